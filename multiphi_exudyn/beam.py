@@ -1,0 +1,271 @@
+"""Straight planar Timoshenko beam bending in x-z, as a linear structure.
+
+Two-node elements with the exact static stiffness of the Timoshenko beam (shear flexibility
+Phi = 12 EI / (k G A l^2)) and the consistent mass of their cubic shape functions, rotary inertia
+included (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, 11.5). Each node carries the
+deflection w [m], positive along +z, and the rotation theta [rad], positive where w grows with x
+(theta = dw/dx without shear).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+
+__all__ = ["Beam", "Clamp", "PointMass", "Section", "beam_nodes", "planar_beam"]
+
+COINCIDENT = 1e-9  # of the beam's length: positions closer than this are one node
+
+
+@dataclass(frozen=True)
+class Section:
+    """A prismatic piece of a beam, from ``start`` to ``end`` [m].
+
+    youngs_modulus, shear_modulus [Pa], density [kg/m3], area [m2], second_moment [m4];
+    shear_factor is k in the shear stiffness k G A.
+    """
+
+    start: float
+    end: float
+    youngs_modulus: float
+    density: float
+    area: float
+    second_moment: float
+    shear_modulus: float
+    shear_factor: float = 5 / 6
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start) and math.isfinite(self.end) and self.start < self.end):
+            raise MultiPhiValueError(f"section: got start {self.start!r}, end {self.end!r}, need start < end")
+        for name in ("youngs_modulus", "density", "area", "second_moment", "shear_modulus", "shear_factor"):
+            _positive(f"section {name}", getattr(self, name))
+
+    @classmethod
+    def rectangle(
+        cls,
+        start: float,
+        end: float,
+        *,
+        width: float,
+        height: float,
+        youngs_modulus: float,
+        density: float,
+        poisson_ratio: float = 0.3,
+    ) -> Section:
+        """A rectangle, ``height`` along z; the shear modulus follows from the Poisson ratio."""
+        return cls(
+            start,
+            end,
+            youngs_modulus=youngs_modulus,
+            density=density,
+            area=_positive("width", width) * _positive("height", height),
+            second_moment=width * height**3 / 12,
+            shear_modulus=youngs_modulus / (2 * (1 + poisson_ratio)),
+        )
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A mass [kg] with rotary inertia [kg m2] fixed to the beam at ``at`` [m]."""
+
+    at: float
+    mass: float
+    inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and math.isfinite(self.inertia) and min(self.mass, self.inertia) >= 0):
+            raise MultiPhiValueError(
+                f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0"
+            )
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """The support of the beam's first end: stiffness against w [N/m] and against theta [N m/rad].
+
+    Infinite (the default) is an ideally rigid clamp, zero a free end.
+    """
+
+    translation: float = math.inf
+    rotation: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not (self.translation >= 0 and self.rotation >= 0):
+            raise MultiPhiValueError(
+                f"clamp: got translation {self.translation!r}, rotation {self.rotation!r}, need values >= 0"
+            )
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Description of a straight planar beam; every model of it is built from this one object.
+
+    sections: pieces that follow each other without a gap. points: name -> x [m].
+    """
+
+    sections: Sequence[Section]
+    points: Mapping[str, float] = field(default_factory=dict)
+    masses: Sequence[PointMass] = ()
+    clamp: Clamp = Clamp()
+
+    def __post_init__(self) -> None:
+        if not self.sections:
+            raise MultiPhiValueError("sections: got none, need at least one Section")
+        for left, right in zip(self.sections, self.sections[1:], strict=False):
+            if abs(left.end - right.start) > COINCIDENT * self.length:
+                raise MultiPhiValueError(
+                    f"sections: one ends at {left.end:g} m, the next starts at {right.start:g} m; need no gap"
+                )
+        places = {f"points[{name!r}]": x for name, x in self.points.items()}
+        places |= {f"point mass {i}": mass.at for i, mass in enumerate(self.masses)}
+        for name, x in places.items():
+            if not self.start <= x <= self.end:
+                raise MultiPhiValueError(f"{name}: got x = {x!r} m, need {self.start:g} <= x <= {self.end:g}")
+
+    @property
+    def start(self) -> float:
+        """Position of the clamped end [m]."""
+        return self.sections[0].start
+
+    @property
+    def end(self) -> float:
+        """Position of the far end [m]."""
+        return self.sections[-1].end
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return self.end - self.start
+
+    def section_at(self, x: float) -> Section:
+        """The section that holds x [m] (at a boundary: the one behind it)."""
+        return next((s for s in self.sections if x < s.end), self.sections[-1])
+
+
+def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
+    """Node positions [m], ascending: a node at every named point, mass and section end.
+
+    ``elements`` is the number of elements aimed at; the pieces between the fixed places are divided
+    into equal elements no longer than length / elements, so there can be a few more.
+    """
+    if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)):
+        raise MultiPhiTypeError(f"elements: got {elements!r}, need an integer >= 1")
+    if elements < 1:
+        raise MultiPhiValueError(f"elements: got {elements}, need an integer >= 1")
+    places = np.sort(
+        np.array(
+            [beam.start]
+            + [s.end for s in beam.sections]
+            + list(beam.points.values())
+            + [mass.at for mass in beam.masses]
+        )
+    )
+    places = places[np.concatenate(([True], np.diff(places) > COINCIDENT * beam.length))]
+    longest = beam.length / elements
+    pieces = [
+        np.linspace(left, right, math.ceil((right - left) / longest - 1e-9) + 1)[:-1]
+        for left, right in zip(places, places[1:], strict=False)
+    ]
+    return np.concatenate([*pieces, [beam.end]])
+
+
+def planar_beam(
+    beam: Beam, elements: int = 57, damping: Matrix | ModalDamping | RayleighDamping | None = None
+) -> LinearStructure:
+    """The beam as a LinearStructure; its points are the deflections w [m] at ``beam.points``.
+
+    DoFs: (w, theta) of every node from the clamped end, those held by a rigid clamp left out.
+    """
+    nodes = beam_nodes(beam, elements)
+    mass = np.zeros((2 * len(nodes), 2 * len(nodes)))
+    stiffness = np.zeros_like(mass)
+    for i, (left, right) in enumerate(zip(nodes, nodes[1:], strict=False)):
+        dofs = slice(2 * i, 2 * i + 4)
+        section = beam.section_at((left + right) / 2)
+        mass[dofs, dofs] += _element_mass(section, right - left)
+        stiffness[dofs, dofs] += _element_stiffness(section, right - left)
+    for point_mass in beam.masses:
+        dof = 2 * _node_at(nodes, point_mass.at)
+        mass[dof, dof] += point_mass.mass
+        mass[dof + 1, dof + 1] += point_mass.inertia
+    held = []
+    for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)):
+        if math.isinf(spring):
+            held.append(dof)
+        else:
+            stiffness[dof, dof] += spring
+    free = np.setdiff1d(np.arange(len(mass)), held)
+    rows = np.eye(len(mass))[:, free]
+    points = {name: rows[2 * _node_at(nodes, x)] for name, x in beam.points.items()}
+    return LinearStructure(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)], damping, points)
+
+
+def _node_at(nodes: np.ndarray, x: float) -> int:
+    return int(np.argmin(np.abs(nodes - x)))
+
+
+def _element_stiffness(section: Section, length: float) -> np.ndarray:
+    bending = section.youngs_modulus * section.second_moment
+    phi = _shear_flexibility(section, length)
+    a, b = 6 * length, length**2
+    return (
+        bending
+        / (length**3 * (1 + phi))
+        * np.array(
+            [
+                [12, a, -12, a],
+                [a, (4 + phi) * b, -a, (2 - phi) * b],
+                [-12, -a, 12, -a],
+                [a, (2 - phi) * b, -a, (4 + phi) * b],
+            ]
+        )
+    )
+
+
+def _element_mass(section: Section, length: float) -> np.ndarray:
+    """Integral of N^T rho A N + S^T rho I S over the element, by Gauss points that are exact for it."""
+    phi = _shear_flexibility(section, length)
+    abscissae, weights = np.polynomial.legendre.leggauss(4)  # exact to degree 7; the integrand has degree 6
+    matrix = np.zeros((4, 4))
+    for s, weight in zip((abscissae + 1) / 2, weights * length / 2, strict=True):
+        deflection, rotation = _shape_functions(s, phi, length)
+        matrix += weight * section.density * section.area * np.outer(deflection, deflection)
+        matrix += weight * section.density * section.second_moment * np.outer(rotation, rotation)
+    return matrix
+
+
+def _shape_functions(s: float, phi: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    deflection = np.array(
+        [
+            1 - 3 * s**2 + 2 * s**3 + phi * (1 - s),
+            length * (s - 2 * s**2 + s**3 + phi * (s - s**2) / 2),
+            3 * s**2 - 2 * s**3 + phi * s,
+            length * (-(s**2) + s**3 - phi * (s - s**2) / 2),
+        ]
+    )
+    rotation = np.array(
+        [
+            6 * (s**2 - s) / length,
+            1 - 4 * s + 3 * s**2 + phi * (1 - s),
+            6 * (s - s**2) / length,
+            -2 * s + 3 * s**2 + phi * s,
+        ]
+    )
+    return deflection / (1 + phi), rotation / (1 + phi)
+
+
+def _shear_flexibility(section: Section, length: float) -> float:
+    shear = section.shear_factor * section.shear_modulus * section.area
+    return 12 * section.youngs_modulus * section.second_moment / (shear * length**2)
+
+
+def _positive(name: str, value: float) -> float:
+    if not (isinstance(value, (int, float, np.number)) and math.isfinite(value) and value > 0):
+        raise MultiPhiValueError(f"{name}: got {value!r}, need a finite value > 0")
+    return float(value)
