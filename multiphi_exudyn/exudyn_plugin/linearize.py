@@ -1,0 +1,303 @@
+"""Linearisation of an Exudyn system: its (M, C, K) about the current state, and its contacts.
+
+    q = q_0 + S z,   M = S^T M_q S,  C = S^T C_q S,  K = S^T K_q S
+
+q [m, rad, ...] are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions the
+constraints leave free (orthonormal columns, from the constraint Jacobian at q_0), z the coordinates of
+the linear structure. The state must be an equilibrium of everything but the contacts and the constraint
+forces: a linear structure has no constant force. What a linear structure cannot hold is not looked for
+beyond that: user functions and other nonlinear forces enter by their tangent at q_0, loads not at all, and
+the geometric stiffness of constraint forces is left out, as in Exudyn's own ComputeLinearizedSystem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn.advancedUtilities import NumericalJacobian
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+
+__all__ = ["LinearizedStructure", "linear_structure_from"]
+
+ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
+HELD = 1e-9  # of a row's largest entry before projection: a point that moves less is held by constraints
+EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
+PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
+
+_AXES = ("x", "y", "z")
+_VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # what only a node with ODE2 coordinates has
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearizedStructure(LinearStructure):
+    """A linear structure that knows the Exudyn coordinates it came from.
+
+    coordinates: S, (n_full, n), with q - q_0 = S z; a copy, read-only. S^T S is the identity, so a
+    matrix A in z acts in Exudyn's coordinates as S A S^T.
+    """
+
+    coordinates: np.ndarray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        coordinates = np.array(self.coordinates, dtype=float)
+        if coordinates.ndim != 2 or coordinates.shape[1] != self.n:
+            raise MultiPhiValueError(f"coordinates: got shape {coordinates.shape}, need (n_full, {self.n})")
+        coordinates.flags.writeable = False
+        object.__setattr__(self, "coordinates", coordinates)
+
+
+def linear_structure_from(
+    mbs: Any,
+    points: Mapping[str, Any] | None = None,
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+) -> tuple[LinearizedStructure, tuple[UnilateralContact, ...]]:
+    """Linearise an assembled Exudyn system about its current state; the system is left as it was.
+
+    points: name -> marker index, or (node index, coordinate number). A marker of one coordinate gives the
+    point ``name``; a marker with a position gives ``name.x``, ``name.y``, ``name.z``, a marker of several
+    coordinates ``name.0``, ``name.1``, ... Without ``points`` every marker is named so by its own name and
+    every node coordinate as ``<node name>.<coordinate number>``; those that cannot move are left out.
+    damping: in the coordinates z or by ratios; None takes what the system's own dampers give.
+
+    Every active ObjectContactCoordinate comes back as a UnilateralContact of the object's name: its row,
+    the gap [m] at the linearisation point and its stiffness [N/m]; none of them is part of the stiffness.
+
+    Raises MultiPhiValueError for a contact, a state or a matrix that a linear structure cannot hold.
+    """
+    _check_system(mbs)
+    objects = _contact_objects(mbs)
+    with _initial_is_current(mbs):
+        gaps = [_gap(mbs, index) for index in objects]
+        with _inactive(mbs, objects):
+            mass, stiffness, dampers, basis = _projected_matrices(mbs)
+            _check_equilibrium(mbs, stiffness, basis)
+        rows = _default_points(mbs, basis) if points is None else _given_points(mbs, points, basis)
+        contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
+    if damping is None and np.any(dampers):
+        damping = dampers
+    structure = LinearizedStructure(mass, stiffness, damping, rows, coordinates=basis)
+    return structure, contacts
+
+
+def _check_system(mbs: Any) -> None:
+    if not mbs.systemIsConsistent:
+        raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
+    if len(mbs.systemData.GetODE2Coordinates()) == 0:
+        raise MultiPhiValueError("mbs: got no ODE2 coordinates, need at least one")
+    if len(mbs.systemData.GetODE1Coordinates()) > 0:
+        raise MultiPhiValueError("mbs: got ODE1 coordinates, need a system of second order only")
+    if mbs.NumberOfGeneralContacts() > 0:
+        raise MultiPhiValueError("mbs: got a GeneralContact, need ObjectContactCoordinate items only")
+
+
+def _contact_objects(mbs: Any) -> list[Any]:
+    """Indices of the active contacts; raises for one that is not a unilateral spring of one coordinate."""
+    found = []
+    for i in range(mbs.systemData.NumberOfObjects()):
+        index = exu.ObjectIndex(i)
+        item = mbs.GetObject(index)
+        if not item["objectType"].startswith("Contact") or not item["activeConnector"]:
+            continue
+        if item["objectType"] != "ContactCoordinate":
+            raise MultiPhiValueError(
+                f"contact {item['name']!r}: got Object{item['objectType']}, need ObjectContactCoordinate"
+            )
+        _check_law(item)
+        found.append(index)
+    return found
+
+
+def _check_law(item: Mapping[str, Any]) -> None:
+    needed = {"contactDamping": 0.0, "contactStiffnessExponent": 1.0, "impactModel": 0}
+    for name, value in needed.items():
+        if item[name] != value:
+            raise MultiPhiValueError(
+                f"contact {item['name']!r} {name}: got {item[name]!r}, need {value!r} (a linear spring)"
+            )
+
+
+@contextmanager
+def _initial_is_current(mbs: Any) -> Iterator[None]:
+    """Make the current state the initial one, about which Exudyn linearises; restore both afterwards."""
+    data, initial = mbs.systemData, exu.ConfigurationType.Initial
+    stored, current = data.GetSystemState(initial), data.GetSystemState()
+    accelerations, time = data.GetODE2Coordinates_tt(), data.GetTime()
+    data.SetSystemState(current, initial)
+    try:
+        yield
+    finally:
+        data.SetSystemState(stored, initial)
+        data.SetSystemState(current)
+        data.SetODE2Coordinates_tt(accelerations)
+        data.SetTime(time)
+
+
+@contextmanager
+def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
+    """Switch the contacts off and, whatever happens, on again."""
+    try:
+        for index in objects:
+            mbs.SetObjectParameter(index, "activeConnector", False)
+        yield
+    finally:
+        for index in objects:
+            mbs.SetObjectParameter(index, "activeConnector", True)
+
+
+def _projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """M, K, C in z, (n, n), and the basis S, (n_full, n)."""
+    result = mbs.ComputeLinearizedSystem(
+        projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
+    )
+    mass, stiffness, damping = result[:3]
+    basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
+    if basis.shape[1] == 0:
+        raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
+    return _symmetric("mass", mass), _symmetric("stiffness", stiffness), _symmetric("damping", damping), basis
+
+
+def _symmetric(name: str, matrix: np.ndarray) -> np.ndarray:
+    matrix = np.asarray(matrix)
+    if np.max(np.abs(matrix - matrix.T)) > ASYMMETRY * np.max(np.abs(matrix)):
+        raise MultiPhiValueError(
+            f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), need a symmetric one"
+        )
+    return (matrix + matrix.T) / 2
+
+
+def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
+    unbalanced = np.abs(basis.T @ _forces(mbs))
+    elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
+    if np.max(unbalanced) > EQUILIBRIUM * elastic + PICOMETRE * np.max(np.abs(stiffness)):
+        raise MultiPhiValueError(
+            f"mbs: its state without contacts is out of balance by {np.max(unbalanced):g} N (or N m), need "
+            "an equilibrium with open contacts: take loads off, or solve the static problem first"
+        )
+
+
+def _forces(mbs: Any) -> np.ndarray:
+    """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.active = False
+    settings.staticSolver.verboseMode = 0
+    solver = exu.MainSolverStatic()
+    solver.InitializeSolver(mbs, settings)
+    solver.ComputeODE2RHS(mbs)
+    forces = np.array(solver.GetSystemResidual())[: solver.GetODE2size()]
+    solver.FinalizeSolver(mbs, settings)
+    return forces
+
+
+def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:
+    item = mbs.GetObject(index)
+    first, second = (_coordinate_row(mbs, exu.MarkerIndex(m)) @ basis for m in item["markerNumbers"])
+    return UnilateralContact(item["name"], second - first, gap, float(item["contactStiffness"]))
+
+
+def _gap(mbs: Any, index: Any) -> float:
+    return float(mbs.GetObjectOutput(index, exu.OutputVariableType.Distance))
+
+
+def _coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
+    return next(iter(_marker_rows(mbs, "marker", marker).values()))
+
+
+def _default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
+    rows: dict[str, np.ndarray] = {}
+    for i in range(mbs.systemData.NumberOfMarkers()):
+        marker = exu.MarkerIndex(i)
+        try:
+            found = _marker_rows(mbs, mbs.GetMarker(marker)["name"], marker)
+        except MultiPhiError:  # a marker without position or coordinates names no point
+            continue
+        _add(rows, found)
+    for i in range(mbs.systemData.NumberOfNodes()):
+        _add(rows, _node_rows(mbs, exu.NodeIndex(i)))
+    return {name: row @ basis for name, row in rows.items() if _moves(row, basis)}
+
+
+def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
+    for name, row in found.items():
+        if name in rows:
+            raise MultiPhiValueError(f"points: got the name {name!r} twice, need the argument points")
+        rows[name] = row
+
+
+def _given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
+    rows: dict[str, np.ndarray] = {}
+    for name, given in points.items():
+        _add(rows, _given_rows(mbs, name, given))
+    return {name: row @ basis for name, row in rows.items()}
+
+
+def _given_rows(mbs: Any, name: str, given: Any) -> dict[str, np.ndarray]:
+    if isinstance(given, tuple):
+        return {name: _node_coordinate_row(mbs, name, *given)}
+    if not isinstance(given, (int, np.integer, exu.MarkerIndex)):
+        raise MultiPhiTypeError(
+            f"points[{name!r}]: got {given!r}, need a marker index or (node index, coordinate number)"
+        )
+    if not 0 <= int(given) < mbs.systemData.NumberOfMarkers():
+        raise MultiPhiValueError(f"points[{name!r}]: got marker {int(given)}, need one that exists")
+    return _marker_rows(mbs, name, exu.MarkerIndex(int(given)))
+
+
+def _node_coordinate_row(mbs: Any, name: str, node: Any, coordinate: int) -> np.ndarray:
+    rows = list(_node_rows(mbs, exu.NodeIndex(int(node))).values())
+    if not 0 <= coordinate < len(rows):
+        raise MultiPhiValueError(
+            f"points[{name!r}]: got coordinate {coordinate}, need 0 <= coordinate < {len(rows)}"
+        )
+    return rows[coordinate]
+
+
+def _node_rows(mbs: Any, node: Any) -> dict[str, np.ndarray]:
+    """Row of every coordinate of a node, (n_full,) each; none for ground and data nodes."""
+    item, coordinates = mbs.GetNode(node), np.eye(len(mbs.systemData.GetODE2Coordinates()))
+    if not _VELOCITIES & item.keys():
+        return {}
+    first, count = mbs.GetNodeODE2Index(node), len(item["initialCoordinates"])
+    return {f"{item['name']}.{c}": coordinates[first + c] for c in range(count)}
+
+
+def _marker_rows(mbs: Any, name: str, marker: Any) -> dict[str, np.ndarray]:
+    """Rows by which a marker's coordinates, or else its position, follow the coordinates, (n_full,) each."""
+    if mbs.GetMarker(marker)["markerType"] == "NodeCoordinate":
+        return {name: _node_coordinate_marker_row(mbs, marker)}
+    outputs = exu.OutputVariableType
+    for variable, labels in ((outputs.Coordinates, None), (outputs.Position, _AXES)):
+        try:
+            values = np.atleast_1d(mbs.GetMarkerOutput(marker, variable))
+        except (exu.ExudynError, ValueError):  # not an output of this type of marker
+            continue
+        rows = _derivative(mbs, marker, variable)
+        if len(values) == 1:
+            return {name: rows[0]}
+        return {f"{name}.{label}": row for label, row in zip(labels or range(len(values)), rows, strict=True)}
+    raise MultiPhiValueError(f"points[{name!r}]: got a marker without coordinates or position, need one")
+
+
+def _node_coordinate_marker_row(mbs: Any, marker: Any) -> np.ndarray:
+    item = mbs.GetMarker(marker)
+    rows = list(_node_rows(mbs, exu.NodeIndex(item["nodeNumber"])).values())
+    return rows[item["coordinate"]] if rows else np.zeros(len(mbs.systemData.GetODE2Coordinates()))
+
+
+def _derivative(mbs: Any, marker: Any, variable: Any) -> np.ndarray:
+    """Central differences of a marker's output by the ODE2 coordinates, (values, n_full)."""
+    every = range(len(mbs.systemData.GetODE2Coordinates()))
+    return NumericalJacobian(mbs, lambda: mbs.GetMarkerOutput(marker, variable), every)
+
+
+def _moves(row: np.ndarray, basis: np.ndarray) -> bool:
+    return bool(np.max(np.abs(row @ basis)) > HELD * np.max(np.abs(row), initial=1.0))
