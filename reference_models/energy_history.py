@@ -1,0 +1,49 @@
+"""Energy of a full beam after its run, from the states that were kept.
+
+E = T + V + sum 1/2 k_i min(0, g_i)^2,   W_d(t) = integral of v.C v
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from exudyn.advancedUtilities import SystemEnergy
+from scipy.integrate import cumulative_trapezoid
+
+from reference_models.histories import Histories
+from reference_models.point_contact import PointContact
+from reference_models.recorder import Recorder
+
+__all__ = ["dissipated_energy", "energy_history"]
+
+
+def energy_history(
+    mbs: Any, recorder: Recorder, contacts: Sequence[PointContact], steps: Histories
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (j,) [s] and energies (j,) [J] of the states kept; the system is left in the last of them."""
+    time = np.array(recorder.state_times)
+    time = time[time <= steps.time[-1]]
+    total = SystemEnergy(mbs)
+    energy = np.array([_energy(mbs, total, *state) for state in recorder.states[: len(time)]])
+    kept = np.searchsorted(steps.time, time)
+    for contact in contacts:
+        energy += contact.energy(steps.gaps[contact.name][kept])
+    return time, energy
+
+
+def dissipated_energy(recorder: Recorder, damping: np.ndarray | None, time: np.ndarray) -> np.ndarray:
+    """Energy [J] the damping matrix (n_full, n_full) has dissipated by the times (j,)."""
+    if damping is None or len(recorder.velocity_times) < 2:
+        return np.zeros(len(time))
+    velocities = np.array(recorder.velocities, dtype=float)
+    power = np.einsum("ti,ti->t", velocities @ damping, velocities)
+    dissipated = cumulative_trapezoid(power, recorder.velocity_times, initial=0)
+    return np.interp(time, recorder.velocity_times, dissipated)
+
+
+def _energy(mbs: Any, total: SystemEnergy, q: np.ndarray, q_t: np.ndarray) -> float:
+    mbs.systemData.SetODE2Coordinates(q)
+    mbs.systemData.SetODE2Coordinates_t(q_t)
+    return total.ComputeSystemEnergies()[-1]

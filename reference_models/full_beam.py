@@ -1,0 +1,209 @@
+"""The full nonlinear model: an Exudyn beam with contact elements, from a beam's description.
+
+    M(q) q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq,   lambda_i = k_i max(0, -g_i)
+
+Large displacements, penalty contacts, implicit time integration. A reduced model of the same scene takes
+its (M, C, K) from ``structure``, so that the two differ in nothing but the reduction, the geometric
+nonlinearity and the time integration.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from multiphi_exudyn.beam import Beam
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
+from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
+from reference_models.energy_history import dissipated_energy, energy_history
+from reference_models.exudyn_quiet import quiet
+from reference_models.full_beam_settings import FullBeamSettings
+from reference_models.full_run import ENERGY_GAIN, EnergyBalance, FullRun, closed_intervals
+from reference_models.histories import Histories, watched_coordinates
+from reference_models.integration import Integration, integrate
+from reference_models.point_contact import point_contacts
+from reference_models.recorder import Recorder
+from reference_models.solver_settings import simulation_settings
+from reference_models.static_start import static_start
+
+__all__ = ["FullBeam", "FullBeamSettings", "FullRun"]
+
+DEFAULT_SETTINGS = FullBeamSettings()
+SYMMETRY = 1e-9  # of the largest entry of a damping matrix
+WHOLE_STEP = 1e-6  # of a step: how far the last sample of a grid may lie beyond the last step
+
+
+class FullBeam:
+    """A beam and its contacts as an Exudyn model.
+
+    contacts: each on one point of the beam, with a finite stiffness.
+    structure: the beam without contacts, linearised where it is straight; its points are beam.points.
+    """
+
+    def __init__(
+        self,
+        beam: Beam,
+        contacts: Sequence[UnilateralContact],
+        settings: FullBeamSettings = DEFAULT_SETTINGS,
+    ) -> None:
+        self.beam = beam
+        self.contacts = point_contacts(beam, contacts)
+        self.settings = settings
+        started = time.perf_counter()
+        with quiet():
+            self.structure = _linearized(beam, settings)
+        self._building_s = time.perf_counter() - started
+
+    @property
+    def dofs(self) -> int:
+        """Number of free coordinates."""
+        return self.structure.n
+
+    def run(
+        self,
+        t_end: float,
+        *,
+        load_at: str,
+        measured_at: str,
+        displacement: float,
+        damping: np.ndarray | None = None,
+        progress: bool = True,
+    ) -> FullRun:
+        """Pull at ``load_at`` until ``measured_at`` deflects by ``displacement`` [m], let go, integrate.
+
+        damping: C [N s/m], (n, n), in the coordinates of ``structure``. A numerical failure is a status of
+        the result; MultiPhiValueError is for the arguments only.
+        """
+        self._check_start(t_end, load_at, measured_at, displacement)
+        matrix = None if damping is None else self._full_damping(damping)
+        with quiet():
+            started = time.perf_counter()
+            load = self.beam.points[load_at]
+            system = build_beam_system(self.beam, self.settings, self.contacts, matrix, load)
+            solver = simulation_settings(self.settings, t_end)
+            measured = system.coordinate(self.beam.points[measured_at])
+            guess = displacement / self._flexibility(load_at, measured_at)
+            try:
+                force = static_start(system, measured, displacement, guess, solver)
+            except NumericalFailure as failure:
+                return self._not_started(str(failure), self._building_s + time.perf_counter() - started)
+            offline_s = self._building_s + time.perf_counter() - started
+            watched = watched_coordinates(system, self.beam, self.contacts)
+            recorder = Recorder(system.mbs, watched, self.settings.output_step, t_end, progress)
+            integration = integrate(system.mbs, solver, recorder, self.settings.cpu_limit_s)
+            return self._result(system, recorder, integration, matrix, force, offline_s)
+
+    def _check_start(self, t_end: float, load_at: str, measured_at: str, displacement: float) -> None:
+        if not (math.isfinite(t_end) and t_end > 0):
+            raise MultiPhiValueError(f"t_end: got {t_end!r}, need a finite time > 0")
+        if not (math.isfinite(displacement) and displacement != 0):
+            raise MultiPhiValueError(f"displacement: got {displacement!r}, need a finite value, not zero")
+        for name, point in (("load_at", load_at), ("measured_at", measured_at)):
+            if point not in self.beam.points:
+                known = ", ".join(sorted(self.beam.points)) or "none"
+                raise MultiPhiValueError(f"{name}: got {point!r}, need one of: {known}")
+            if not np.any(self.structure.row(point)):
+                raise MultiPhiValueError(f"{name}: got {point!r}, held by the clamp; need a point that moves")
+
+    def _full_damping(self, damping: np.ndarray) -> np.ndarray:
+        """C in Exudyn's coordinates, (n_full, n_full): S C S^T, as S has orthonormal columns."""
+        matrix, n = np.asarray(damping, dtype=float), self.structure.n
+        if matrix.shape != (n, n) or not np.all(np.isfinite(matrix)):
+            raise MultiPhiValueError(f"damping: got shape {matrix.shape}, need {(n, n)} of finite numbers")
+        if np.max(np.abs(matrix - matrix.T)) > SYMMETRY * np.max(np.abs(matrix)):
+            raise MultiPhiValueError("damping: got an asymmetric matrix, need a symmetric one")
+        return self.structure.coordinates @ matrix @ self.structure.coordinates.T
+
+    def _flexibility(self, load_at: str, measured_at: str) -> float:
+        """Linear contact-free deflection of one point under a unit force at another [m/N]."""
+        load, measured = self.structure.row(load_at), self.structure.row(measured_at)
+        return float(measured @ np.linalg.lstsq(self.structure.stiffness, load)[0])
+
+    def _result(
+        self,
+        system: BeamSystem,
+        recorder: Recorder,
+        integration: Integration,
+        damping: np.ndarray | None,
+        force: float,
+        offline_s: float,
+    ) -> FullRun:
+        steps = Histories.recorded(recorder, self.beam, self.contacts, self.settings)
+        grid = steps.at(_grid(steps.time[-1], self.settings))
+        energy_time, energy = energy_history(system.mbs, recorder, self.contacts, steps)
+        balance = EnergyBalance.of(energy_time, energy, dissipated_energy(recorder, damping, energy_time))
+        failure = _failure(integration, recorder, steps, balance)
+        return FullRun(
+            status="failed" if failure else "ok",
+            message=failure[0] if failure else "",
+            failed_at=failure[1] if failure else None,
+            time=grid.time,
+            points=grid.points,
+            contact_force={c.name: c.force(grid.gaps[c.name]) for c in self.contacts},
+            gaps=grid.gaps,
+            contact_intervals={name: closed_intervals(steps.time, gap) for name, gap in steps.gaps.items()},
+            energy_time=energy_time,
+            energy=energy,
+            balance=balance,
+            start_force=force,
+            steps=len(steps.time) - 1,
+            offline_s=offline_s,
+            online_s=integration.wall_s,
+            dofs=self.dofs,
+            settings=self.settings,
+        )
+
+    def _not_started(self, message: str, offline_s: float) -> FullRun:
+        none = np.empty(0)
+        contacts = {contact.name: none for contact in self.contacts}
+        return FullRun(
+            status="failed",
+            message=message,
+            failed_at=0.0,
+            time=none,
+            points=dict.fromkeys(self.beam.points, none),
+            contact_force=contacts,
+            gaps=contacts,
+            contact_intervals=dict.fromkeys(contacts, ()),
+            energy_time=none,
+            energy=none,
+            balance=None,
+            start_force=math.nan,
+            steps=0,
+            offline_s=offline_s,
+            online_s=0.0,
+            dofs=self.dofs,
+            settings=self.settings,
+        )
+
+
+def _linearized(beam: Beam, settings: FullBeamSettings) -> LinearizedStructure:
+    system = build_beam_system(beam, settings)
+    points = {name: (system.nodes[system.node_at(x)], DEFLECTION) for name, x in beam.points.items()}
+    return linear_structure_from(system.mbs, points)[0]
+
+
+def _grid(last: float, settings: FullBeamSettings) -> np.ndarray:
+    """Multiples of output_step [s] up to the last step."""
+    count = math.floor((last + WHOLE_STEP * settings.step) / settings.output_step)
+    return settings.output_step * np.arange(count + 1)
+
+
+def _failure(
+    integration: Integration, recorder: Recorder, steps: Histories, balance: EnergyBalance
+) -> tuple[str, float] | None:
+    """Cause and time [s] of a failure; the first in time where there are several."""
+    last = float(steps.time[-1])
+    if balance.gain_at is not None:
+        gain = f"energy gained: more than {ENERGY_GAIN:.0%} by {balance.gain_at:.6g} s"
+        return f"{gain}, at worst {balance.worst_gain:.2%} at {balance.worst_gain_at:.6g} s", balance.gain_at
+    if integration.cause:
+        return f"{integration.cause} at {last:.6g} s", last
+    if len(steps.time) < len(recorder.times):
+        return f"state not finite after {last:.6g} s", last
+    return None
