@@ -175,7 +175,7 @@ def _symmetric(name: str, matrix: np.ndarray) -> np.ndarray:
 
 
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
-    unbalanced = np.abs(basis.T @ _forces(mbs))
+    unbalanced = np.abs(basis @ (basis.T @ _forces(mbs)))  # what constraint forces cannot balance
     elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
     if np.max(unbalanced) > EQUILIBRIUM * elastic + PICOMETRE * np.max(np.abs(stiffness)):
         raise MultiPhiValueError(
