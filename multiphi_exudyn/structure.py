@@ -24,7 +24,8 @@ __all__ = ["At", "LinearStructure", "Matrix", "ModalDamping", "RayleighDamping"]
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
 
-SYMMETRY_TOLERANCE = 1e-9  # of the largest entry: above what assembling in floating point leaves
+ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating point leaves of a zero
+REAL_KINDS = "biufO"  # numpy's codes of what may be converted: numbers, and objects that know how
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,11 @@ class ModalDamping:
     beyond: float = 0.0
 
     def __post_init__(self) -> None:
-        values = np.asarray(self.ratios, dtype=float)
+        values = _real("ratios", self.ratios, "a list of ratios")
         if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values < 0):
             raise MultiPhiValueError(f"ratios: got {self.ratios!r}, need a list of finite ratios >= 0")
-        if not (np.isfinite(self.beyond) and self.beyond >= 0):
-            raise MultiPhiValueError(f"beyond: got {self.beyond!r}, need a finite ratio >= 0")
+        object.__setattr__(self, "ratios", tuple(values.tolist()))
+        _check_not_negative("beyond", self.beyond)
 
     def of(self, count: int) -> np.ndarray:
         """Ratios of the lowest ``count`` modes, (count,)."""
@@ -61,13 +62,11 @@ class RayleighDamping:
     beta: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.alpha) and np.isfinite(self.beta) and min(self.alpha, self.beta) >= 0):
-            raise MultiPhiValueError(
-                f"alpha, beta: got {self.alpha!r}, {self.beta!r}, need finite values >= 0"
-            )
+        _check_not_negative("alpha", self.alpha)
+        _check_not_negative("beta", self.beta)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearStructure:
     """A linear structure; see the module's docstring for the equation.
 
@@ -76,7 +75,8 @@ class LinearStructure:
     points: name -> DoF index or (n,) row.
 
     Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
-    asymmetric matrix, a mass that is not positive definite, a negative diagonal of the stiffness.
+    asymmetric matrix, a mass that is not positive definite, a negative diagonal of stiffness or damping.
+    Two structures are equal only if they are the same object.
     """
 
     mass: Matrix
@@ -86,18 +86,14 @@ class LinearStructure:
 
     def __post_init__(self) -> None:
         mass = _symmetric("mass", self.mass, None)
-        stiffness = _symmetric("stiffness", self.stiffness, mass.shape[0])
         _check_positive_definite(mass)
-        if np.any(stiffness.diagonal() < 0):
-            raise MultiPhiValueError(
-                f"stiffness: diagonal entry {int(np.argmin(stiffness.diagonal()))} is "
-                f"{stiffness.diagonal().min():g}, need values >= 0"
-            )
+        stiffness = _semidefinite_diagonal("stiffness", self.stiffness, mass.shape[0])
         damping = self.damping
         if not (damping is None or isinstance(damping, (ModalDamping, RayleighDamping))):
-            damping = _symmetric("damping", damping, mass.shape[0])
-        rows = {name: _point_row(name, given, mass.shape[0]) for name, given in dict(self.points).items()}
-        for name, value in zip(("mass", "stiffness", "damping", "points"), (mass, stiffness, damping, rows), strict=True):
+            damping = _semidefinite_diagonal("damping", damping, mass.shape[0])
+        rows = _point_rows(self.points, mass.shape[0])
+        checked = {"mass": mass, "stiffness": stiffness, "damping": damping, "points": rows}
+        for name, value in checked.items():
             object.__setattr__(self, name, value)
 
     @property
@@ -115,37 +111,56 @@ class LinearStructure:
         if isinstance(at, Mapping):
             if not at:
                 raise MultiPhiValueError("direction: got an empty mapping, need {point: coefficient, ...}")
-            return np.sum([_coefficient(name, value) * self.row(name) for name, value in at.items()], axis=0)
+            return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
         return _vector("row", at, self.n)
+
+    def vector(self, name: str, given: Any) -> np.ndarray:
+        """A copy of ``given`` as finite (n,) numbers; ``name`` is what an error calls it."""
+        return _vector(name, given, self.n)
 
 
 def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
-    if scipy.sparse.issparse(given):
-        matrix = scipy.sparse.csr_array(given, dtype=float)
-        values = matrix.data
-    else:
-        try:
-            matrix = np.array(given, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise MultiPhiTypeError(
-                f"{name}: got {type(given).__name__}, need an (n, n) array of real numbers"
-            ) from error
-        values = matrix
+    matrix = _real(name, given, "an (n, n) array of real numbers")
+    values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
         raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need (n, n)")
     if n is not None and matrix.shape[0] != n:
         raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need {(n, n)} as the mass has")
     if not np.all(np.isfinite(values)):
         raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
-    largest = np.max(np.abs(values), initial=0.0)
-    difference = matrix - matrix.T
-    asymmetry = np.max(np.abs(difference.data if scipy.sparse.issparse(difference) else difference), initial=0.0)
-    if asymmetry > SYMMETRY_TOLERANCE * largest:
+    asymmetry = _largest(matrix - matrix.T)
+    if asymmetry > ROUND_OFF * _largest(matrix):
         raise MultiPhiValueError(f"{name}: asymmetric by {asymmetry:g}, need a symmetric matrix")
     symmetric = (matrix + matrix.T) / 2
     if not scipy.sparse.issparse(symmetric):
         symmetric.flags.writeable = False
     return symmetric
+
+
+def _real(name: str, given: Any, needed: str) -> Matrix:
+    """A copy of ``given`` as real numbers, sparse if it is; text and complex numbers are not converted."""
+    if scipy.sparse.issparse(given) and given.dtype.kind in REAL_KINDS:
+        return scipy.sparse.csr_array(given, dtype=float)
+    try:
+        array = np.array(given)
+        if array.dtype.kind in REAL_KINDS:
+            return array.astype(float, copy=False)
+    except (TypeError, ValueError) as error:
+        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need {needed}") from error
+    raise MultiPhiTypeError(f"{name}: got {type(given).__name__} of {array.dtype}, need {needed}")
+
+
+def _largest(matrix: Matrix) -> float:
+    return float(np.max(np.abs(matrix.data if scipy.sparse.issparse(matrix) else matrix), initial=0.0))
+
+
+def _semidefinite_diagonal(name: str, given: Matrix, n: int) -> Matrix:
+    matrix = _symmetric(name, given, n)
+    diagonal = matrix.diagonal()
+    if np.any(diagonal < -ROUND_OFF * _largest(matrix)):
+        worst = int(np.argmin(diagonal))
+        raise MultiPhiValueError(f"{name}: diagonal entry {worst} is {diagonal[worst]:g}, need values >= 0")
+    return matrix
 
 
 def _check_positive_definite(mass: Matrix) -> None:
@@ -160,6 +175,12 @@ def _check_positive_definite(mass: Matrix) -> None:
         scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
+
+
+def _point_rows(given: Any, n: int) -> dict[str, np.ndarray]:
+    if not isinstance(given, Mapping):
+        raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {{name: DoF index or ({n},) row}}")
+    return {name: _point_row(name, place, n) for name, place in given.items()}
 
 
 def _point_row(name: str, given: int | np.ndarray, n: int) -> np.ndarray:
@@ -177,10 +198,7 @@ def _point_row(name: str, given: int | np.ndarray, n: int) -> np.ndarray:
 
 
 def _vector(name: str, given: Any, n: int) -> np.ndarray:
-    try:
-        vector = np.array(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need an ({n},) array") from error
+    vector = _real(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
     if not np.all(np.isfinite(vector)):
@@ -189,6 +207,21 @@ def _vector(name: str, given: Any, n: int) -> np.ndarray:
 
 
 def _coefficient(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+    if not isinstance(name, str):
+        raise MultiPhiTypeError(f"direction: got the name {name!r}, need the name of a point")
+    if not _is_real(value):
+        raise MultiPhiTypeError(f"direction[{name!r}]: got {value!r}, need a number")
+    if not np.isfinite(value):
         raise MultiPhiValueError(f"direction[{name!r}]: got {value!r}, need a finite coefficient")
     return float(value)
+
+
+def _check_not_negative(name: str, value: Any) -> None:
+    if not _is_real(value):
+        raise MultiPhiTypeError(f"{name}: got {value!r}, need a number")
+    if not (np.isfinite(value) and value >= 0):
+        raise MultiPhiValueError(f"{name}: got {value!r}, need a finite value >= 0")
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)

@@ -1,6 +1,33 @@
-"""Settings of the whole suite: property tests draw the same examples in every run."""
+"""What the whole suite shares: reproducible property tests, and how a bad input has to be refused."""
 
+from collections.abc import Callable
+from typing import Any
+
+import pytest
 from hypothesis import settings
+
+from multiphi_exudyn.errors import MultiPhiError
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
+
+
+@pytest.fixture(scope="session")
+def refused() -> Callable[..., None]:
+    """``refused(kind, begins, build, ...)``: build(...) raises a MultiPhiError that is also a ``kind``.
+
+    Its message is one line, starts with ``begins`` and says what is needed.
+    """
+
+    def check(
+        kind: type[Exception], begins: str, build: Callable[..., Any], *given: Any, **named: Any
+    ) -> None:
+        with pytest.raises(kind) as caught:
+            build(*given, **named)
+        message = str(caught.value)
+        assert isinstance(caught.value, MultiPhiError)
+        assert message.startswith(begins)
+        assert "need" in message
+        assert "\n" not in message
+
+    return check
