@@ -1,0 +1,40 @@
+"""Multi-Phi: structures with contacts as piecewise-linear modal models, exact in time between events.
+
+A structure (M, C, K, named points) and its contacts make levels, one for each set of closed contacts, each with its
+own modes and asymptotic configuration; transitions carry the motion from level to level.
+"""
+
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.level import Level, LevelOverride
+from multiphi_exudyn.loads import ConstantLoad
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.state import Event
+from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.trajectory import Ledger, Trajectory
+
+__all__ = [
+    "Beam",
+    "Clamp",
+    "ConstantLoad",
+    "Event",
+    "Ledger",
+    "Level",
+    "LevelOverride",
+    "LinearStructure",
+    "ModalDamping",
+    "MultiPhiError",
+    "MultiPhiModel",
+    "MultiPhiTypeError",
+    "MultiPhiValueError",
+    "NumericalFailure",
+    "PointMass",
+    "RayleighDamping",
+    "Section",
+    "Trajectory",
+    "UnilateralContact",
+    "planar_beam",
+    "simulate",
+]

@@ -1,0 +1,282 @@
+"""Event rule: when a contact changes state, and which level follows. It is the same in every driver of the model.
+
+Every contact has one function that says whether its present state is admissible, s >= 0:
+
+    open                 s = g         gap
+    closed, compliant    s = -g        penetration
+    closed, rigid        s = lambda    reaction
+
+With all modes the states exclude each other: where one stops being admissible the other begins to be. The truncated
+bases of two levels need not agree, so the rule says what happens then:
+
+1. A contact is *armed* while s >= 0. When s falls through zero it asks to change state.
+2. A rigid contact that asks to close is decided together with all rigid contacts that touch, in the basis of the
+   level in which they are open: Moreau's impact, then complementarity of acceleration and reaction. A contact closes
+   only if the level it enters gives it a reaction >= 0.
+3. A rigid contact that asks to open always opens: it never pulls.
+4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling.
+5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
+   armed when s reaches zero, and asks again if s turns down before.
+6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
+   armed), or until s in the level it would enter has (then it changes).
+
+A sign is that of the first derivative that is not round-off. All instants are roots of analytic signals, so nothing
+depends on sampling. Negative gaps that truncation leaves are measured and reported. An endless exchange at one
+instant is a failure, with its cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State
+from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
+
+__all__ = ["EventRule"]
+
+ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
+ROUND_OFF = 1e-13  # of the sum of a function's absolute terms
+RESTING = 1e-12  # of the same: a gap velocity below it is zero right after an impact
+
+
+class EventRule:
+    """Applies the rule to one model under one static load (m,) in base coordinates."""
+
+    def __init__(self, model: MultiPhiModel, load: np.ndarray) -> None:
+        self.model = model
+        self.load = load
+        self.transitions = 0
+        self._rigid = np.isinf(model.base.stiffnesses)
+        self._levels: dict[tuple[int, ...], LoadedLevel] = {}
+        self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
+        self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[int], SignalTable]] = {}
+
+    def level(self, closed: Iterable[int]) -> LoadedLevel:
+        """The level with these contacts closed, under this load."""
+        key = tuple(sorted(closed))
+        if key not in self._levels:
+            self._levels[key] = LoadedLevel.of(self.model.level_at(key), self.load)
+        return self._levels[key]
+
+    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+        """The map between two levels, computed once."""
+        key = (source.level.indices, target.level.indices)
+        if key not in self._maps:
+            self._maps[key] = Transition(source, target)
+        return self._maps[key]
+
+    def function(self, level: LoadedLevel, contact: int) -> Row:
+        """s of a contact in a level."""
+        own = level.level
+        if contact not in own.indices:
+            return Row(own.gap_rows[contact], np.zeros(own.modes), float(level.gap_constants[contact]))
+        if not self._rigid[contact]:
+            return Row(-own.gap_rows[contact], np.zeros(own.modes), -float(level.gap_constants[contact]))
+        k = own.indices.index(contact)
+        return Row(own.force_rows[k], own.force_rate_rows[k], float(level.asymptotic.forces[k]))
+
+    def entered_function(self, level: LoadedLevel, contact: int) -> Row:
+        """s that a contact would have after a change of its state, as a function of the present level's state."""
+        target = self.level(set(level.level.indices) ^ {contact})
+        move, there = self.transition(level, target), self.function(target, contact)
+        constant = there.constant + float(there.position @ move.offset)
+        return Row(there.position @ move.matrix, there.rate @ move.matrix, constant)
+
+    def watch(self, state: State) -> tuple[list[tuple[int, bool]], SignalTable]:
+        """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
+        key = (state.closed, state.phases)
+        if key not in self._tables:
+            found = [
+                (contact, *wait)
+                for contact, phase in enumerate(state.phases)
+                for wait in self._waiting_for(state.level, contact, phase)
+            ]
+            rows, rates = [item[2] for item in found], [item[3] for item in found]
+            table = SignalTable(state.level.level.response, rows, rates)
+            self._tables[key] = [(contact, asks) for contact, asks, _, _ in found], table
+        return self._tables[key]
+
+    def _waiting_for(self, level: LoadedLevel, contact: int, phase: Phase) -> list[tuple[bool, Row, bool]]:
+        """(asks, function, whether its rate is meant) of what ends a contact's phase by falling through zero."""
+        own = self.function(level, contact)
+        if phase is Phase.ARMED:
+            return [(True, own, False)]
+        if phase is Phase.RECOVERING:
+            return [(False, -own, False), (True, own, True)]
+        return [(False, -own, False), (True, -self.entered_function(level, contact), False)]
+
+    # ------------------------------------------------------------------ decisions at one instant
+
+    def start(
+        self, displacement: np.ndarray, velocity: np.ndarray, penetrating: Sequence[int], touching: Sequence[int]
+    ) -> tuple[State, Loss, list[Change]]:
+        """First state from y, y' (m,) in base coordinates, with what is lost on the way into its level.
+
+        penetrating: compliant contacts that start closed. touching: rigid contacts that start at their gap.
+        """
+        level, changes, admissible = self.level(penetrating), list[Change](), velocity
+        if touching:
+            rows = self.model.base.directions[:, list(touching)].T
+            admissible, _ = nearest_admissible(rows, velocity)
+            open_state = self._entered(level, displacement, admissible)
+            decided, _, changes = self._impact(open_state, set(touching), set(penetrating))
+            level = decided.level
+        state = self._entered(level, displacement, admissible)
+        kinetic = 0.5 * float(admissible @ admissible)
+        loss = Loss(
+            impact=0.5 * float(velocity @ velocity) - kinetic,
+            truncation_kinetic=kinetic - state.kinetic,
+            truncation_strain=self.potential(displacement, penetrating) - state.potential,
+        )
+        state, lost, made = self.decide(state, set())
+        return state, loss + lost, [change for change in changes if change.kind == "close"] + made
+
+    def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
+        """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
+        base, closed = self.model.base, list(penetrating)
+        gaps = base.directions[:, closed].T @ displacement + base.gaps[closed]
+        stretched = base.modes.omega * displacement
+        springs = float(np.sum(base.stiffnesses[closed] * gaps**2))
+        return 0.5 * float(stretched @ stretched) + 0.5 * springs - float(self.load @ displacement)
+
+    def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
+        """State right after an instant at which these contacts ask to change."""
+        loss, changes = Loss(), list[Change]()
+        for _ in range(ROUNDS):
+            if asking:
+                state, lost, made = self._answer(state, asking)
+                loss, changes = loss + lost, changes + made
+            heard = {change.contact for change in changes} | asking
+            state, asking = self._with_phases(state, heard)
+            if not asking:
+                return state, loss, changes
+        names = ", ".join(self.model.contacts[i].name for i in sorted(asking))
+        raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
+
+    def _with_phases(self, state: State, heard: set[int]) -> tuple[State, set[int]]:
+        """Phases as the state stands, and the contacts that ask to change and have not been heard."""
+        standing = [self._standing(state, contact) for contact in range(len(self._rigid))]
+        asking = {i for i, phase in enumerate(standing) if phase is Phase.REFUSED} - heard
+        return replace(state, phases=tuple(standing)), asking
+
+    def _standing(self, state: State, contact: int) -> Phase:
+        """ARMED where s is or becomes positive, RECOVERING where it is negative and rises, else REFUSED."""
+        own = self.function(state.level, contact)
+        table = SignalTable(state.level.level.response, [own, own], [False, True])
+        value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))
+        if value >= 0:
+            return Phase.ARMED
+        if rate > 0:
+            return Phase.RECOVERING
+        return Phase.REFUSED
+
+    def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
+        closed = set(state.closed)
+        rigid = {i for i in asking if self._rigid[i]}
+        if rigid - closed:
+            return self._impact(state, rigid - closed, {i for i in closed ^ (asking - rigid) if not self._rigid[i]})
+        return self._switch(state, asking)
+
+    def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
+        """Compliant contacts change where the level they enter admits it, rigid ones open."""
+        while asking:
+            entered, loss = self._moved(state, self.level(set(state.closed) ^ asking))
+            denied = {i for i in asking if not self._rigid[i] and self._standing(entered, i) is Phase.REFUSED}
+            if not denied:
+                break
+            asking = asking - denied
+        if not asking:
+            return state, Loss(), []
+        self.transitions += 1
+        opened = sorted(i for i in asking if self._rigid[i])
+        if opened:
+            entered, _, lost = self._collided(entered, opened)
+            loss = loss + lost
+        kinds = ("open" if i in state.closed else "close" for i in sorted(asking))
+        return entered, loss, [Change(i, kind) for i, kind in zip(sorted(asking), kinds, strict=True)]
+
+    def _impact(self, state: State, striking: set[int], compliant: set[int]) -> tuple[State, Loss, list[Change]]:
+        """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level."""
+        held = {i for i in state.closed if self._rigid[i]}
+        touching = sorted(held | striking)
+        released, loss = self._moved(state, self.level(compliant))
+        struck, impulses, plastic = self._collided(released, touching)
+        closed = self._pressing(struck, touching)
+        after, dropped = struck, loss + plastic
+        while closed:
+            after = self._at_rest_on(state, struck, compliant | closed)
+            pulling = {i for i in closed if self._value(after, i) < 0}
+            if not pulling:
+                dropped = self._loss(state, after, released, struck)
+                break
+            closed = closed - pulling
+            after = struck
+        self.transitions += 1
+        pushed = dict(zip(touching, impulses, strict=True))
+        return after, dropped, self._changes(state, striking, after, compliant, pushed)
+
+    def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
+        """Displacement straight from the level before the impact, velocity from the one it was computed in."""
+        level = self.level(closed)
+        displacement = self.transition(state.level, level).displacement(state.displacement)
+        velocity = self.transition(struck.level, level).velocity(struck.velocity)
+        return State(level, displacement, velocity, state.phases)
+
+    @staticmethod
+    def _loss(state: State, after: State, released: State, struck: State) -> Loss:
+        plastic = released.kinetic - struck.kinetic
+        return Loss(plastic, state.kinetic - after.kinetic - plastic, state.potential - after.potential)
+
+    def _changes(
+        self, state: State, striking: set[int], after: State, compliant: set[int], pushed: dict[int, float]
+    ) -> list[Change]:
+        """All changes of an impact; who strikes and does not stay closed has closed and opened at one instant."""
+        before, closed = set(state.closed), set(after.closed)
+        struck = [Change(i, "close", pushed[i]) for i in sorted(striking) if i in closed or pushed[i] > 0]
+        rebounds = {change.contact for change in struck} - closed
+        sprung = [Change(i, "close") for i in sorted(compliant - before)]
+        return struck + sprung + [Change(i, "open") for i in sorted(rebounds | (before - closed))]
+
+    def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
+        """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
+        rows = state.level.level.gap_rows[touching]
+        velocity, impulses = nearest_admissible(rows, state.velocity)
+        after = replace(state, velocity=velocity)
+        return after, impulses, Loss(impact=state.kinetic - after.kinetic)
+
+    def _pressing(self, state: State, touching: list[int]) -> set[int]:
+        """Contacts at rest relative to their stop whose free acceleration would close them further."""
+        own = state.level.level
+        rows = own.gap_rows[touching]
+        resting = np.abs(rows @ state.velocity) <= RESTING * np.abs(rows) @ np.abs(state.velocity)
+        if not np.any(resting):
+            return set()
+        acceleration = state.level.acceleration(state.displacement, state.velocity)
+        _, multipliers = nearest_admissible(rows[resting], acceleration)
+        return {i for i, force in zip(np.array(touching)[resting], multipliers, strict=True) if force > 0}
+
+    def _value(self, state: State, contact: int) -> int:
+        """Sign of s itself, zero where it is round-off."""
+        own = self.function(state.level, contact)
+        terms = np.abs(own.position) @ np.abs(state.displacement) + np.abs(own.rate) @ np.abs(state.velocity)
+        value = own(state.displacement, state.velocity)
+        return 0 if abs(value) <= ROUND_OFF * (terms + abs(own.constant)) else int(np.sign(value))
+
+    def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
+        """The state in another level (eq. 38.6), and what truncation took."""
+        if level is state.level:
+            return state, Loss()
+        move = self.transition(state.level, level)
+        after = State(level, move.displacement(state.displacement), move.velocity(state.velocity), state.phases)
+        return after, Loss(0.0, state.kinetic - after.kinetic, state.potential - after.potential)
+
+    def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
+        """A state given in base coordinates, in a level's modes."""
+        vectors = level.level.vectors.T
+        eta = vectors @ (displacement - level.asymptotic.configuration)
+        return State(level, eta, vectors @ velocity, (Phase.ARMED,) * len(self._rigid))

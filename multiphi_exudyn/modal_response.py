@@ -1,0 +1,269 @@
+"""Exact free response of modal equations, as sums of exponentials.
+
+    eta'' + D eta' + diag(omega^2) eta = p,   p constant on zero-frequency modes, zero on the others
+    eta(t) = Re sum_j V_j c_j t^d_j exp(lambda_j t),   c = A eta(0) + B eta'(0) + P p
+
+D [1/s] is diagonal for proportional damping: then each mode has its own closed form (underdamped,
+overdamped, nearly critical by a Taylor polynomial, zero frequency). Where D couples the modes, the
+lambda_j are the complex eigenvalues of the 2r x 2r first-order system. A conjugate pair is kept once,
+with its weight doubled. Constant forces on modes of non-zero frequency belong to the asymptotic
+configuration, not here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.errors import NumericalFailure
+
+__all__ = ["Exponentials", "ModalResponse", "modal_response"]
+
+DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
+NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
+SERIES_BELOW = 0.5  # |s T| under which exp is integrated by its series, to SERIES_TERMS terms
+SERIES_TERMS = 20
+WORST_CONDITION = 1e9  # of the scaled eigenvectors: above it the damped modes are defective to working precision
+
+
+@dataclass(frozen=True)
+class Exponentials:
+    """The functions phi_j(t) = t^d_j exp(lambda_j t).
+
+    rates: lambda (p,) complex, 1/s. powers: d (p,) int; j with d_j > 0 follows its d_j - 1 directly.
+    """
+
+    rates: np.ndarray
+    powers: np.ndarray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_chained", np.flatnonzero(self.powers))
+
+    def at(self, t: np.ndarray | float) -> np.ndarray:
+        """phi at t: (p,) for a scalar, (k, p) for (k,) times."""
+        times = np.asarray(t, dtype=float)[..., None]
+        values = np.exp(times * self.rates)
+        chained = self._chained  # type: ignore[attr-defined]
+        if len(chained):
+            values[..., chained] *= times ** self.powers[chained]
+        return values
+
+    def derivative(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (..., p) of the time derivative."""
+        result = coefficients * self.rates
+        chained = self._chained  # type: ignore[attr-defined]
+        if len(chained):
+            result[..., chained - 1] += self.powers[chained] * coefficients[..., chained]
+        return result
+
+    def integrals(self, duration: float) -> np.ndarray:
+        """Integral of every phi_j over [0, duration], (p,)."""
+        return exponential_integrals(self.rates, self.powers, duration)
+
+    def shifted(self, coefficients: np.ndarray, delay: float) -> np.ndarray:
+        """Coefficients (..., p) of the same function from a later start: f(t) = g(t + delay)."""
+        chained = self._chained  # type: ignore[attr-defined]
+        result = coefficients * np.exp(delay * self.rates)
+        if len(chained):
+            result = result @ self._translation(delay)
+        return result
+
+    def _translation(self, delay: float) -> np.ndarray:
+        """(t + delay)^d expanded in powers of t, as a matrix from old to new coefficients."""
+        matrix = np.eye(len(self.powers))
+        for j in self._chained:  # type: ignore[attr-defined]
+            degree, binomial = int(self.powers[j]), 1.0
+            for lower in range(1, degree + 1):
+                binomial *= (degree - lower + 1) / lower
+                matrix[j, j - lower] = binomial * delay**lower
+        return matrix
+
+
+def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float) -> np.ndarray:
+    """Integral of t^d exp(s t) over [0, duration], elementwise; d small.
+
+    By parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
+    """
+    exponents = rates * duration
+    small = np.abs(exponents) < SERIES_BELOW
+    safe = np.where(small, 1.0, rates)
+    by_parts = np.where(small, 0.0, np.expm1(exponents) / safe)
+    series = np.zeros_like(by_parts)
+    term = np.ones_like(by_parts)
+    for n in range(SERIES_TERMS):
+        series += term / (n + 1 + powers)
+        term = term * exponents / (n + 1)
+    for degree in range(1, int(np.max(powers, initial=0)) + 1):
+        raised = (duration**degree * np.exp(exponents) - degree * by_parts) / safe
+        by_parts = np.where(powers >= degree, raised, by_parts)
+    return np.where(small, series * duration ** (powers + 1.0), by_parts)
+
+
+@dataclass(frozen=True)
+class ModalResponse:
+    """The closed form of the module's equation.
+
+    basis: the p exponentials. shapes: V (r, p) complex. from_displacement, from_velocity, from_force:
+    A, B, P (p, r) complex. diagonal: whether D was diagonal to round-off.
+    """
+
+    basis: Exponentials
+    shapes: np.ndarray
+    from_displacement: np.ndarray
+    from_velocity: np.ndarray
+    from_force: np.ndarray
+    diagonal: bool
+
+    def coefficients(
+        self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray | None = None
+    ) -> np.ndarray:
+        """c (p,) of the motion that starts at eta(0), eta'(0), both (r,)."""
+        c = self.from_displacement @ displacement + self.from_velocity @ velocity
+        return c if force is None else c + self.from_force @ force
+
+    def dissipated(self, coefficients: np.ndarray, damping: np.ndarray, duration: float) -> float:
+        """Work of damping, the integral of eta'^T D eta' over [0, duration], for the motion with these c (p,).
+
+        Re u Re v = Re (u v + u conj(v)) / 2 turns it into integrals of single exponentials.
+        """
+        velocity = self.shapes * self.basis.derivative(coefficients)
+        rates, powers = self.basis.rates, self.basis.powers
+        degrees = powers[:, None] + powers[None, :]
+        same = velocity.T @ damping @ velocity
+        crossed = velocity.T @ damping @ velocity.conj()
+        total = same * exponential_integrals(rates[:, None] + rates[None, :], degrees, duration)
+        total += crossed * exponential_integrals(rates[:, None] + rates[None, :].conj(), degrees, duration)
+        return 0.5 * float(np.sum(total.real))
+
+
+def modal_response(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Closed form for frequencies omega (r,) [rad/s] and damping D (r, r) [1/s].
+
+    Raises NumericalFailure where coupled damping leaves no complete set of complex modes.
+    """
+    diagonal = np.diagonal(damping)
+    scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
+    off_diagonal = damping - np.diag(diagonal)
+    if np.all(np.abs(off_diagonal) <= DIAGONAL * np.maximum(scale, np.max(scale, initial=0.0) * DIAGONAL)):
+        return _uncoupled(omega, diagonal)
+    return _coupled(omega, damping)
+
+
+def _uncoupled(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    terms = [term for k in range(len(omega)) for term in _mode_terms(k, omega[k], damping[k] / 2)]
+    p, r = len(terms), len(omega)
+    shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
+    for j, (k, _, _, weights) in enumerate(terms):
+        shapes[k, j] = 1.0
+        maps[:, j, k] = weights
+    basis = Exponentials(np.array([t[1] for t in terms], complex), np.array([t[2] for t in terms], int))
+    return ModalResponse(basis, shapes, maps[0], maps[1], maps[2], diagonal=True)
+
+
+Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
+
+
+def _mode_terms(k: int, omega: float, delta: float) -> list[Term]:
+    """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p."""
+    if omega == 0.0:
+        return _free_terms(k, delta)
+    difference = (delta - omega) * (delta + omega)
+    root = np.sqrt(abs(difference))
+    if root <= NEARLY_CRITICAL * omega:
+        s = difference  # cosh, sinh(s t)/s of small s t, to t^5
+        even, odd = (1.0, 0.0, s / 2, 0.0, s**2 / 24, 0.0), (0.0, 1.0, 0.0, s / 6, 0.0, s**2 / 120)
+        return [(k, -delta, d, (e + delta * o, o, 0.0)) for d, (e, o) in enumerate(zip(even, odd, strict=True))]
+    if difference < 0:
+        return [(k, complex(-delta, root), 0, (1 - 1j * delta / root, -1j / root, 0.0))]
+    fast = -(delta + root)
+    slow = omega**2 / fast
+    return [
+        (k, slow, 0, (-fast / (slow - fast), 1 / (slow - fast), 0.0)),
+        (k, fast, 0, (slow / (slow - fast), -1 / (slow - fast), 0.0)),
+    ]
+
+
+def _free_terms(k: int, delta: float) -> list[Term]:
+    """Terms of eta'' + 2 delta eta' = p."""
+    if delta == 0.0:
+        return [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0)), (k, 0.0, 2, (0.0, 0.0, 0.5))]
+    rate = 2 * delta
+    return [
+        (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),
+        (k, 0.0, 1, (0.0, 0.0, 1 / rate)),
+        (k, -rate, 0, (0.0, -1 / rate, 1 / rate**2)),
+    ]
+
+
+def _coupled(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Undamped rigid-body modes on their own, all others by their complex modes."""
+    alone = (omega == 0) & ~np.any(damping, axis=1)
+    if not np.any(alone):
+        return _complex_modes(omega, damping)
+    together = ~alone
+    parts = (
+        _uncoupled(omega[alone], np.zeros(int(np.sum(alone)))),
+        _complex_modes(omega[together], damping[np.ix_(together, together)]),
+    )
+    return _side_by_side(parts, (np.flatnonzero(alone), np.flatnonzero(together)), len(omega))
+
+
+def _complex_modes(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Complex modes of z' = S z, z = (omega eta, eta'); zero-frequency modes are carried as eta itself."""
+    r = len(omega)
+    scale = np.where(omega > 0, omega, 1.0)
+    system = np.block([[np.zeros((r, r)), np.diag(scale)], [-np.diag(omega**2 / scale), -damping]])
+    rates, vectors = np.linalg.eig(system)
+    if not np.linalg.cond(vectors) < WORST_CONDITION:
+        raise NumericalFailure(
+            "damping: the damped modes of a level are defective (coupled modes critically damped alike), "
+            "so its motion is no sum of exponentials"
+        )
+    kept = rates.imag >= 0
+    weight = np.where(rates[kept].imag > 0, 2.0, 1.0)
+    maps = np.linalg.inv(vectors)[kept] * weight[:, None]
+    basis = Exponentials(rates[kept], np.zeros(int(np.sum(kept)), int))
+    from_displacement, from_velocity = maps[:, :r] * scale, maps[:, r:]
+    none = np.zeros_like(from_velocity)
+    response = ModalResponse(basis, vectors[:r, kept] / scale[:, None], from_displacement, from_velocity, none, False)
+    return _with_drift(response, omega, damping) if np.any(omega == 0) else response
+
+
+def _with_drift(response: ModalResponse, omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Adds the motion u + w t of damped zero-frequency modes under a constant force: diag(omega^2) u + D w = p."""
+    free = np.flatnonzero(omega == 0)
+    unknowns = np.diag(omega**2)
+    unknowns[:, free] = damping[:, free]
+    solution = np.linalg.solve(unknowns, np.eye(len(omega))[:, free])
+    drift = np.zeros_like(solution)
+    drift[free] = solution[free]
+    offset = solution - drift
+    count, p = len(free), len(response.basis.rates)
+    rates = np.concatenate([response.basis.rates, np.zeros(3 * count)])
+    powers = np.concatenate([response.basis.powers, np.tile([0, 0, 1], count)])  # u, then w t with its derivative w
+    added = np.stack([offset, drift, drift], axis=2).reshape(len(omega), 3 * count)
+    maps = [np.vstack([m, np.zeros((3 * count, len(omega)))]) for m in _maps(response)]
+    maps[2][:p, free] = -(response.from_displacement @ offset + response.from_velocity @ drift)
+    maps[2][p : p + 3 * count : 3, free] = maps[2][p + 2 : p + 3 * count : 3, free] = np.eye(count)
+    shapes = np.hstack([response.shapes, added])
+    return ModalResponse(Exponentials(rates, powers), shapes, maps[0], maps[1], maps[2], False)
+
+
+def _side_by_side(parts: tuple[ModalResponse, ...], modes: tuple[np.ndarray, ...], r: int) -> ModalResponse:
+    p = sum(len(part.basis.rates) for part in parts)
+    shapes, maps, first = np.zeros((r, p), complex), np.zeros((3, p, r), complex), 0
+    for part, index in zip(parts, modes, strict=True):
+        rows = np.arange(first, first + len(part.basis.rates))
+        shapes[np.ix_(index, rows)] = part.shapes
+        for whole, own in zip(maps, _maps(part), strict=True):
+            whole[np.ix_(rows, index)] = own
+        first += len(rows)
+    basis = Exponentials(
+        np.concatenate([part.basis.rates for part in parts]), np.concatenate([part.basis.powers for part in parts])
+    )
+    return ModalResponse(basis, shapes, maps[0], maps[1], maps[2], False)
+
+
+def _maps(response: ModalResponse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return response.from_displacement, response.from_velocity, response.from_force

@@ -1,0 +1,152 @@
+"""The reduced model: a structure, its contacts, and the levels they make, built as they are needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level
+from multiphi_exudyn.structure import LinearStructure
+
+__all__ = ["MultiPhiModel"]
+
+
+@dataclass(frozen=True)
+class MultiPhiModel:
+    """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
+
+    structure: M, C, K and points. contacts: rigid or compliant, any number; with c contacts there are 2^c levels,
+    of which only those asked for are built.
+    modes: r of every level, or "all". Levels are truncated from one larger basis, so
+    ``dataclasses.replace(model, modes=12)`` builds nothing anew.
+    overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
+    """
+
+    structure: LinearStructure
+    contacts: Sequence[UnilateralContact] = ()
+    modes: int | str = 6
+    overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
+    _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    _levels: dict[tuple[int, ...], Level] = field(init=False, default_factory=dict, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.structure, LinearStructure):
+            raise MultiPhiTypeError(f"structure: got {type(self.structure).__name__}, need a LinearStructure")
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        names = [contact.name for contact in self.contacts]
+        if len(set(names)) < len(names):
+            raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
+        for contact in self.contacts:
+            if not np.any(self.structure.row(contact.direction)):
+                raise MultiPhiValueError(f"contact {contact.name!r} direction: got a zero row, need a direction")
+        self._check_modes()
+        ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
+        object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
+        if not self._can_share():
+            object.__setattr__(self, "_shared", {"structure": self.structure, "contacts": self.contacts, "levels": {}})
+
+    @property
+    def base(self) -> Base:
+        """Coordinates common to all levels, built on first use."""
+        if "base" not in self._shared:
+            self._shared["base"] = build_base(self.structure, self.contacts, self.modes)
+        base: Base = self._shared["base"]
+        most = base.modes.count - len(self.contacts)
+        if self.modes != "all" and int(self.modes) > most:
+            raise MultiPhiValueError(
+                f"modes: got {self.modes}, need at most {most} "
+                f"({base.modes.count} modes less {len(self.contacts)} contacts), or 'all'"
+            )
+        return base
+
+    @property
+    def levels_built(self) -> int:
+        """Number of levels built so far."""
+        return len(self._levels)
+
+    def index(self, name: str) -> int:
+        """Position of a contact."""
+        for i, contact in enumerate(self.contacts):
+            if contact.name == name:
+                return i
+        known = ", ".join(contact.name for contact in self.contacts) or "none"
+        raise MultiPhiValueError(f"contact: got {name!r}, need one of: {known}")
+
+    def level(self, closed: Iterable[str] = ()) -> Level:
+        """The level with these contacts closed, built on first use."""
+        if isinstance(closed, str):
+            raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names")
+        return self.level_at(tuple(sorted(self.index(name) for name in closed)))
+
+    def level_at(self, indices: tuple[int, ...]) -> Level:
+        """The level of closed contacts given by ascending positions."""
+        if indices not in self._levels:
+            base = self.base
+            full = self._shared["levels"].get(indices)
+            if full is None:
+                full = self._shared["levels"][indices] = build_level(base, indices)
+            level = full if self.modes == "all" else full.truncated(int(self.modes))
+            override = self.overrides.get(level.closed)
+            self._levels[indices] = level if override is None else level.overridden(override)
+        return self._levels[indices]
+
+    def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
+
+        Contact forces are the solution of the complementarity problem F lambda + g_0 + lambda / k >= 0, lambda >= 0
+        (F the flexibility at the contacts, g_0 the gaps without contact forces), as a non-negative least-squares
+        problem. Needs a structure without rigid-body modes.
+        """
+        base = self.base
+        if base.modes.rigid:
+            raise MultiPhiValueError(
+                f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
+            )
+        load = self.base_load(forces)
+        compliance = base.modes.omega**-2.0
+        gaps = base.directions.T @ (compliance * load) + base.gaps
+        flexibility = base.directions.T @ (compliance[:, None] * base.directions) + np.diag(1 / base.stiffnesses)
+        pressing = _complementary(flexibility, gaps) > 0
+        level = build_level(base, tuple(int(i) for i in np.flatnonzero(pressing)))
+        return base.modes.shapes @ level.asymptotic(load).configuration
+
+    def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Forces [N] at points as a load (m,) in base coordinates."""
+        if not isinstance(forces, Mapping):
+            raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
+        row = self.structure.row(forces) if forces else np.zeros(self.structure.n)
+        return self.base.modes.shapes.T @ row
+
+    def _can_share(self) -> bool:
+        """Whether the levels built for another number of modes serve this model too."""
+        if self._shared.get("structure") is not self.structure or self._shared["contacts"] != self.contacts:
+            return False
+        base = self._shared.get("base")
+        if base is None or base.complete:
+            return base is not None
+        return self.modes != "all" and BASE_MARGIN * int(self.modes) <= base.modes.count
+
+    def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
+        return tuple(self.contacts[i].name for i in indices)
+
+    def _check_modes(self) -> None:
+        if self.modes == "all":
+            return
+        if isinstance(self.modes, bool) or not isinstance(self.modes, (int, np.integer)):
+            raise MultiPhiTypeError(f"modes: got {self.modes!r}, need an integer >= 1 or 'all'")
+        if self.modes < 1:
+            raise MultiPhiValueError(f"modes: got {self.modes}, need an integer >= 1 or 'all'")
+
+
+def _complementary(matrix: np.ndarray, constant: np.ndarray) -> np.ndarray:
+    """z >= 0 with matrix z + constant >= 0 and z . (matrix z + constant) = 0, matrix (k, k) positive definite."""
+    if len(constant) == 0:
+        return constant
+    upper = np.linalg.cholesky(matrix).T
+    return scipy.optimize.nnls(upper, -np.linalg.solve(upper.T, constant))[0]

@@ -1,0 +1,197 @@
+"""Simulation: exact modal motion from event to event (eqs. 38.3, 38.6). There is no time step.
+
+Within a level the motion is a sum of exponentials; the next event is the certified first root of a few of them
+(first_root.py); the event rule (event_rule.py) gives the state that follows. What comes out is a Trajectory of
+analytic segments. A failure on the way ends the trajectory early, with a status and its cause.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.loads import ConstantLoad
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.state import Change, Event, Loss, Phase, State
+
+from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
+
+__all__ = ["Motion", "simulate"]
+
+TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
+EVENTS_PER_PERIOD = 20  # of the highest kept mode: more, over CHATTER_WINDOW events, is chatter
+CHATTER_WINDOW = 200
+
+
+def simulate(
+    model: MultiPhiModel,
+    t_end: float,
+    displacement: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    loads: Sequence[ConstantLoad] = (),
+) -> Trajectory:
+    """Motion of ``model`` from 0 to t_end [s].
+
+    displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: constant loads.
+    The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early.
+    Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
+    """
+    end = _time("t_end", t_end)
+    load = _static_load(model, loads)
+    start = _start(model, displacement, velocity)
+    motion = Motion(model, EventRule(model, load), start)
+    motion.advance(end)
+    return motion.trajectory(end, loads)
+
+
+@dataclass
+class Motion:
+    """A run under way: advances the state and collects segments and events."""
+
+    model: MultiPhiModel
+    rule: EventRule
+    start: Start
+    time: float = 0.0
+    segments: list[Segment] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    message: str = ""
+    evaluations: int = 0
+
+    def __post_init__(self) -> None:
+        self._before = self.model.levels_built
+        try:
+            self.state, self.start_loss, changes = self.rule.start(
+                self.start.displacement, self.start.velocity, self.start.penetrating, self.start.touching
+            )
+            self._record(changes, Loss())
+        except NumericalFailure as failure:
+            self.message = f"at t = 0 s: {failure}"
+
+    def advance(self, end: float) -> None:
+        """Carries the state to ``end``, or to the failure that stops it."""
+        try:
+            while not self.message and self.time < end:
+                self._one_segment(end)
+        except MultiPhiError as failure:
+            self.message = f"at t = {self.time:.9g} s: {failure}"
+
+    def trajectory(self, end: float, loads: Sequence[ConstantLoad]) -> Trajectory:
+        """What has been collected."""
+        return Trajectory(
+            model=self.model,
+            segments=tuple(self.segments),
+            events=tuple(self.events),
+            t_end=self.time if self.message else end,
+            status="failed" if self.message else "ok",
+            message=self.message,
+            start=self.start,
+            start_loss=self.start_loss,
+            load=self.rule.load,
+            stats=Statistics(
+                levels_built=self.model.levels_built,
+                levels_possible=2 ** len(self.model.contacts),
+                transitions=self.rule.transitions,
+                events=len(self.events),
+                segments=len(self.segments),
+                function_evaluations=self.evaluations,
+            ),
+        )
+
+    def _one_segment(self, end: float) -> None:
+        state = self.state
+        own = state.level.level
+        coefficients = state.coefficients()
+        if not np.all(np.isfinite(coefficients)):
+            raise NumericalFailure("the modal state is not finite")
+        waiting, table = self.rule.watch(state)
+        signals = table.signals(coefficients)
+        before = own.finder.evaluations
+        duration = own.finder.first(signals, end - self.time)
+        self.evaluations += own.finder.evaluations - before
+        length = end - self.time if duration is None else duration
+        self.segments.append(Segment(self.time, self.time + length, state.level, coefficients, state.phases))
+        self.time = end if duration is None else self.time + length
+        reached = self._at(state, coefficients, length)
+        self.state = reached if duration is None else self._respond(reached, waiting, own.finder.fallen(signals, length))
+
+    def _at(self, state: State, coefficients: np.ndarray, length: float) -> State:
+        response = state.level.level.response
+        values = response.basis.at(length)
+        return State(
+            state.level,
+            (response.shapes @ (coefficients * values)).real,
+            (response.shapes @ (response.basis.derivative(coefficients) * values)).real,
+            state.phases,
+        )
+
+    def _respond(self, state: State, waiting: list[tuple[int, bool]], fallen: np.ndarray) -> State:
+        """The state after the signals that have reached zero have been answered."""
+        asking = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and asks}
+        armed = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and not asks}
+        if not asking:
+            phases = (Phase.ARMED if i in armed else phase for i, phase in enumerate(state.phases))
+            return State(state.level, state.displacement, state.velocity, tuple(phases))
+        state, loss, changes = self.rule.decide(state, asking)
+        self._record(changes, loss)
+        self._check_chatter(state)
+        return state
+
+    def _record(self, changes: list[Change], loss: Loss) -> None:
+        for change in changes:
+            name = self.model.contacts[change.contact].name
+            self.events.append(Event(self.time, name, change.kind, loss, change.impulse))
+            loss = Loss()
+
+    def _check_chatter(self, state: State) -> None:
+        if len(self.segments) <= CHATTER_WINDOW:
+            return
+        highest = float(np.max(state.level.level.omega)) / (2 * math.pi)
+        elapsed = self.time - self.segments[-CHATTER_WINDOW].start
+        if highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
+            raise NumericalFailure(
+                f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {EVENTS_PER_PERIOD} "
+                f"in a period of the highest kept mode ({highest:g} Hz)"
+            )
+
+
+def _start(model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None) -> Start:
+    base = model.base
+    x, v = (_state_vector(name, given, model) for name, given in (("displacement", displacement), ("velocity", velocity)))
+    y = base.weights @ x
+    gaps = base.directions.T @ y + base.gaps
+    scale = TOUCHING * (np.abs(base.gaps) + np.abs(base.directions.T) @ np.abs(y))
+    rigid = np.isinf(base.stiffnesses)
+    for i in np.flatnonzero(rigid & (gaps < -scale)):
+        raise MultiPhiValueError(
+            f"displacement: lies {-gaps[i]:g} m inside the rigid contact {model.contacts[i].name!r}, need a gap >= 0 "
+            "(static_equilibrium gives an admissible start)"
+        )
+    penetrating = np.flatnonzero(~rigid & (gaps < -scale))
+    touching = np.flatnonzero(rigid & (gaps <= scale))
+    return Start(y, base.weights @ v, tuple(map(int, penetrating)), tuple(map(int, touching)))
+
+
+def _static_load(model: MultiPhiModel, loads: Sequence[ConstantLoad]) -> np.ndarray:
+    total = np.zeros(model.base.modes.count)
+    for load in loads:
+        if not isinstance(load, ConstantLoad):
+            raise MultiPhiTypeError(f"loads: got {type(load).__name__}, need ConstantLoad")
+        total += load.force * (model.base.modes.shapes.T @ model.structure.row(load.at))
+    return total
+
+
+def _state_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:
+    return np.zeros(model.structure.n) if given is None else model.structure.vector(name, given)
+
+
+def _time(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        raise MultiPhiTypeError(f"{name}: got {value!r}, need a time in s")
+    if not (math.isfinite(value) and value > 0):
+        raise MultiPhiValueError(f"{name}: got {value!r}, need a finite time > 0 s")
+    return float(value)

@@ -1,0 +1,145 @@
+"""State of the reduced model at an instant, the events that change it, and the signals they are read from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from multiphi_exudyn.first_root import Signals
+from multiphi_exudyn.modal_response import ModalResponse
+from multiphi_exudyn.transition import LoadedLevel
+
+__all__ = ["Change", "Event", "Loss", "Phase", "Row", "SignalTable", "State"]
+
+
+class Phase(Enum):
+    """What a contact waits for; see event_rule.py."""
+
+    ARMED = "armed"
+    RECOVERING = "recovering"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class State:
+    """level, modal displacement and velocity (r,), phase of every contact (c,)."""
+
+    level: LoadedLevel
+    displacement: np.ndarray
+    velocity: np.ndarray
+    phases: tuple[Phase, ...]
+
+    @property
+    def closed(self) -> tuple[int, ...]:
+        """Positions of the closed contacts."""
+        return self.level.level.indices
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy [J]."""
+        return 0.5 * float(self.velocity @ self.velocity)
+
+    @property
+    def potential(self) -> float:
+        """Strain energy less the potential of static loads [J]; a transition can only lower it."""
+        return self.level.potential(self.displacement)
+
+    def coefficients(self) -> np.ndarray:
+        """Coefficients (p,) of the level's exponentials for the motion that starts here."""
+        drive = self.level.asymptotic.drive
+        return self.level.level.response.coefficients(
+            self.displacement, self.velocity, drive if self.level.driven else None
+        )
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped."""
+
+    impact: float = 0.0
+    truncation_kinetic: float = 0.0
+    truncation_strain: float = 0.0
+
+    def __add__(self, other: Loss) -> Loss:
+        return Loss(
+            self.impact + other.impact,
+            self.truncation_kinetic + other.truncation_kinetic,
+            self.truncation_strain + other.truncation_strain,
+        )
+
+    @property
+    def total(self) -> float:
+        """Sum of all parts [J]."""
+        return self.impact + self.truncation_kinetic + self.truncation_strain
+
+
+@dataclass(frozen=True)
+class Change:
+    """One contact's change of state at an instant: its position, "close" | "open", impulse of its impact [N s]."""
+
+    contact: int
+    kind: str
+    impulse: float = 0.0
+
+
+@dataclass(frozen=True)
+class Event:
+    """A contact changed state.
+
+    time [s]; contact: its name; kind: "close" | "open"; loss: the energy [J] of the whole instant, carried by its
+    first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an "open" of equal time.
+    """
+
+    time: float
+    contact: str
+    kind: str
+    loss: Loss
+    impulse: float = 0.0
+
+    @property
+    def energy_loss(self) -> float:
+        """Total energy lost [J]."""
+        return self.loss.total
+
+
+@dataclass(frozen=True)
+class Row:
+    """A linear function of a level's modal state: position.eta + rate.eta' + constant."""
+
+    position: np.ndarray
+    rate: np.ndarray
+    constant: float
+
+    def __neg__(self) -> Row:
+        return Row(-self.position, -self.rate, -self.constant)
+
+    def __call__(self, displacement: np.ndarray, velocity: np.ndarray) -> float:
+        return float(self.position @ displacement + self.rate @ velocity) + self.constant
+
+
+class SignalTable:
+    """Linear functions of a level's state, ready to become signals of time for any motion in that level.
+
+    rows: the functions. rates: those whose time derivative is meant.
+    """
+
+    def __init__(self, response: ModalResponse, rows: list[Row], rates: list[bool]) -> None:
+        r = response.shapes.shape[0]
+        position = np.array([row.position for row in rows]).reshape(-1, r)
+        rate = np.array([row.rate for row in rows]).reshape(-1, r)
+        self._basis = response.basis
+        self._position = position @ response.shapes
+        self._rate = rate @ response.shapes if np.any(rate) else None
+        self._rates = np.flatnonzero(rates)
+        self._constants = np.array([0.0 if is_rate else row.constant for row, is_rate in zip(rows, rates, strict=True)])
+
+    def signals(self, coefficients: np.ndarray) -> Signals:
+        """The signals of the motion with these coefficients (p,)."""
+        values = self._position * coefficients
+        if self._rate is not None:
+            values = values + self._rate * self._basis.derivative(coefficients)
+        if len(self._rates):
+            values[self._rates] = self._basis.derivative(values[self._rates])
+        return Signals(values, self._constants)

@@ -1,0 +1,294 @@
+"""Trajectory: what a simulation leaves, as analytic segments that can be asked at any time (eq. 38.4).
+
+    x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
+
+Energies come from two independent sides: the ledger adds what was lost (impacts, truncation, damping, the last as
+a closed-form integral of eta'^T D eta') and what loads did; its residual is the difference to kinetic + strain.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.state import Event, Loss, Phase
+from multiphi_exudyn.structure import At
+from multiphi_exudyn.transition import LoadedLevel
+
+__all__ = ["Ledger", "Segment", "Start", "Statistics", "Trajectory"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap."""
+
+    displacement: np.ndarray
+    velocity: np.ndarray
+    penetrating: tuple[int, ...]
+    touching: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Motion in one level from ``start`` to ``end`` [s]: coefficients c (p,) of the level's exponentials."""
+
+    start: float
+    end: float
+    level: LoadedLevel
+    coefficients: np.ndarray
+    phases: tuple[Phase, ...]
+
+    def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """eta or its first or second derivative, (r, k) at times (k,)."""
+        response = self.level.level.response
+        coefficients = self.coefficients
+        for _ in range(derivative):
+            coefficients = response.basis.derivative(coefficients)
+        return (response.shapes @ (coefficients * response.basis.at(t - self.start)).T).real
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Work of a run; function_evaluations counts samples of event signals."""
+
+    levels_built: int
+    levels_possible: int
+    transitions: int
+    events: int
+    segments: int
+    function_evaluations: int
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Energies [J]: initial + work_of_loads = final + impact + truncation_kinetic + truncation_strain + damping.
+
+    residual: what is left over of that equation.
+    """
+
+    initial: float
+    work_of_loads: float
+    impact: float
+    truncation_kinetic: float
+    truncation_strain: float
+    damping: float
+    final: float
+
+    @property
+    def residual(self) -> float:
+        """initial + work - losses - final [J]; round-off if everything is accounted for."""
+        lost = self.impact + self.truncation_kinetic + self.truncation_strain + self.damping
+        return self.initial + self.work_of_loads - lost - self.final
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Result of ``simulate``.
+
+    status: "ok" | "failed"; message: the cause. t_end [s]: how far it goes. events: in order of time.
+    Times are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or "left".
+    """
+
+    model: MultiPhiModel
+    segments: tuple[Segment, ...]
+    events: tuple[Event, ...]
+    t_end: float
+    status: str
+    message: str
+    start: Start
+    start_loss: Loss
+    load: np.ndarray
+    stats: Statistics
+
+    def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""
+        return self._full(t, side, 0)
+
+    def velocity(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x' [m/s, rad/s]: (n,) or (n, k)."""
+        return self._full(t, side, 1)
+
+    def acceleration(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x'' [m/s2, rad/s2]: (n,) or (n, k)."""
+        return self._full(t, side, 2)
+
+    def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,)."""
+        row = self.model.base.modes.shapes.T @ self.model.structure.row(point)
+        return self._evaluate(t, side, lambda segment, times: self._of_row(segment, row, times))
+
+    def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Gap [m] of a contact: a float, or (k,)."""
+        i = self.model.index(contact)
+
+        def gaps(segment: Segment, times: np.ndarray) -> np.ndarray:
+            return segment.level.level.gap_rows[i] @ segment.modal(times) + segment.level.gap_constants[i]
+
+        return self._evaluate(t, side, gaps)
+
+    def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
+        i = self.model.index(contact)
+        return self._evaluate(t, side, lambda segment, times: _force(segment, i, times))
+
+    def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
+        """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
+        i = self.model.index(contact)
+        first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
+        if first > last:
+            raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
+        pushed = sum(
+            _force_integral(segment, i, max(first, segment.start), min(last, segment.end))
+            for segment in self.segments
+            if i in segment.level.level.indices and segment.start < last and segment.end > first
+        )
+        struck = sum(e.impulse for e in self.events if e.contact == contact and first <= e.time <= last)
+        return float(pushed + struck)
+
+    def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
+        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
+        i = self.model.index(contact)
+        intervals: list[tuple[float, float]] = []
+        for segment in self.segments:
+            if i not in segment.level.level.indices or segment.end <= segment.start:
+                continue
+            if intervals and intervals[-1][1] == segment.start:
+                intervals[-1] = (intervals[-1][0], segment.end)
+            else:
+                intervals.append((segment.start, segment.end))
+        return intervals
+
+    def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Kinetic + strain energy [J], the strain of closed compliant contacts included."""
+        return self._evaluate(t, side, _energy)
+
+    @functools.cached_property
+    def ledger(self) -> Ledger:
+        """Where the energy went; computed when it is asked for."""
+        losses = sum((event.loss for event in self.events), self.start_loss)
+        y0, v0 = self.start.displacement, self.start.velocity
+        base, closed = self.model.base, list(self.start.penetrating)
+        gaps = base.directions[:, closed].T @ y0 + base.gaps[closed]
+        stretched = base.modes.omega * y0
+        initial = 0.5 * float(v0 @ v0 + stretched @ stretched + np.sum(base.stiffnesses[closed] * gaps**2))
+        last = self.segments[-1]
+        end = np.array([last.end])
+        reached = last.level.configuration(last.modal(end)[:, 0])
+        return Ledger(
+            initial=initial,
+            work_of_loads=float(self.load @ (reached - y0)),
+            impact=losses.impact,
+            truncation_kinetic=losses.truncation_kinetic,
+            truncation_strain=losses.truncation_strain,
+            damping=sum(_damping_work(segment) for segment in self.segments),
+            final=float(_energy(last, end)[0]),
+        )
+
+    def deepest_gap(self, contact: str, samples: int = 20) -> float:
+        """Smallest gap [m] of a rigid contact while it is open, 0.0 where truncation left none below zero.
+
+        Looked for where the event rule let the gap be negative, ``samples`` per such segment.
+        """
+        i = self.model.index(contact)
+        depth = 0.0
+        for segment in self.segments:
+            if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
+                times = np.linspace(segment.start, segment.end, samples)
+                gaps = segment.level.level.gap_rows[i] @ segment.modal(times) + segment.level.gap_constants[i]
+                depth = min(depth, float(np.min(gaps)))
+        return depth
+
+    # ------------------------------------------------------------------ evaluation
+
+    def _of_row(self, segment: Segment, row: np.ndarray, times: np.ndarray) -> np.ndarray:
+        own = segment.level
+        return (row @ own.level.vectors) @ segment.modal(times) + row @ own.asymptotic.configuration
+
+    def _full(self, t: float | np.ndarray, side: str, derivative: int) -> np.ndarray:
+        shapes = self.model.base.modes.shapes
+
+        def values(segment: Segment, times: np.ndarray) -> np.ndarray:
+            y = segment.level.level.vectors @ segment.modal(times, derivative)
+            if derivative == 0:
+                y = y + segment.level.asymptotic.configuration[:, None]
+            return shapes @ y
+
+        return np.asarray(self._evaluate(t, side, values))
+
+    def _evaluate(self, t: float | np.ndarray, side: str, values) -> float | np.ndarray:  # type: ignore[no-untyped-def]
+        times = self._times(t)
+        owner = self._owners(times, side)
+        parts = np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1)
+        result: np.ndarray | None = None
+        for part in parts:
+            found = values(self.segments[owner[part[0]]], times[part])
+            if result is None:
+                result = np.empty((*found.shape[:-1], len(times)))
+            result[..., part] = found
+        assert result is not None
+        if np.ndim(t) == 0:
+            return float(result[0]) if result.ndim == 1 else result[:, 0]
+        return result
+
+    def _times(self, t: float | np.ndarray) -> np.ndarray:
+        try:
+            times = np.atleast_1d(np.asarray(t, dtype=float))
+        except (TypeError, ValueError) as error:
+            raise MultiPhiTypeError(f"t: got {type(t).__name__}, need a time or (k,) times in s") from error
+        if times.ndim != 1 or len(times) == 0:
+            raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
+        if not self.segments or not np.all((times >= 0) & (times <= self.t_end)):
+            raise MultiPhiValueError(f"t: got {np.min(times):g} to {np.max(times):g} s, need 0 <= t <= {self.t_end:g} s")
+        return times
+
+    @functools.cached_property
+    def _starts(self) -> np.ndarray:
+        return np.array([segment.start for segment in self.segments])
+
+    def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
+        if side not in ("left", "right"):
+            raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
+        found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
+        return np.maximum(found, 0)
+
+
+def _energy(segment: Segment, times: np.ndarray) -> np.ndarray:
+    displacement, velocity = segment.modal(times), segment.modal(times, 1)
+    own = segment.level
+    bent = own.asymptotic.load - own.asymptotic.drive
+    strain = 0.5 * np.sum((own.level.omega[:, None] * displacement) ** 2, axis=0) + bent @ displacement
+    return np.asarray(0.5 * np.sum(velocity**2, axis=0) + strain + own.asymptotic.strain)
+
+
+def _force(segment: Segment, contact: int, times: np.ndarray) -> np.ndarray:
+    own = segment.level.level
+    if contact not in own.indices:
+        return np.zeros(len(times))
+    k = own.indices.index(contact)
+    force = own.force_rows[k] @ segment.modal(times) + own.force_rate_rows[k] @ segment.modal(times, 1)
+    return np.asarray(force + segment.level.asymptotic.forces[k])
+
+
+def _force_integral(segment: Segment, contact: int, start: float, end: float) -> float:
+    """Exact: the force is a sum of exponentials plus a constant."""
+    own = segment.level.level
+    k = own.indices.index(contact)
+    response = own.response
+    c = response.basis.shifted(segment.coefficients, start - segment.start)
+    terms = (own.force_rows[k] @ response.shapes) * c
+    terms = terms + (own.force_rate_rows[k] @ response.shapes) * response.basis.derivative(c)
+    integral = float((terms @ response.basis.integrals(end - start)).real)
+    return integral + float(segment.level.asymptotic.forces[k]) * (end - start)
+
+
+def _damping_work(segment: Segment) -> float:
+    """Integral of eta'^T D eta' over the segment, in closed form pair by pair of exponentials."""
+    own = segment.level.level
+    if not np.any(own.damping):
+        return 0.0
+    response = own.response
+    return response.dissipated(segment.coefficients, own.damping, segment.end - segment.start)

@@ -1,0 +1,122 @@
+"""Transition between levels: the state at an event, expressed in the next level's modes (eq. 38.6).
+
+The paper's "Phi_m^-1" is the M-projection, the best approximation in the kinetic and in the strain energy norm:
+
+    eta_m = T eta_l + c,   eta'_m = T eta'_l,   T = Phi_m^T M Phi_l,   c = Phi_m^T M (x_inf,l - x_inf,m)
+
+T is r x r and computed once for a pair of levels. A transition can only take energy out (for one
+physical M, K); what it took is truncation, kinetic and strain.
+
+A rigid contact that closes is an impact first (Moreau, restitution 0), in the basis of a level where it is open:
+
+    v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l
+
+the admissible velocity (A v+ >= 0) nearest to v- in the kinetic metric; the energy it loses is plastic.
+Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from multiphi_exudyn.level import Asymptotic, Level
+
+__all__ = ["LoadedLevel", "Transition", "nearest_admissible"]
+
+
+@dataclass(frozen=True)
+class LoadedLevel:
+    """A level under the static loads of one run: where its motion is centred, and its energies.
+
+    level, asymptotic: as there. gap_constants: gaps (c,) of all contacts at eta = 0.
+    """
+
+    level: Level
+    asymptotic: Asymptotic
+    gap_constants: np.ndarray
+
+    @classmethod
+    def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
+        """``level`` under a static load (m,) in base coordinates."""
+        rest = level.asymptotic(load)
+        return cls(level, rest, level.base.directions.T @ rest.configuration + level.base.gaps)
+
+    @functools.cached_property
+    def driven(self) -> bool:
+        """Whether a load drives zero-frequency modes."""
+        return bool(np.any(self.asymptotic.drive))
+
+    def strain(self, displacement: np.ndarray) -> float:
+        """Strain energy [J] of the structure and of its closed compliant contacts.
+
+        1/2 |omega eta|^2 + eta . (Phi^T f - drive) + strain(x_inf)
+        """
+        bent = self.asymptotic.load - self.asymptotic.drive
+        return self._oscillation(displacement) + float(bent @ displacement) + self.asymptotic.strain
+
+    def potential(self, displacement: np.ndarray) -> float:
+        """Strain energy less the potential f.x of the static load [J]."""
+        drive = float(self.asymptotic.drive @ displacement) if self.driven else 0.0
+        return self._oscillation(displacement) - drive + self.asymptotic.potential
+
+    def _oscillation(self, displacement: np.ndarray) -> float:
+        stretched = self.level.omega * displacement
+        return 0.5 * float(stretched @ stretched)
+
+    def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """eta'' (r,) from eta, eta' (38.3)."""
+        own = self.level
+        return self.asymptotic.drive - own.omega**2 * displacement - own.damping @ velocity
+
+    def gap(self, contact: int, displacement: np.ndarray) -> float:
+        """Gap of a contact [m]."""
+        return float(self.level.gap_rows[contact] @ displacement + self.gap_constants[contact])
+
+    def configuration(self, displacement: np.ndarray) -> np.ndarray:
+        """y = Psi eta + y_inf (m,) in base coordinates."""
+        return self.level.vectors @ displacement + self.asymptotic.configuration
+
+
+@dataclass(frozen=True)
+class Transition:
+    """The map of eq. (38.6) from level ``source`` to level ``target``."""
+
+    source: LoadedLevel
+    target: LoadedLevel
+
+    @functools.cached_property
+    def matrix(self) -> np.ndarray:
+        """T (r_m, r_l)."""
+        return self.target.level.vectors.T @ self.source.level.vectors
+
+    @functools.cached_property
+    def offset(self) -> np.ndarray:
+        """c (r_m,)."""
+        jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
+        return self.target.level.vectors.T @ jump
+
+    def displacement(self, eta: np.ndarray) -> np.ndarray:
+        """eta_m from eta_l."""
+        return self.matrix @ eta + self.offset
+
+    def velocity(self, eta_t: np.ndarray) -> np.ndarray:
+        """eta'_m from eta'_l."""
+        return self.matrix @ eta_t
+
+
+def nearest_admissible(rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(v+, p): the vector nearest to ``vector`` (r,) with rows v+ >= 0, and its multipliers p (k,) >= 0.
+
+    Both of Moreau's laws: velocities at an impact, accelerations of contacts that touch at rest.
+    """
+    if len(rows) == 1:
+        row = rows[0]
+        multiplier = max(0.0, -float(row @ vector) / float(row @ row))
+        return vector + multiplier * row, np.array([multiplier])
+    lengths = np.linalg.norm(rows, axis=1)
+    multipliers = scipy.optimize.nnls((rows / lengths[:, None]).T, -vector)[0] / lengths
+    return vector + multipliers @ rows, multipliers
