@@ -40,7 +40,6 @@ from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissib
 __all__ = ["EventRule"]
 
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
-ROUND_OFF = 1e-13  # of the sum of a function's absolute terms
 RESTING = 1e-12  # of the same: a gap velocity below it is zero right after an impact
 
 
@@ -54,6 +53,7 @@ class EventRule:
         self._rigid = np.isinf(model.base.stiffnesses)
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
+        self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
         self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[int], SignalTable]] = {}
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
@@ -72,6 +72,12 @@ class EventRule:
 
     def function(self, level: LoadedLevel, contact: int) -> Row:
         """s of a contact in a level."""
+        key = (level.level.indices, contact)
+        if key not in self._functions:
+            self._functions[key] = self._function(level, contact)
+        return self._functions[key]
+
+    def _function(self, level: LoadedLevel, contact: int) -> Row:
         own = level.level
         if contact not in own.indices:
             return Row(own.gap_rows[contact], np.zeros(own.modes), float(level.gap_constants[contact]))
@@ -167,13 +173,16 @@ class EventRule:
     def _standing(self, state: State, contact: int) -> Phase:
         """ARMED where s is or becomes positive, RECOVERING where it is negative and rises, else REFUSED."""
         own = self.function(state.level, contact)
-        table = SignalTable(state.level.level.response, [own, own], [False, True])
-        value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))
+        value = own.sign(state.displacement, state.velocity)
+        if value > 0:
+            return Phase.ARMED
+        rate = own.rate_sign(state.velocity, state.level.acceleration(state.displacement, state.velocity))
+        if value == 0 or rate == 0:
+            table = SignalTable(state.level.level.response, [own, own], [False, True])
+            value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))
         if value >= 0:
             return Phase.ARMED
-        if rate > 0:
-            return Phase.RECOVERING
-        return Phase.REFUSED
+        return Phase.RECOVERING if rate > 0 else Phase.REFUSED
 
     def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         closed = set(state.closed)
@@ -210,7 +219,7 @@ class EventRule:
         after, dropped = struck, loss + plastic
         while closed:
             after = self._at_rest_on(state, struck, compliant | closed)
-            pulling = {i for i in closed if self._value(after, i) < 0}
+            pulling = {i for i in closed if self.function(after.level, i).sign(after.displacement, after.velocity) < 0}
             if not pulling:
                 dropped = self._loss(state, after, released, struck)
                 break
@@ -259,13 +268,6 @@ class EventRule:
         acceleration = state.level.acceleration(state.displacement, state.velocity)
         _, multipliers = nearest_admissible(rows[resting], acceleration)
         return {i for i, force in zip(np.array(touching)[resting], multipliers, strict=True) if force > 0}
-
-    def _value(self, state: State, contact: int) -> int:
-        """Sign of s itself, zero where it is round-off."""
-        own = self.function(state.level, contact)
-        terms = np.abs(own.position) @ np.abs(state.displacement) + np.abs(own.rate) @ np.abs(state.velocity)
-        value = own(state.displacement, state.velocity)
-        return 0 if abs(value) <= ROUND_OFF * (terms + abs(own.constant)) else int(np.sign(value))
 
     def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
         """The state in another level (eq. 38.6), and what truncation took."""

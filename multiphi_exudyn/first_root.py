@@ -28,7 +28,9 @@ from multiphi_exudyn.modal_response import Exponentials
 __all__ = ["DescentFinder", "Signals", "ZERO"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
+DERIVATIVES = 7  # g and its derivatives up to the sixth
 INTERVALS = 32  # in a block
+TABLES = 64  # sample tables kept for a basis
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
 HERMITE = 1 / 384
@@ -55,7 +57,8 @@ class DescentFinder:
         self.evaluations = 0
         self._decay = np.minimum(basis.rates.real, 0.0)
         self._growth = np.maximum(basis.rates.real, 0.0)
-        self._eternal = not np.any(basis.powers) and not np.any(basis.rates.real > 0)
+        self._eternal = not np.any(basis.powers) and not np.any(self._growth)
+        self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None, None]
         self._tables: dict[float, np.ndarray] = {}
 
     def first(self, signals: Signals, horizon: float) -> float | None:
@@ -63,20 +66,24 @@ class DescentFinder:
         if len(signals.constants) == 0:
             return None
         derivatives = self._derivatives(signals.coefficients)
+        magnitudes = np.abs(derivatives)
+        constants = signals.constants.tolist()
         start = 0.0
         while start < horizon:
-            if self._settled(derivatives[0], signals.constants, start):
+            step, bounds = self._step(magnitudes, constants, start, horizon)
+            if step is None:
                 return None
-            step = self._step(derivatives, signals.constants, start, horizon)
-            found = self._search_block(derivatives, signals.constants, start, step, horizon)
+            found = self._search_block(derivatives, signals.constants, bounds, start, step, horizon)
             if found is not None:
-                return found if found <= horizon else None
+                return found
             start += INTERVALS * step
         return None
 
-    def fallen(self, signals: Signals, t: float) -> np.ndarray:
+    def fallen(self, signals: Signals, t: float) -> list[bool]:
         """Which signals (s,) have reached zero at t, the time of a first descent: simultaneous events are one."""
         coefficients = signals.coefficients
+        if len(coefficients) == 1:
+            return [True]
         values = self.basis.at(t)
         reached = (coefficients @ values).real + signals.constants
         slopes = (self.basis.derivative(coefficients) @ values).real
@@ -84,207 +91,198 @@ class DescentFinder:
         down = (reached <= noise) & (slopes <= 0)
         if not np.any(down):
             down[np.argmin(reached - noise)] = True
-        return np.asarray(down)
+        return [bool(fell) for fell in down]
 
     def signs(self, signals: Signals) -> list[int]:
         """For each signal: +1 or -1 as it is, or becomes at once, positive or negative at t = 0; 0 if it vanishes."""
         derivatives = self._derivatives(signals.coefficients)
-        start = self.basis.at(0.0)
-        values = (derivatives @ start).real
+        values = (derivatives @ self.basis.at(0.0)).real
         values[0] += signals.constants
         noise = ZERO * np.abs(derivatives).sum(axis=2)
         noise[0] += ZERO * np.abs(signals.constants)
         decided = np.abs(values) > noise
-        return [
-            int(np.sign(values[order, s])) if decided[order, s] else 0
-            for s, order in enumerate(np.argmax(decided[:5], axis=0))
-        ]
+        first = np.argmax(decided, axis=0)
+        return [int(np.sign(values[order, s])) if decided[order, s] else 0 for s, order in enumerate(first)]
 
     def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients of g, g', ..., g^(6): (7, s, p)."""
-        stack = np.empty((7, *coefficients.shape), complex)
-        stack[0] = coefficients
-        for order in range(6):
-            stack[order + 1] = self.basis.derivative(stack[order])
-        return stack
+        if self.basis.pure:
+            return np.asarray(coefficients * self._orders)
+        stack = [coefficients]
+        for _ in range(DERIVATIVES - 1):
+            stack.append(self.basis.derivative(stack[-1]))
+        return np.array(stack)
 
-    def _settled(self, coefficients: np.ndarray, constants: np.ndarray, start: float) -> bool:
-        """True where every signal stays positive from ``start`` on for ever, by its decaying envelope."""
-        if not self._eternal:
-            return False
-        envelope = np.abs(coefficients) @ np.exp(self.basis.rates.real * start)
-        return bool(np.all(constants > envelope))
+    def _step(
+        self, magnitudes: np.ndarray, constants: list[float], start: float, horizon: float
+    ) -> tuple[float | None, np.ndarray]:
+        """Sample distance of the next block, None if no signal can ever reach zero; bounds (7, s) from there on.
 
-    def _bounds(self, coefficients: np.ndarray, left: float, right: float) -> np.ndarray:
-        """Upper bounds of |Re sum coefficients phi| on [left, right], one for each row."""
-        envelope = np.exp(self._decay * left + self._growth * right)
-        if not self._eternal:
-            envelope = envelope * right**self.basis.powers
-        return np.abs(coefficients) @ envelope
-
-    def _step(self, derivatives: np.ndarray, constants: np.ndarray, start: float, horizon: float) -> float:
-        """Sample distance, a power of two, at which the remainder is small beside the signals."""
-        remaining = horizon - start
-        size = self._bounds(derivatives[0], start, start + remaining if not self._eternal else start)
-        curvature = self._bounds(derivatives[4], start, start + remaining if not self._eternal else start)
-        typical = np.abs(constants) + size
-        with np.errstate(divide="ignore"):
-            step = float(np.min((RESOLUTION * typical / (HERMITE * curvature)) ** 0.25)) / self.refine
-        step = min(step, remaining / INTERVALS)
-        return 2.0 ** math.floor(math.log2(step)) if step > 0 else remaining
+        The distance is a power of two, at which the remainder is small beside the signals.
+        """
+        envelope = np.exp(self._decay * start + self._growth * horizon)
+        if not self.basis.pure:
+            envelope = envelope * horizon**self.basis.powers
+        bounds = magnitudes @ envelope
+        sizes, curvatures = bounds[0].tolist(), bounds[4].tolist()
+        if self._eternal and all(c > size for c, size in zip(constants, sizes, strict=True)):
+            return None, bounds
+        step = (horizon - start) / INTERVALS
+        for c, size, curvature in zip(constants, sizes, curvatures, strict=True):
+            wanted = RESOLUTION * (abs(c) + size) / HERMITE
+            if wanted < curvature * step**4:
+                step = math.sqrt(math.sqrt(wanted / curvature))
+        return 2.0 ** math.floor(math.log2(step / self.refine)), bounds
 
     def _table(self, step: float) -> np.ndarray:
-        """phi at the block's samples, (INTERVALS + 1, p), from its start."""
+        """phi at the block's samples, (p, INTERVALS + 1), from its start."""
         if step not in self._tables:
-            if len(self._tables) > 64:
+            if len(self._tables) > TABLES:
                 self._tables.clear()
-            self._tables[step] = self.basis.at(step * np.arange(INTERVALS + 1))
+            self._tables[step] = np.ascontiguousarray(self.basis.at(step * np.arange(INTERVALS + 1)).T)
         return self._tables[step]
 
     def _search_block(
-        self, derivatives: np.ndarray, constants: np.ndarray, start: float, step: float, horizon: float
+        self,
+        derivatives: np.ndarray,
+        constants: np.ndarray,
+        bounds: np.ndarray,
+        start: float,
+        step: float,
+        horizon: float,
     ) -> float | None:
         local = derivatives[:2] if start == 0 else self.basis.shifted(derivatives[:2], start)
-        samples = (local @ self._table(step).T).real
+        samples = (local @ self._table(step)).real
         self.evaluations += INTERVALS + 1
         values = samples[0] + constants[:, None]
-        slopes = samples[1] * (step / 3)
-        remainder = HERMITE * step**4 * self._bounds(derivatives[4], start, start + INTERVALS * step)
-        lowest = np.minimum(values[:, :-1], values[:, 1:])
-        np.minimum(lowest, values[:, :-1] + slopes[:, :-1], out=lowest)
-        np.minimum(lowest, values[:, 1:] - slopes[:, 1:], out=lowest)
-        doubtful = lowest <= remainder[:, None]
-        for interval in np.flatnonzero(doubtful.any(axis=0)):
-            left = start + interval * step
-            if left >= horizon:
+        inner = samples[1] * (step / 3)
+        left, right = values[:, :-1], values[:, 1:]
+        lowest = np.minimum(np.minimum(left, right), np.minimum(left + inner[:, :-1], right - inner[:, 1:]))
+        doubtful = lowest <= (HERMITE * step**4) * bounds[4][:, None]
+        for interval in doubtful.any(axis=0).nonzero()[0].tolist():
+            begin = start + interval * step
+            if begin >= horizon:
                 return None
-            right = min(left + step, horizon)
-            found = [
-                root
-                for s in np.flatnonzero(doubtful[:, interval])
-                if (root := self._descent(derivatives[:, s], float(constants[s]), left, right)) is not None
+            roots = [
+                _Search(self, derivatives[:, s], float(constants[s]), bounds[:, s]).descent(
+                    begin, min(begin + step, horizon)
+                )
+                for s in doubtful[:, interval].nonzero()[0].tolist()
             ]
+            found = [root for root in roots if root is not None]
             if found:
                 return min(found)
         return None
 
-    def _descent(self, derivatives: np.ndarray, constant: float, left: float, right: float) -> float | None:
-        """First descent in [left, right] by division until an interval is decided."""
-        narrowest = NARROWEST * max(right, right - left)
-        intervals = [(left, right, self._point(derivatives, constant, left), self._point(derivatives, constant, right))]
+
+class _Search:
+    """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about."""
+
+    def __init__(
+        self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: np.ndarray
+    ) -> None:
+        self._finder = finder
+        self._basis = finder.basis
+        self._derivatives = derivatives
+        self._constant = constant
+        self._bounds: list[float] = bounds.tolist()
+        self._noise = [ZERO * bound for bound in self._bounds]
+        self._noise[0] += ZERO * abs(constant)
+
+    def descent(self, left: float, right: float) -> float | None:
+        """First descent in [left, right], by division until every interval is decided."""
+        narrowest = NARROWEST * right
+        intervals = [(left, right, self._point(left), self._point(right))]
         while intervals:
             left, right, at_left, at_right = intervals.pop()
-            decided, root = self._decide(derivatives, constant, left, right, at_left, at_right, narrowest)
+            decided, root = self._decide(left, right, at_left, at_right, narrowest)
             if root is not None:
                 return root
             if not decided:
                 middle = (left + right) / 2
-                at_middle = self._point(derivatives, constant, middle)
+                at_middle = self._point(middle)
                 intervals.append((middle, right, at_middle, at_right))
                 intervals.append((left, middle, at_left, at_middle))
         return None
 
-    def _point(self, derivatives: np.ndarray, constant: float, t: float) -> np.ndarray:
+    def _point(self, t: float) -> list[float]:
         """g, g', g'', g''' at t."""
-        self.evaluations += 1
-        values = (derivatives[:4] @ self.basis.at(t)).real
-        values[0] += constant
+        self._finder.evaluations += 1
+        values: list[float] = (self._derivatives[:4] @ self._basis.at(t)).real.tolist()
+        values[0] += self._constant
         return values
 
     def _decide(
-        self,
-        derivatives: np.ndarray,
-        constant: float,
-        left: float,
-        right: float,
-        at_left: np.ndarray,
-        at_right: np.ndarray,
-        narrowest: float,
+        self, left: float, right: float, at_left: list[float], at_right: list[float], narrowest: float
     ) -> tuple[bool, float | None]:
         """(decided, root): what certified bounds of g, g', g'' say about a descent in [left, right]."""
         width = right - left
-        bounds = self._bounds(derivatives, left, right)
-        noise = ZERO * bounds
-        noise[0] += ZERO * abs(constant)
-        remainder = HERMITE * width**4
-        low, _ = _hermite_range(at_left[0], at_right[0], at_left[1], at_right[1], width, remainder * bounds[4])
-        if low > 0 or _rises(at_left, bounds, noise, width):
+        if self._range(0, at_left, at_right, width)[0] > 0 or self._rises(at_left, width):
             return True, None
-        crosses = at_right[0] < -noise[0]
-        slope_low, slope_high = _hermite_range(
-            at_left[1], at_right[1], at_left[2], at_right[2], width, remainder * bounds[5]
-        )
-        if slope_low > 0 and at_left[0] >= -noise[0]:
-            return True, None
-        if at_left[0] < -noise[0]:
+        slope_low, slope_high = self._range(1, at_left, at_right, width)
+        if at_left[0] < -self._noise[0]:
             return True, left
-        if slope_high < 0 or width < narrowest:
-            return True, self._newton(derivatives, constant, left, right) if crosses else None
-        curvature_low, curvature_high = _hermite_range(
-            at_left[2], at_right[2], at_left[3], at_right[3], width, remainder * bounds[6]
-        )
-        if curvature_high < 0:
-            return True, self._newton(derivatives, constant, left, right) if crosses else None
+        if slope_low > 0:
+            return True, None
+        curvature_low, curvature_high = self._range(2, at_left, at_right, width)
+        if slope_high < 0 or curvature_high < 0 or width < narrowest:
+            crosses = at_right[0] < -self._noise[0]
+            return True, self._newton(0, left, right, at_left, at_right) if crosses else None
         if curvature_low > 0:
-            return True, self._convex(derivatives, constant, left, right, at_left, at_right, noise)
+            return True, self._convex(left, right, at_left, at_right)
         return False, None
 
-    def _convex(
-        self,
-        derivatives: np.ndarray,
-        constant: float,
-        left: float,
-        right: float,
-        at_left: np.ndarray,
-        at_right: np.ndarray,
-        noise: np.ndarray,
-    ) -> float | None:
-        """First descent of a convex piece: it lies before the minimum, if the minimum lies below zero."""
-        if at_left[1] >= -noise[1]:
-            return None
-        bottom = right
-        if at_right[1] > 0:
-            bottom = self._newton(-derivatives[1:], 0.0, left, right)
-        lowest = self._point(derivatives, constant, bottom)[0]
-        return self._newton(derivatives, constant, left, bottom) if lowest < -noise[0] else None
+    def _range(
+        self, order: int, at_left: list[float], at_right: list[float], width: float
+    ) -> tuple[float, float]:
+        """Certified range of the derivative of this order on an interval: Bernstein coefficients and remainder."""
+        remainder = HERMITE * width**4 * self._bounds[order + 4]
+        left, right = at_left[order], at_right[order]
+        inner_left, inner_right = left + width * at_left[order + 1] / 3, right - width * at_right[order + 1] / 3
+        low = min(left, right, inner_left, inner_right) - remainder
+        return low, max(left, right, inner_left, inner_right) + remainder
 
-    def _newton(self, derivatives: np.ndarray, constant: float, left: float, right: float) -> float:
-        """Root in [left, right] of a signal >= 0 at left and < 0 at right: Newton kept inside its bracket."""
-        t = (left + right) / 2
+    def _rises(self, at_left: list[float], width: float) -> bool:
+        """True where g starts at zero or above and its first derivative that counts stays positive."""
+        for order in range(1, 4):
+            if at_left[order - 1] < -self._noise[order - 1]:
+                return False
+            if at_left[order] > self._bounds[order + 1] * width:
+                return True
+        return False
+
+    def _convex(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
+        """First descent of a convex piece: it lies before the minimum, if the minimum lies below zero."""
+        if at_left[1] >= -self._noise[1]:
+            return None
+        if at_right[1] > 0:
+            right = self._newton(1, left, right, at_left, at_right)
+            at_right = self._point(right)
+        return self._newton(0, left, right, at_left, at_right) if at_right[0] < -self._noise[0] else None
+
+    def _newton(
+        self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]
+    ) -> float:
+        """Root in [left, right] of g (order 0, falling) or g' (order 1, rising): Newton kept inside its bracket."""
+        rows, constant = self._derivatives[order : order + 2], self._constant if order == 0 else 0.0
+        sign = 1.0 if order == 0 else -1.0
+        t = left + (right - left) * _fraction(at_left[order], at_right[order])
         tolerance = 4 * np.finfo(float).eps * right
         for _ in range(100):
-            values = (derivatives[:2] @ self.basis.at(t)).real
-            self.evaluations += 1
-            value, slope = float(values[0]) + constant, float(values[1])
-            if value >= 0:
+            value, slope = (rows @ self._basis.at(t)).real.tolist()
+            value += constant
+            self._finder.evaluations += 1
+            if sign * value >= 0:
                 left = t
             else:
                 right = t
-            if value == 0.0:
-                break
             following = t - value / slope if slope else left
-            if not left < following < right:
-                following = (left + right) / 2
             if abs(following - t) <= tolerance:
                 break
-            t = following
+            t = following if left < following < right else (left + right) / 2
         return t
 
 
-def _hermite_range(
-    left: float, right: float, slope_left: float, slope_right: float, width: float, remainder: float
-) -> tuple[float, float]:
-    """Certified range of a function on an interval from its ends' values and slopes."""
-    inner_left, inner_right = left + width * slope_left / 3, right - width * slope_right / 3
-    coefficients = (left, inner_left, inner_right, right)
-    return min(coefficients) - remainder, max(coefficients) + remainder
-
-
-def _rises(at_left: np.ndarray, bounds: np.ndarray, noise: np.ndarray, width: float) -> bool:
-    """True where g starts at zero or above and its first derivative that counts stays positive."""
-    for order in range(1, 4):
-        if at_left[order - 1] < -noise[order - 1]:
-            return False
-        if at_left[order] > bounds[order + 1] * width:
-            return True
-    return False
+def _fraction(at_left: float, at_right: float) -> float:
+    """Where the chord crosses zero, kept away from the ends."""
+    return min(max(at_left / (at_left - at_right), 0.01), 0.99) if at_left != at_right else 0.5

@@ -12,6 +12,7 @@ configuration, not here.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,23 +38,28 @@ class Exponentials:
     rates: np.ndarray
     powers: np.ndarray
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_chained", np.flatnonzero(self.powers))
+    @functools.cached_property
+    def pure(self) -> bool:
+        """True where every power is zero."""
+        return not np.any(self.powers)
+
+    @functools.cached_property
+    def _chained(self) -> np.ndarray:
+        return np.flatnonzero(self.powers)
 
     def at(self, t: np.ndarray | float) -> np.ndarray:
         """phi at t: (p,) for a scalar, (k, p) for (k,) times."""
-        times = np.asarray(t, dtype=float)[..., None]
+        times = np.asarray(t, dtype=float)[..., None] if isinstance(t, np.ndarray) else t
         values = np.exp(times * self.rates)
-        chained = self._chained  # type: ignore[attr-defined]
-        if len(chained):
-            values[..., chained] *= times ** self.powers[chained]
-        return values
+        if not self.pure:
+            values[..., self._chained] *= times ** self.powers[self._chained]
+        return np.asarray(values)
 
     def derivative(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients (..., p) of the time derivative."""
         result = coefficients * self.rates
-        chained = self._chained  # type: ignore[attr-defined]
-        if len(chained):
+        if not self.pure:
+            chained = self._chained
             result[..., chained - 1] += self.powers[chained] * coefficients[..., chained]
         return result
 
@@ -63,16 +69,13 @@ class Exponentials:
 
     def shifted(self, coefficients: np.ndarray, delay: float) -> np.ndarray:
         """Coefficients (..., p) of the same function from a later start: f(t) = g(t + delay)."""
-        chained = self._chained  # type: ignore[attr-defined]
         result = coefficients * np.exp(delay * self.rates)
-        if len(chained):
-            result = result @ self._translation(delay)
-        return result
+        return result if self.pure else result @ self._translation(delay)
 
     def _translation(self, delay: float) -> np.ndarray:
         """(t + delay)^d expanded in powers of t, as a matrix from old to new coefficients."""
         matrix = np.eye(len(self.powers))
-        for j in self._chained:  # type: ignore[attr-defined]
+        for j in self._chained:
             degree, binomial = int(self.powers[j]), 1.0
             for lower in range(1, degree + 1):
                 binomial *= (degree - lower + 1) / lower

@@ -129,7 +129,7 @@ class Motion:
             state.phases,
         )
 
-    def _respond(self, state: State, waiting: list[tuple[int, bool]], fallen: np.ndarray) -> State:
+    def _respond(self, state: State, waiting: list[tuple[int, bool]], fallen: list[bool]) -> State:
         """The state after the signals that have reached zero have been answered."""
         asking = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and asks}
         armed = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and not asks}

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from multiphi_exudyn.first_root import Signals
+from multiphi_exudyn.first_root import ZERO, Signals
 from multiphi_exudyn.modal_response import ModalResponse
 from multiphi_exudyn.transition import LoadedLevel
 
@@ -117,6 +117,21 @@ class Row:
 
     def __call__(self, displacement: np.ndarray, velocity: np.ndarray) -> float:
         return float(self.position @ displacement + self.rate @ velocity) + self.constant
+
+    def sign(self, displacement: np.ndarray, velocity: np.ndarray) -> int:
+        """Sign of the value, zero where it is round-off of its terms."""
+        return _sign(self.position * displacement + self.rate * velocity, self.constant)
+
+    def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray) -> int:
+        """Sign of the time derivative, zero where it is round-off of its terms."""
+        return _sign(self.position * velocity + self.rate * acceleration, 0.0)
+
+
+def _sign(terms: np.ndarray, constant: float) -> int:
+    value = float(terms.sum()) + constant
+    if abs(value) <= ZERO * (float(np.abs(terms).sum()) + abs(constant)):
+        return 0
+    return 1 if value > 0 else -1
 
 
 class SignalTable:
