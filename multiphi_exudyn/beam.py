@@ -10,13 +10,15 @@ deflection w [m], positive along +z, and the rotation theta [rad], positive wher
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping, is_real
 
 __all__ = ["Beam", "Clamp", "PointMass", "Section", "beam_nodes", "planar_beam"]
 
@@ -41,6 +43,7 @@ class Section:
     shear_factor: float = 5 / 6
 
     def __post_init__(self) -> None:
+        _check_numbers("section", start=self.start, end=self.end)
         if not (math.isfinite(self.start) and math.isfinite(self.end) and self.start < self.end):
             raise MultiPhiValueError(f"section: got start {self.start!r}, end {self.end!r}, need start < end")
         for name in ("youngs_modulus", "density", "area", "second_moment", "shear_modulus", "shear_factor"):
@@ -59,6 +62,9 @@ class Section:
         poisson_ratio: float = 0.3,
     ) -> Section:
         """A rectangle, ``height`` along z; the shear modulus follows from the Poisson ratio."""
+        _check_numbers("rectangle", poisson_ratio=poisson_ratio)
+        if not -1 < poisson_ratio <= 0.5:
+            raise MultiPhiValueError(f"poisson_ratio: got {poisson_ratio!r}, need -1 < poisson_ratio <= 0.5")
         return cls(
             start,
             end,
@@ -66,7 +72,7 @@ class Section:
             density=density,
             area=_positive("width", width) * _positive("height", height),
             second_moment=width * height**3 / 12,
-            shear_modulus=youngs_modulus / (2 * (1 + poisson_ratio)),
+            shear_modulus=_positive("youngs_modulus", youngs_modulus) / (2 * (1 + poisson_ratio)),
         )
 
 
@@ -79,7 +85,8 @@ class PointMass:
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and math.isfinite(self.inertia) and min(self.mass, self.inertia) >= 0):
+        _check_numbers("point mass", at=self.at, mass=self.mass, inertia=self.inertia)
+        if not (math.isfinite(self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
             raise MultiPhiValueError(
                 f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0"
             )
@@ -96,6 +103,7 @@ class Clamp:
     rotation: float = math.inf
 
     def __post_init__(self) -> None:
+        _check_numbers("clamp", translation=self.translation, rotation=self.rotation)
         if not (self.translation >= 0 and self.rotation >= 0):
             raise MultiPhiValueError(
                 f"clamp: got translation {self.translation!r}, rotation {self.rotation!r}, need values >= 0"
@@ -112,12 +120,17 @@ class Beam:
     sections: Sequence[Section]
     points: Mapping[str, float] = field(default_factory=dict)
     masses: Sequence[PointMass] = ()
-    clamp: Clamp = Clamp()
+    clamp: Clamp = field(default_factory=Clamp)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sections", _each_a("sections", self.sections, Section))
+        object.__setattr__(self, "masses", _each_a("masses", self.masses, PointMass))
+        object.__setattr__(self, "points", _positions(self.points))
+        if not isinstance(self.clamp, Clamp):
+            raise MultiPhiTypeError(f"clamp: got {type(self.clamp).__name__}, need a Clamp")
         if not self.sections:
             raise MultiPhiValueError("sections: got none, need at least one Section")
-        for left, right in zip(self.sections, self.sections[1:], strict=False):
+        for left, right in pairwise(self.sections):
             if abs(left.end - right.start) > COINCIDENT * self.length:
                 raise MultiPhiValueError(
                     f"sections: one ends at {left.end:g} m, the next starts at {right.start:g} m; need no gap"
@@ -154,6 +167,8 @@ def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
     ``elements`` is the number of elements aimed at; the pieces between the fixed places are divided
     into equal elements no longer than length / elements, so there can be a few more.
     """
+    if not isinstance(beam, Beam):
+        raise MultiPhiTypeError(f"beam: got {type(beam).__name__}, need a Beam")
     if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)):
         raise MultiPhiTypeError(f"elements: got {elements!r}, need an integer >= 1")
     if elements < 1:
@@ -170,7 +185,7 @@ def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
     longest = beam.length / elements
     pieces = [
         np.linspace(left, right, math.ceil((right - left) / longest - 1e-9) + 1)[:-1]
-        for left, right in zip(places, places[1:], strict=False)
+        for left, right in pairwise(places)
     ]
     return np.concatenate([*pieces, [beam.end]])
 
@@ -185,7 +200,7 @@ def planar_beam(
     nodes = beam_nodes(beam, elements)
     mass = np.zeros((2 * len(nodes), 2 * len(nodes)))
     stiffness = np.zeros_like(mass)
-    for i, (left, right) in enumerate(zip(nodes, nodes[1:], strict=False)):
+    for i, (left, right) in enumerate(pairwise(nodes)):
         dofs = slice(2 * i, 2 * i + 4)
         section = beam.section_at((left + right) / 2)
         mass[dofs, dofs] += _element_mass(section, right - left)
@@ -266,6 +281,35 @@ def _shear_flexibility(section: Section, length: float) -> float:
 
 
 def _positive(name: str, value: float) -> float:
-    if not (isinstance(value, (int, float, np.number)) and math.isfinite(value) and value > 0):
+    if not is_real(value):
+        raise MultiPhiTypeError(f"{name}: got {value!r}, need a number")
+    if not (math.isfinite(value) and value > 0):
         raise MultiPhiValueError(f"{name}: got {value!r}, need a finite value > 0")
     return float(value)
+
+
+def _check_numbers(of: str, **values: Any) -> None:
+    for name, value in values.items():
+        if not is_real(value):
+            raise MultiPhiTypeError(f"{of} {name}: got {value!r}, need a number")
+
+
+def _each_a(name: str, given: Any, kind: type) -> tuple[Any, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need a sequence of {kind.__name__}")
+    items = tuple(given)
+    for i, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise MultiPhiTypeError(f"{name}[{i}]: got {type(item).__name__}, need a {kind.__name__}")
+    return items
+
+
+def _positions(points: Any) -> dict[str, float]:
+    if not isinstance(points, Mapping):
+        raise MultiPhiTypeError(f"points: got {type(points).__name__}, need {{name: position in m}}")
+    for name, x in points.items():
+        if not isinstance(name, str) or not name:
+            raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
+        if not is_real(x):
+            raise MultiPhiTypeError(f"points[{name!r}]: got {x!r}, need a position in m")
+    return dict(points)

@@ -209,7 +209,7 @@ def _vector(name: str, given: Any, n: int) -> np.ndarray:
 def _coefficient(name: str, value: Any) -> float:
     if not isinstance(name, str):
         raise MultiPhiTypeError(f"direction: got the name {name!r}, need the name of a point")
-    if not _is_real(value):
+    if not is_real(value):
         raise MultiPhiTypeError(f"direction[{name!r}]: got {value!r}, need a number")
     if not np.isfinite(value):
         raise MultiPhiValueError(f"direction[{name!r}]: got {value!r}, need a finite coefficient")
@@ -217,11 +217,12 @@ def _coefficient(name: str, value: Any) -> float:
 
 
 def _check_not_negative(name: str, value: Any) -> None:
-    if not _is_real(value):
+    if not is_real(value):
         raise MultiPhiTypeError(f"{name}: got {value!r}, need a number")
     if not (np.isfinite(value) and value >= 0):
         raise MultiPhiValueError(f"{name}: got {value!r}, need a finite value >= 0")
 
 
-def _is_real(value: Any) -> bool:
+def is_real(value: Any) -> bool:
+    """True for a Python or numpy number that is neither complex nor a truth value."""
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
