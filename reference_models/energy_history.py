@@ -37,8 +37,9 @@ def dissipated_energy(recorder: Recorder, damping: np.ndarray | None, time: np.n
     """Energy [J] the damping matrix (n_full, n_full) has dissipated by the times (j,)."""
     if damping is None or len(recorder.velocity_times) < 2:
         return np.zeros(len(time))
-    velocities = np.array(recorder.velocities, dtype=float)
-    power = np.einsum("ti,ti->t", velocities @ damping, velocities)
+    velocities = np.array(recorder.velocities)
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that has blown up
+        power = np.einsum("ti,ti->t", velocities @ damping, velocities)
     dissipated = cumulative_trapezoid(power, recorder.velocity_times, initial=0)
     return np.interp(time, recorder.velocity_times, dissipated)
 

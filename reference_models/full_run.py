@@ -34,8 +34,9 @@ class EnergyBalance:
     def of(cls, time: np.ndarray, energy: np.ndarray, dissipated: np.ndarray) -> EnergyBalance:
         """The balance of energies (k,) [J] at times (k,) [s] with what had been dissipated by then."""
         balance = energy + dissipated
-        gain = (balance - np.minimum.accumulate(balance)) / energy[0]
-        beyond = np.flatnonzero(gain > ENERGY_GAIN)
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that has blown up
+            gain = (balance - np.minimum.accumulate(balance)) / energy[0]
+        beyond = np.flatnonzero(~(gain <= ENERGY_GAIN))
         worst = int(np.argmax(gain))
         return cls(
             initial=float(energy[0]),

@@ -40,7 +40,7 @@ def integrate(
 def _solve(mbs: Any, simulation_settings: Any, cpu_limit_s: float | None) -> str:
     try:
         mbs.SolveDynamic(simulation_settings)
-    except exu.ExudynError as error:
+    except exu.SolverError as error:
         said = mbs.sys["dynamicSolver"].GetErrorString() or str(error)
         return " ".join(said.split())
     if mbs.sys["dynamicSolver"].output.simulationTimeout:

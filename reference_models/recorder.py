@@ -1,6 +1,6 @@
 """What is kept while a full beam is integrated, at the least cost per step.
 
-Every step: the time and the watched coordinates. At output_step: all velocities (single precision), from
+Every step: the time and the watched coordinates. At output_step: all velocities, from
 which the dissipated energy follows. Every millisecond: all coordinates and velocities, from which the
 energy follows after the run. The cost is that of Exudyn's own sensors, about 2 us a step.
 """
@@ -56,7 +56,7 @@ class Recorder:
         if t >= self._next_output:
             self._next_output = t + self._output_step * (1 - EARLY)
             self.velocity_times.append(t)
-            self.velocities.append(self._q_t.astype(np.float32))
+            self.velocities.append(self._q_t.copy())
         if t >= self._next_state:
             self._next_state = t + ENERGY_STEP * (1 - EARLY)
             self.keep_state(t)

@@ -45,7 +45,7 @@ def _deflection(system: BeamSystem, coordinate: int, force: float, simulation_se
     system.mbs.SetLoadParameter(system.load, "load", force)
     try:
         system.mbs.SolveStatic(simulation_settings, updateInitialValues=True)
-    except exu.ExudynError as error:
+    except exu.SolverError as error:
         cause = system.mbs.sys["staticSolver"].GetErrorString() or str(error)
         raise NumericalFailure(f"static start: {cause.strip()} at a force of {force:g} N") from error
     return float(system.mbs.systemData.GetODE2Coordinates()[coordinate])

@@ -216,7 +216,7 @@ class TestPoints:
         chain = Chain()
         chain.marker(chain.nodes[1], "n-second.0")
         chain.mbs.Assemble()
-        with pytest.raises(MultiPhiValueError, match="'n-second.0' twice"):
+        with pytest.raises(MultiPhiValueError, match=r"'n-second\.0' twice"):
             linear_structure_from(chain.mbs)
 
     @pytest.mark.parametrize(
