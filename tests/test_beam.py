@@ -150,6 +150,15 @@ class TestStatics:
         shear = a / (section.shear_factor * section.shear_modulus * section.area)
         assert flexibility == pytest.approx(bending + shear, rel=1e-9)
 
+    def test_of_two_sections_each_counts_over_its_own_length(self):
+        near, far = rectangle(0.003, end=0.2), rectangle(0.002, start=0.2)
+        structure = planar_beam(Beam([near, far], {"tip": LENGTH}), 5)
+        bending_near, bending_far = (s.youngs_modulus * s.second_moment for s in (near, far))
+        bending = (LENGTH**3 - 0.3**3) / (3 * bending_near) + 0.3**3 / (3 * bending_far)
+        shear = sum((s.end - s.start) / (s.shear_factor * s.shear_modulus * s.area) for s in (near, far))
+        tip = structure.row("tip")
+        assert tip @ np.linalg.solve(structure.stiffness, tip) == pytest.approx(bending + shear, rel=1e-9)
+
     def test_elastic_clamp_adds_its_own_flexibility(self):
         rigid, soft = (planar_beam(beam(clamp=clamp), 6) for clamp in (Clamp(), Clamp(2e4, 30.0)))
         rigid_tip, soft_tip = (
