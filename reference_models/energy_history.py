@@ -34,14 +34,20 @@ def energy_history(
 
 
 def dissipated_energy(recorder: Recorder, damping: np.ndarray | None, time: np.ndarray) -> np.ndarray:
-    """Energy [J] the damping matrix (n_full, n_full) has dissipated by the times (j,)."""
-    if damping is None or len(recorder.velocity_times) < 2:
+    """Energy [J] the damping matrix (n_full, n_full) has dissipated by the times (j,).
+
+    The power of a step is taken at the mean of its two velocities, where the trapezoidal rule has it: at
+    the ends the modes that a step does not resolve seem to dissipate several times as much.
+    """
+    if damping is None or len(recorder.velocities) < 2:
         return np.zeros(len(time))
-    velocities = np.array(recorder.velocities)
+    steps, velocities = np.array(recorder.velocity_steps), np.array(recorder.velocities)
+    adjacent = np.flatnonzero(np.diff(steps) == 1)
+    mean = (velocities[adjacent] + velocities[adjacent + 1]) / 2
+    middle = (np.array(recorder.times)[steps[adjacent]] + np.array(recorder.times)[steps[adjacent + 1]]) / 2
     with np.errstate(over="ignore", invalid="ignore"):  # a run that has blown up
-        power = np.einsum("ti,ti->t", velocities @ damping, velocities)
-    dissipated = cumulative_trapezoid(power, recorder.velocity_times, initial=0)
-    return np.interp(time, recorder.velocity_times, dissipated)
+        power = np.einsum("ti,ti->t", mean @ damping, mean)
+    return np.interp(time, middle, cumulative_trapezoid(power, middle, initial=0))
 
 
 def _energy(mbs: Any, total: SystemEnergy, q: np.ndarray, q_t: np.ndarray) -> float:

@@ -18,7 +18,7 @@ ENERGY_GAIN = 0.01  # of the initial energy; a run that gains more than this is 
 class EnergyBalance:
     """Energy of a run [J].
 
-    dissipated: by the damping matrix, the integral of v.C v by the trapezoidal rule at output_step.
+    dissipated: by the damping matrix, the integral of v.C v, sampled at output_step.
     worst_gain: largest rise of energy + dissipated above an earlier value of it, relative to initial.
     worst_gain_at: when that was [s]; gain_at: when the gain first exceeded ENERGY_GAIN, or None.
     """
