@@ -34,6 +34,7 @@ TABLES = 64  # sample tables kept for a basis
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
 HERMITE = 1 / 384
+TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal this near to zero at another's root has its root there too
 
 
@@ -120,10 +121,10 @@ class DescentFinder:
 
         The distance is a power of two, at which the remainder is small beside the signals.
         """
-        envelope = np.exp(self._decay * start + self._growth * horizon)
-        if not self.basis.pure:
-            envelope = envelope * horizon**self.basis.powers
-        bounds = magnitudes @ envelope
+        if self._eternal and start == 0.0:
+            bounds = magnitudes.sum(axis=2)
+        else:
+            bounds = magnitudes @ self._envelope(start, horizon)
         sizes, curvatures = bounds[0].tolist(), bounds[4].tolist()
         if self._eternal and all(c > size for c, size in zip(constants, sizes, strict=True)):
             return None, bounds
@@ -133,6 +134,11 @@ class DescentFinder:
             if wanted < curvature * step**4:
                 step = math.sqrt(math.sqrt(wanted / curvature))
         return 2.0 ** math.floor(math.log2(step / self.refine)), bounds
+
+    def _envelope(self, start: float, horizon: float) -> np.ndarray:
+        """Upper bounds of |phi| on [start, horizon], (p,)."""
+        envelope = np.exp(self._decay * start + self._growth * horizon)
+        return envelope if self.basis.pure else envelope * horizon**self.basis.powers
 
     def _table(self, step: float) -> np.ndarray:
         """phi at the block's samples, (p, INTERVALS + 1), from its start."""
@@ -266,8 +272,8 @@ class _Search:
         """Root in [left, right] of g (order 0, falling) or g' (order 1, rising): Newton kept inside its bracket."""
         rows, constant = self._derivatives[order : order + 2], self._constant if order == 0 else 0.0
         sign = 1.0 if order == 0 else -1.0
-        t = left + (right - left) * _fraction(at_left[order], at_right[order])
-        tolerance = 4 * np.finfo(float).eps * right
+        t = left + (right - left) * _guess(right - left, at_left[order : order + 2], at_right[order : order + 2])
+        tolerance = TIME_ROUND_OFF * right
         for _ in range(100):
             value, slope = (rows @ self._basis.at(t)).real.tolist()
             value += constant
@@ -277,12 +283,20 @@ class _Search:
             else:
                 right = t
             following = t - value / slope if slope else left
-            if abs(following - t) <= tolerance:
-                break
+            correction = abs(following - t)
+            # Newton's error after this correction is at most bound/(2 |slope|) correction^2
+            if correction <= tolerance or self._bounds[order + 2] * correction**2 <= 2 * abs(slope) * tolerance:
+                return min(max(following, left), right)
             t = following if left < following < right else (left + right) / 2
         return t
 
 
-def _fraction(at_left: float, at_right: float) -> float:
-    """Where the chord crosses zero, kept away from the ends."""
-    return min(max(at_left / (at_left - at_right), 0.01), 0.99) if at_left != at_right else 0.5
+def _guess(width: float, at_left: list[float], at_right: list[float]) -> float:
+    """Where in its interval, as a fraction, a monotone function is zero: inverse cubic Hermite interpolation."""
+    (left, slope_left), (right, slope_right) = at_left, at_right
+    rise = right - left
+    s = -left / rise if rise else 0.5
+    if slope_left * rise > 0 and slope_right * rise > 0:
+        toward_left, toward_right = rise / (slope_left * width), rise / (slope_right * width)
+        s = s * s * (3 - 2 * s) + s * (1 - s) * ((1 - s) * toward_left - s * toward_right)
+    return min(max(s, 0.01), 0.99)

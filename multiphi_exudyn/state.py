@@ -128,8 +128,9 @@ class Row:
 
 
 def _sign(terms: np.ndarray, constant: float) -> int:
-    value = float(terms.sum()) + constant
-    if abs(value) <= ZERO * (float(np.abs(terms).sum()) + abs(constant)):
+    values = terms.tolist()
+    value = sum(values) + constant
+    if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant)):
         return 0
     return 1 if value > 0 else -1
 
