@@ -15,12 +15,12 @@ import math
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.structure import At
+from multiphi_exudyn.structure import At, is_real
 
 __all__ = ["UnilateralContact"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UnilateralContact:
     """One unilateral contact; see the module's docstring for its law.
 
@@ -28,6 +28,8 @@ class UnilateralContact:
     direction: h as a point name, {point: coefficient} or an (n,) row.
     gap: distance [m] in the undeformed structure; negative is a preload.
     stiffness: k [N/m], infinite for a rigid contact.
+
+    Two contacts are equal only if they are the same object.
     """
 
     name: str
@@ -40,12 +42,14 @@ class UnilateralContact:
             raise MultiPhiTypeError(f"contact name: got {self.name!r}, need a non-empty string")
         for field in ("gap", "stiffness"):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
+            if not is_real(value):
                 raise MultiPhiTypeError(f"contact {self.name!r} {field}: got {value!r}, need a number")
+            object.__setattr__(self, field, float(value))
         if not math.isfinite(self.gap):
             raise MultiPhiValueError(f"contact {self.name!r} gap: got {self.gap!r}, need a finite distance")
         if not self.stiffness > 0:
-            raise MultiPhiValueError(f"contact {self.name!r} stiffness: got {self.stiffness!r}, need > 0 (or inf)")
+            received = f"contact {self.name!r} stiffness: got {self.stiffness!r}"
+            raise MultiPhiValueError(f"{received}, need a value > 0 (or inf, rigid)")
 
     @property
     def rigid(self) -> bool:

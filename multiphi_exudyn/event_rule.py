@@ -54,7 +54,7 @@ class EventRule:
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
         self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
-        self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[int], SignalTable]] = {}
+        self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[tuple[int, bool]], SignalTable]] = {}
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed, under this load."""

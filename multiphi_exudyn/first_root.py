@@ -184,9 +184,7 @@ class DescentFinder:
 class _Search:
     """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about."""
 
-    def __init__(
-        self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: np.ndarray
-    ) -> None:
+    def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: np.ndarray) -> None:
         self._finder = finder
         self._basis = finder.basis
         self._derivatives = derivatives
@@ -238,9 +236,7 @@ class _Search:
             return True, self._convex(left, right, at_left, at_right)
         return False, None
 
-    def _range(
-        self, order: int, at_left: list[float], at_right: list[float], width: float
-    ) -> tuple[float, float]:
+    def _range(self, order: int, at_left: list[float], at_right: list[float], width: float) -> tuple[float, float]:
         """Certified range of the derivative of this order on an interval: Bernstein coefficients and remainder."""
         remainder = HERMITE * width**4 * self._bounds[order + 4]
         left, right = at_left[order], at_right[order]
@@ -266,9 +262,7 @@ class _Search:
             at_right = self._point(right)
         return self._newton(0, left, right, at_left, at_right) if at_right[0] < -self._noise[0] else None
 
-    def _newton(
-        self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]
-    ) -> float:
+    def _newton(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
         """Root in [left, right] of g (order 0, falling) or g' (order 1, rising): Newton kept inside its bracket."""
         rows, constant = self._derivatives[order : order + 2], self._constant if order == 0 else 0.0
         sign = 1.0 if order == 0 else -1.0

@@ -37,7 +37,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import Modes, complete_modes, lowest_modes, right_singular_vectors
-from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 
 __all__ = ["BASE_MARGIN", "Asymptotic", "Base", "Level", "LevelOverride", "build_base", "build_level"]
 
@@ -249,7 +249,7 @@ def build_level(base: Base, indices: tuple[int, ...]) -> Level:
     )
 
 
-def _dense(matrix: object) -> np.ndarray:
+def _dense(matrix: Matrix) -> np.ndarray:
     return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
 
 
@@ -328,9 +328,7 @@ def _rest(
     carried = _range(directions[: base.modes.rigid])
     coupling = directions[: base.modes.rigid].T @ carried
     matrix = np.block([[flexibility, coupling], [coupling.T, np.zeros((carried.shape[1],) * 2)]])
-    given = np.concatenate(
-        [-gaps - touching.T @ (compliance * load[elastic]), -carried.T @ load[: base.modes.rigid]]
-    )
+    given = np.concatenate([-gaps - touching.T @ (compliance * load[elastic]), -carried.T @ load[: base.modes.rigid]])
     solution = np.linalg.solve(matrix, given)
     forces, rigid = solution[: len(gaps)], solution[len(gaps) :]
     configuration = np.concatenate([carried @ rigid, compliance * (load[elastic] + touching @ forces)])

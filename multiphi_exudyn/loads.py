@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.structure import At
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.structure import At, is_real
 
 __all__ = ["ConstantLoad"]
 
@@ -27,5 +27,7 @@ class ConstantLoad:
     force: float
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.force, (int, float)) and math.isfinite(self.force)):
+        if not is_real(self.force):
+            raise MultiPhiTypeError(f"load force: got {self.force!r}, need a number")
+        if not math.isfinite(self.force):
             raise MultiPhiValueError(f"load force: got {self.force!r}, need a finite number")

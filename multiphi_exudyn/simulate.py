@@ -19,6 +19,7 @@ from multiphi_exudyn.loads import ConstantLoad
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Event, Loss, Phase, State
 
+from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
 
 __all__ = ["Motion", "simulate"]
@@ -117,7 +118,9 @@ class Motion:
         self.segments.append(Segment(self.time, self.time + length, state.level, coefficients, state.phases))
         self.time = end if duration is None else self.time + length
         reached = self._at(state, coefficients, length)
-        self.state = reached if duration is None else self._respond(reached, waiting, own.finder.fallen(signals, length))
+        self.state = (
+            reached if duration is None else self._respond(reached, waiting, own.finder.fallen(signals, length))
+        )
 
     def _at(self, state: State, coefficients: np.ndarray, length: float) -> State:
         response = state.level.level.response
@@ -161,12 +164,14 @@ class Motion:
 
 def _start(model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None) -> Start:
     base = model.base
-    x, v = (_state_vector(name, given, model) for name, given in (("displacement", displacement), ("velocity", velocity)))
+    x, v = (
+        _state_vector(name, given, model) for name, given in (("displacement", displacement), ("velocity", velocity))
+    )
     y = base.weights @ x
     gaps = base.directions.T @ y + base.gaps
     scale = TOUCHING * (np.abs(base.gaps) + np.abs(base.directions.T) @ np.abs(y))
     rigid = np.isinf(base.stiffnesses)
-    for i in np.flatnonzero(rigid & (gaps < -scale)):
+    for i in np.flatnonzero(rigid & (gaps < -scale)).tolist():
         raise MultiPhiValueError(
             f"displacement: lies {-gaps[i]:g} m inside the rigid contact {model.contacts[i].name!r}, need a gap >= 0 "
             "(static_equilibrium gives an admissible start)"
@@ -190,7 +195,7 @@ def _state_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> 
 
 
 def _time(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+    if not is_real(value):
         raise MultiPhiTypeError(f"{name}: got {value!r}, need a time in s")
     if not (math.isfinite(value) and value > 0):
         raise MultiPhiValueError(f"{name}: got {value!r}, need a finite time > 0 s")

@@ -9,6 +9,7 @@ a closed-form integral of eta'^T D eta') and what loads did; its residual is the
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -219,7 +220,10 @@ class Trajectory:
 
         return np.asarray(self._evaluate(t, side, values))
 
-    def _evaluate(self, t: float | np.ndarray, side: str, values) -> float | np.ndarray:  # type: ignore[no-untyped-def]
+    def _evaluate(
+        self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
+    ) -> float | np.ndarray:
+        """``values`` of the segments that own the times, in the order of the times."""
         times = self._times(t)
         owner = self._owners(times, side)
         parts = np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1)
@@ -242,7 +246,9 @@ class Trajectory:
         if times.ndim != 1 or len(times) == 0:
             raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
         if not self.segments or not np.all((times >= 0) & (times <= self.t_end)):
-            raise MultiPhiValueError(f"t: got {np.min(times):g} to {np.max(times):g} s, need 0 <= t <= {self.t_end:g} s")
+            raise MultiPhiValueError(
+                f"t: got {np.min(times):g} to {np.max(times):g} s, need 0 <= t <= {self.t_end:g} s"
+            )
         return times
 
     @functools.cached_property
