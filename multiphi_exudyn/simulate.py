@@ -18,7 +18,6 @@ from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.loads import ConstantLoad
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Event, Loss, Phase, State
-
 from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
 
