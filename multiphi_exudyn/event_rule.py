@@ -168,7 +168,7 @@ class EventRule:
         """Phases as the state stands, and the contacts that ask to change and have not been heard."""
         standing = [self._standing(state, contact) for contact in range(len(self._rigid))]
         asking = {i for i, phase in enumerate(standing) if phase is Phase.REFUSED} - heard
-        return replace(state, phases=tuple(standing)), asking
+        return State(state.level, state.displacement, state.velocity, tuple(standing)), asking
 
     def _standing(self, state: State, contact: int) -> Phase:
         """ARMED where s is or becomes positive, RECOVERING where it is negative and rises, else REFUSED."""

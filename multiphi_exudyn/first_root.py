@@ -29,6 +29,7 @@ __all__ = ["DescentFinder", "Signals", "ZERO"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
+SAMPLED = 4  # of them, known at every sample
 INTERVALS = 32  # in a block
 TABLES = 64  # sample tables kept for a basis
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
@@ -141,11 +142,12 @@ class DescentFinder:
         return envelope if self.basis.pure else envelope * horizon**self.basis.powers
 
     def _table(self, step: float) -> np.ndarray:
-        """phi at the block's samples, (p, INTERVALS + 1), from its start."""
+        """Parts of phi at the block's samples, (2p, INTERVALS + 1), from its start."""
         if step not in self._tables:
             if len(self._tables) > TABLES:
                 self._tables.clear()
-            self._tables[step] = np.ascontiguousarray(self.basis.at(step * np.arange(INTERVALS + 1)).T)
+            samples = self.basis.at(step * np.arange(INTERVALS + 1))
+            self._tables[step] = np.ascontiguousarray(samples.view(float).T)
         return self._tables[step]
 
     def _search_block(
@@ -157,46 +159,52 @@ class DescentFinder:
         step: float,
         horizon: float,
     ) -> float | None:
-        local = derivatives[:2] if start == 0 else self.basis.shifted(derivatives[:2], start)
-        samples = (local @ self._table(step)).real
+        local = derivatives[:SAMPLED] if start == 0 else self.basis.shifted(derivatives[:SAMPLED], start)
+        samples = (_parts(local).reshape(-1, 2 * local.shape[2]) @ self._table(step)).reshape(*local.shape[:2], -1)
         self.evaluations += INTERVALS + 1
-        values = samples[0] + constants[:, None]
-        inner = samples[1] * (step / 3)
+        samples[0] += constants[:, None]
+        values, inner = samples[0], samples[1] * (step / 3)
         left, right = values[:, :-1], values[:, 1:]
         lowest = np.minimum(np.minimum(left, right), np.minimum(left + inner[:, :-1], right - inner[:, 1:]))
         doubtful = lowest <= (HERMITE * step**4) * bounds[4][:, None]
-        for interval in doubtful.any(axis=0).nonzero()[0].tolist():
+        signals, intervals = doubtful.nonzero()
+        first: float | None = None
+        search: _Search | None = None
+        for s, interval in zip(signals.tolist(), intervals.tolist(), strict=True):
             begin = start + interval * step
-            if begin >= horizon:
-                return None
-            roots = [
-                _Search(self, derivatives[:, s], float(constants[s]), bounds[:, s]).descent(
-                    begin, min(begin + step, horizon)
-                )
-                for s in doubtful[:, interval].nonzero()[0].tolist()
-            ]
-            found = [root for root in roots if root is not None]
-            if found:
-                return min(found)
-        return None
+            if begin >= horizon or (first is not None and begin >= first):
+                continue  # behind the end, or behind a root already found
+            if search is None or search.signal != s:
+                search = _Search(self, s, derivatives[:, s], float(constants[s]), bounds[:, s])
+            ends = samples[:, s, interval : interval + 2].T.tolist()
+            found = search.descent(begin, begin + step, *ends)
+            if found is not None and found <= horizon and (first is None or found < first):
+                first = found
+        return first
 
 
 class _Search:
     """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about."""
 
-    def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: np.ndarray) -> None:
+    def __init__(
+        self, finder: DescentFinder, signal: int, derivatives: np.ndarray, constant: float, bounds: np.ndarray
+    ) -> None:
+        self.signal = signal
         self._finder = finder
         self._basis = finder.basis
-        self._derivatives = derivatives
+        self._rows = _parts(derivatives[:SAMPLED])
         self._constant = constant
         self._bounds: list[float] = bounds.tolist()
         self._noise = [ZERO * bound for bound in self._bounds]
         self._noise[0] += ZERO * abs(constant)
 
-    def descent(self, left: float, right: float) -> float | None:
-        """First descent in [left, right], by division until every interval is decided."""
+    def descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
+        """First descent in [left, right], by division until every interval is decided.
+
+        at_left, at_right: g and its derivatives to the third at the ends.
+        """
         narrowest = NARROWEST * right
-        intervals = [(left, right, self._point(left), self._point(right))]
+        intervals = [(left, right, at_left, at_right)]
         while intervals:
             left, right, at_left, at_right = intervals.pop()
             decided, root = self._decide(left, right, at_left, at_right, narrowest)
@@ -212,7 +220,7 @@ class _Search:
     def _point(self, t: float) -> list[float]:
         """g, g', g'', g''' at t."""
         self._finder.evaluations += 1
-        values: list[float] = (self._derivatives[:4] @ self._basis.at(t)).real.tolist()
+        values: list[float] = (self._rows @ self._basis.at(t).view(float)).tolist()
         values[0] += self._constant
         return values
 
@@ -264,12 +272,12 @@ class _Search:
 
     def _newton(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
         """Root in [left, right] of g (order 0, falling) or g' (order 1, rising): Newton kept inside its bracket."""
-        rows, constant = self._derivatives[order : order + 2], self._constant if order == 0 else 0.0
+        rows, constant = self._rows[order : order + 2], self._constant if order == 0 else 0.0
         sign = 1.0 if order == 0 else -1.0
         t = left + (right - left) * _guess(right - left, at_left[order : order + 2], at_right[order : order + 2])
         tolerance = TIME_ROUND_OFF * right
         for _ in range(100):
-            value, slope = (rows @ self._basis.at(t)).real.tolist()
+            value, slope = (rows @ self._basis.at(t).view(float)).tolist()
             value += constant
             self._finder.evaluations += 1
             if sign * value >= 0:
@@ -283,6 +291,11 @@ class _Search:
                 return min(max(following, left), right)
             t = following if left < following < right else (left + right) / 2
         return t
+
+
+def _parts(coefficients: np.ndarray) -> np.ndarray:
+    """Real rows (..., 2p) whose product with the interleaved parts of phi is Re(coefficients phi)."""
+    return np.ascontiguousarray(coefficients.conj()).view(float)
 
 
 def _guess(width: float, at_left: list[float], at_right: list[float]) -> float:

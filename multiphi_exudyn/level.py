@@ -133,6 +133,11 @@ class Level:
         """Undamped natural frequencies (r,) [Hz]."""
         return self.omega / (2 * math.pi)
 
+    @functools.cached_property
+    def highest_frequency(self) -> float:
+        """The highest of them [Hz]."""
+        return float(np.max(self.frequencies))
+
     @property
     def ratios(self) -> np.ndarray:
         """Damping ratios (r,), diagonal of the projected damping over 2 omega; zero for rigid-body modes."""

@@ -122,8 +122,29 @@ class ModalResponse:
         self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray | None = None
     ) -> np.ndarray:
         """c (p,) of the motion that starts at eta(0), eta'(0), both (r,)."""
-        c = self.from_displacement @ displacement + self.from_velocity @ velocity
+        c: np.ndarray = (self._from_state @ np.concatenate([displacement, velocity])).view(complex)
         return c if force is None else c + self.from_force @ force
+
+    def state(self, coefficients: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """eta(t), eta'(t), both (r,)."""
+        r, values = len(self.shapes), self.basis.at(t)
+        if not self.basis.pure:
+            rate = self.basis.derivative(coefficients)
+            return (self.shapes @ (coefficients * values)).real, (self.shapes @ (rate * values)).real
+        both = self._to_state @ (coefficients * values).view(float)
+        return both[:r], both[r:]
+
+    @functools.cached_property
+    def _from_state(self) -> np.ndarray:
+        """[A, B] on real and imaginary parts, (2p, 2r): one real product where two complex ones stood."""
+        both = np.hstack([self.from_displacement, self.from_velocity])
+        return np.stack([both.real, both.imag], axis=1).reshape(2 * len(both), -1)
+
+    @functools.cached_property
+    def _to_state(self) -> np.ndarray:
+        """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), where every power is zero."""
+        both = np.vstack([self.shapes, self.shapes * self.basis.rates])
+        return np.stack([both.real, -both.imag], axis=2).reshape(len(both), -1)
 
     def dissipated(self, coefficients: np.ndarray, damping: np.ndarray, duration: float) -> float:
         """Work of damping, the integral of eta'^T D eta' over [0, duration], for the motion with these c (p,).

@@ -106,7 +106,7 @@ class Motion:
         state = self.state
         own = state.level.level
         coefficients = state.coefficients()
-        if not np.all(np.isfinite(coefficients)):
+        if not math.isfinite(abs(complex(coefficients.sum()))):
             raise NumericalFailure("the modal state is not finite")
         waiting, table = self.rule.watch(state)
         signals = table.signals(coefficients)
@@ -116,19 +116,9 @@ class Motion:
         length = end - self.time if duration is None else duration
         self.segments.append(Segment(self.time, self.time + length, state.level, coefficients, state.phases))
         self.time = end if duration is None else self.time + length
-        reached = self._at(state, coefficients, length)
+        reached = State(state.level, *own.response.state(coefficients, length), state.phases)
         self.state = (
             reached if duration is None else self._respond(reached, waiting, own.finder.fallen(signals, length))
-        )
-
-    def _at(self, state: State, coefficients: np.ndarray, length: float) -> State:
-        response = state.level.level.response
-        values = response.basis.at(length)
-        return State(
-            state.level,
-            (response.shapes @ (coefficients * values)).real,
-            (response.shapes @ (response.basis.derivative(coefficients) * values)).real,
-            state.phases,
         )
 
     def _respond(self, state: State, waiting: list[tuple[int, bool]], fallen: list[bool]) -> State:
@@ -152,7 +142,7 @@ class Motion:
     def _check_chatter(self, state: State) -> None:
         if len(self.segments) <= CHATTER_WINDOW:
             return
-        highest = float(np.max(state.level.level.omega)) / (2 * math.pi)
+        highest = state.level.level.highest_frequency
         elapsed = self.time - self.segments[-CHATTER_WINDOW].start
         if highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
             raise NumericalFailure(
