@@ -1,0 +1,1 @@
+"""Scenes, runs of their models, and what comes out of comparing them."""

@@ -1,0 +1,203 @@
+"""Comparison: every model of a scene run once, and measured against the reference.
+
+Errors are computed here and nowhere else; ``summary`` and ``histories`` are what is written to disk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.study import metrics
+from multiphi_exudyn.study.runners import run_model
+from multiphi_exudyn.study.runs import ModelRun
+from multiphi_exudyn.study.scene_file import DisplacedStart
+from multiphi_exudyn.study.workbench import Workbench
+
+__all__ = ["Comparison", "compare", "histories", "summary"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs of one scene, in the scene's order; environment: where they ran."""
+
+    bench: Workbench
+    runs: Mapping[str, ModelRun]
+    environment: Mapping[str, Any]
+
+    @property
+    def reference(self) -> ModelRun:
+        """What the others are measured against."""
+        return self.runs[self.bench.scene.file.comparison.reference]
+
+    @property
+    def coarser(self) -> ModelRun | None:
+        """The reference's coarser copy, if it ran."""
+        run = self.runs.get(self.bench.scene.file.comparison.coarser or "")
+        return run if run is not None and run.ok else None
+
+    @property
+    def cheapest(self) -> tuple[ModelRun, ...]:
+        """The full model at its cheapest fair setting, at nearby steps."""
+        return tuple(self.runs[name] for name in self.bench.scene.file.comparison.cheapest)
+
+    @property
+    def measured(self) -> dict[str, ModelRun]:
+        """Runs that can be measured: those that are ok, if the reference is."""
+        if not self.reference.ok:
+            return {}
+        return {name: run for name, run in self.runs.items() if run.ok and run is not self.reference}
+
+    @property
+    def windows(self) -> tuple[float, ...]:
+        """Ends [s] of the windows in which errors are given, ascending; the last is the end of the run."""
+        end = self.bench.t_end
+        return (*(w for w in sorted(self.bench.scene.file.outputs.windows) if w < end), end)
+
+    @property
+    def headline_window(self) -> float:
+        """The window the headline figures speak of: the longest before the end of the run."""
+        return self.windows[-2] if len(self.windows) > 1 else self.windows[-1]
+
+    def error(self, run: ModelRun, point: str, until: float) -> float:
+        """NRMSE of a point to the reference from 0 to ``until`` [s]."""
+        return metrics.nrmse(run.points[point], self.reference.points[point], run.time, until)
+
+    def worst_error(self, run: ModelRun, until: float) -> float:
+        """Largest NRMSE of the judged points."""
+        return max(self.error(run, point, until) for point in self.bench.judged_points)
+
+    def horizon(self, run: ModelRun, tolerance: float) -> float:
+        """Agreement horizon [s] of the judged points."""
+        pairs = [(run.points[p], self.reference.points[p]) for p in self.bench.judged_points]
+        return metrics.agreement_horizon(pairs, run.time, tolerance)
+
+    def speedup(self, run: ModelRun) -> float | None:
+        """Online time of the reference over the run's own; None where there is no such ratio."""
+        timed = run.ok and self.reference.ok and run.online_s > 0
+        return self.reference.online_s / run.online_s if timed else None
+
+    def first_phase(self, run: ModelRun, contact: str) -> np.ndarray:
+        """Contact intervals (m, 2) [s] of the first contact phase."""
+        return metrics.first_phase(run.contact_intervals[contact], self.bench.longest_period)
+
+    def lift_offs(self, run: ModelRun, contact: str) -> list[float]:
+        """Largest gap [m], on the common grid, of every opening inside the first contact phase."""
+        phase = self.first_phase(run, contact)
+        gap = run.gaps[contact]
+        openings = [(run.time >= a) & (run.time <= b) for a, b in zip(phase[:-1, 1], phase[1:, 0], strict=True)]
+        return [float(np.max(gap[inside], initial=0.0)) for inside in openings]
+
+
+def compare(
+    bench: Workbench,
+    environment: Mapping[str, Any],
+    progress: bool = True,
+    started: Callable[[str], None] = lambda name: None,
+) -> Comparison:
+    """Run every model of the scene; ``started`` is called with each name before it runs."""
+    runs = {}
+    for name in bench.scene.models:
+        started(name)
+        runs[name] = run_model(bench, name, progress)
+    return Comparison(bench, runs, environment)
+
+
+def summary(comparison: Comparison) -> dict[str, Any]:
+    """The content of summary.json; numbers that do not exist are None."""
+    outputs = comparison.bench.scene.file.outputs
+    errors = {name: _errors(comparison, run) for name, run in comparison.measured.items()}
+    coarser = comparison.coarser
+    known = coarser is not None and comparison.reference.ok
+    content = {
+        "scene": _scene(comparison),
+        "environment": dict(comparison.environment),
+        "reference": comparison.reference.name,
+        "models": {name: _row(comparison, run) for name, run in comparison.runs.items()},
+        "reference_uncertainty": errors[coarser.name] if known and coarser else {},
+        "errors": errors,
+        "agreement_horizon_s": {
+            name: {f"{tolerance:g}": comparison.horizon(run, tolerance) for tolerance in outputs.tolerances}
+            for name, run in comparison.measured.items()
+        },
+        "contact_intervals": {
+            name: {contact: given.tolist() for contact, given in run.contact_intervals.items()}
+            for name, run in comparison.runs.items()
+        },
+        "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
+    }
+    return _without_nan(content)
+
+
+def histories(comparison: Comparison) -> dict[str, np.ndarray]:
+    """The content of histories.npz: "time" [s], "MODEL/point/NAME" [m], "MODEL/gap/CONTACT" [m],
+    "MODEL/force/CONTACT" [N], "MODEL/energy_time" [s], "MODEL/energy" [J]."""
+    arrays = {"time": comparison.bench.time}
+    for name, run in comparison.runs.items():
+        if run.ok:
+            arrays |= {f"{name}/point/{point}": values for point, values in run.points.items()}
+            arrays |= {f"{name}/gap/{contact}": values for contact, values in run.gaps.items()}
+            arrays |= {f"{name}/force/{contact}": values for contact, values in run.contact_force.items()}
+            arrays |= {f"{name}/energy_time": run.energy_time, f"{name}/energy": run.energy}
+    return arrays
+
+
+def _scene(comparison: Comparison) -> dict[str, Any]:
+    scene = comparison.bench.scene
+    start = scene.file.start
+    size = {"displacement": start.displacement, "measured_at": start.measured_at}
+    return {
+        "name": scene.name,
+        "title": scene.file.title,
+        "t_end": comparison.bench.t_end,
+        "points": list(comparison.bench.points),
+        "judged_points": list(comparison.bench.judged_points),
+        "start": {"load_at": start.load_at} | (size if isinstance(start, DisplacedStart) else {"force": start.force}),
+        "contacts": {
+            contact.name: {"gap": contact.gap, "stiffness": "rigid" if contact.rigid else contact.stiffness}
+            for contact in comparison.bench.mechanics.contacts
+        },
+        "assumptions": list(comparison.bench.mechanics.assumptions),
+    }
+
+
+def _row(comparison: Comparison, run: ModelRun) -> dict[str, Any]:
+    return {
+        "kind": run.kind,
+        "label": run.label,
+        "dofs": run.dofs,
+        "status": run.status,
+        "message": run.message,
+        "steps": run.steps,
+        "offline_s": run.offline_s,
+        "online_s": run.online_s,
+        "first_s": run.first_s,
+        "repeats_s": list(run.repeats_s),
+        "sampling_s": run.sampling_s,
+        "speedup": comparison.speedup(run),
+        "first_contact_s": {name: metrics.first_contact(given) for name, given in run.contact_intervals.items()},
+        "inner_lift_offs_m": {name: comparison.lift_offs(run, name) for name in run.contact_intervals},
+        "impulse_Ns": dict(run.impulse),
+    }
+
+
+def _errors(comparison: Comparison, run: ModelRun) -> dict[str, dict[str, float]]:
+    return {
+        f"{until:g}": {point: comparison.error(run, point, until) for point in comparison.bench.points}
+        for until in comparison.windows
+    }
+
+
+def _without_nan(value: Any) -> Any:
+    """The same with None for numbers JSON cannot hold."""
+    if isinstance(value, Mapping):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return float(value) if isinstance(value, np.floating) else value

@@ -1,0 +1,67 @@
+"""Where a comparison ran: versions, machine, and what importing the packages costs."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import subprocess
+import sys
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+__all__ = ["environment"]
+
+PACKAGES = ("multiphi-exudyn", "exudyn", "numpy", "scipy")
+IMPORTED = ("multiphi_exudyn", "exudyn")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+IMPORT_LIMIT_S = 60  # s; an import that takes longer is not reported
+
+
+def environment() -> dict[str, Any]:
+    """Versions, machine, thread settings, and the import time [s] of each package in a fresh interpreter."""
+    return {
+        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "threads": {name: os.environ.get(name, "not set") for name in THREADS},
+        "versions": {name: _version(name) for name in PACKAGES},
+        "import_s": {name: _import_time(name) for name in IMPORTED},
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _processor() -> str:
+    """The processor's name where the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def _import_time(module: str) -> float | None:
+    """Seconds that ``import module`` takes in a fresh interpreter; None where it fails."""
+    code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+    path = os.pathsep.join(filter(None, sys.path))
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            timeout=IMPORT_LIMIT_S,
+            check=True,
+            env=os.environ | {"PYTHONPATH": path},
+        )
+        return float(done.stdout.split()[-1])
+    except (subprocess.SubprocessError, ValueError, IndexError, OSError):
+        return None

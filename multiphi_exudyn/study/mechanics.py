@@ -1,0 +1,174 @@
+"""What a scene file describes, as mechanics: beam or matrices, contacts, damping, and what is assumed.
+
+Errors of the mechanical objects get the file and the field they came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeVar
+from zipfile import BadZipFile
+
+import numpy as np
+
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.scene_file import (
+    BeamSpec,
+    DampingSpec,
+    DisplacedStart,
+    FullModel,
+    MatrixStructure,
+    ModalDampingSpec,
+    RectangleSection,
+    RigStructure,
+    SectionSpec,
+    StructureSpec,
+)
+from multiphi_exudyn.study.scenes import Scene, refuse
+from reference_models.rig import assumptions, rig_beam, rig_contact, rig_damping
+
+__all__ = ["Mechanics", "mechanics_of"]
+
+T = TypeVar("T")
+Damping = Matrix | ModalDamping | RayleighDamping | None
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """A scene's structure, given as a beam or as matrices, with its contacts and its damping.
+
+    parameter_set: of the paper's rig, None for any other structure.
+    assumptions: what the scene rests on beyond what is known, one sentence each.
+    """
+
+    contacts: tuple[UnilateralContact, ...]
+    damping: Damping
+    beam: Beam | None = None
+    matrices: LinearStructure | None = None
+    parameter_set: str | None = None
+    assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of the structure's points."""
+        given = self.beam.points if self.beam is not None else _known(self.matrices).points
+        return tuple(given)
+
+
+def mechanics_of(scene: Scene) -> Mechanics:
+    """Build and check what ``scene`` describes; raises MultiPhiValueError naming file and field."""
+    mechanics = _structure(scene, scene.file.structure)
+    own = tuple(
+        _at(scene, f"contacts[{i}]", lambda spec=spec: UnilateralContact(**spec.model_dump()))
+        for i, spec in enumerate(scene.file.contacts)
+    )
+    mechanics = replace(mechanics, contacts=mechanics.contacts + own)
+    if scene.file.damping is not None:
+        mechanics = replace(mechanics, damping=_damping(scene.file.damping))
+    _check_points(scene, mechanics)
+    _check_contacts(scene, mechanics)
+    return mechanics
+
+
+def _structure(scene: Scene, spec: StructureSpec) -> Mechanics:
+    if isinstance(spec, RigStructure):
+        return Mechanics(
+            contacts=(rig_contact(spec.support_stiffness),),
+            damping=rig_damping(),
+            beam=rig_beam(spec.rig),
+            parameter_set=spec.rig,
+            assumptions=assumptions(spec.rig),
+        )
+    if isinstance(spec, MatrixStructure):
+        matrices = _at(scene, "structure", lambda: _matrices(scene.path.parent, spec))
+        return Mechanics((), matrices.damping, matrices=matrices)
+    return Mechanics((), None, beam=_at(scene, "structure.beam", lambda: _beam(spec.beam)))
+
+
+def _beam(spec: BeamSpec) -> Beam:
+    return Beam(
+        [_section(section) for section in spec.sections],
+        spec.points,
+        [PointMass(mass.at, mass.mass, mass.inertia) for mass in spec.masses],
+        Clamp(spec.clamp.translation, spec.clamp.rotation),
+    )
+
+
+def _section(spec: SectionSpec) -> Section:
+    if isinstance(spec, RectangleSection):
+        return Section.rectangle(**spec.model_dump())
+    return Section(**spec.model_dump())
+
+
+def _matrices(folder: Path, spec: MatrixStructure) -> LinearStructure:
+    path = folder / spec.matrices
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = dict(stored)
+    except (OSError, ValueError, EOFError, BadZipFile, TypeError, AttributeError) as error:
+        raise MultiPhiValueError(f"matrices: got {path}, need an .npz file of arrays: {error}") from error
+    return LinearStructure(
+        _array(arrays, "mass"),
+        _array(arrays, "stiffness"),
+        arrays.get("damping"),
+        {name: _array(arrays, at) if isinstance(at, str) else at for name, at in spec.points.items()},
+    )
+
+
+def _array(arrays: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    if name not in arrays:
+        raise MultiPhiValueError(f"matrices: got the arrays {', '.join(arrays) or 'none'}, need {name!r}")
+    return arrays[name]
+
+
+def _damping(spec: DampingSpec) -> ModalDamping | RayleighDamping:
+    if isinstance(spec, ModalDampingSpec):
+        return ModalDamping(spec.modal_ratios, spec.beyond)
+    return RayleighDamping(spec.alpha, spec.beta)
+
+
+def _check_points(scene: Scene, mechanics: Mechanics) -> None:
+    """Every point named anywhere in the file is one of the structure's."""
+    file = scene.file
+    named = {"start.load_at": file.start.load_at}
+    if isinstance(file.start, DisplacedStart):
+        named["start.measured_at"] = file.start.measured_at
+    for group in ("points", "judged_points"):
+        named |= {f"outputs.{group}[{i}]": name for i, name in enumerate(getattr(file.outputs, group))}
+    for i, contact in enumerate(file.contacts):
+        names = [contact.direction] if isinstance(contact.direction, str) else contact.direction
+        named |= {f"contacts[{i}].direction": name for name in names}
+    for field_name, name in named.items():
+        if name not in mechanics.points:
+            refuse(scene, field_name, name, f"one of the points: {', '.join(mechanics.points)}")
+
+
+def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
+    names = [contact.name for contact in mechanics.contacts]
+    for name in names:
+        if names.count(name) > 1:
+            refuse(scene, "contacts", name, "a name of its own for every contact")
+    full = [i for i, model in enumerate(scene.file.models) if isinstance(model, FullModel)]
+    if full and mechanics.beam is None:
+        refuse(scene, f"models[{full[0]}].kind", "full", "reduced or user-object: matrices have no full model")
+    rigid = [contact.name for contact in mechanics.contacts if contact.rigid]
+    if full and rigid:
+        refuse(scene, f"stiffness of contact {rigid[0]}", "inf", "a finite one: the full model is a penalty model")
+
+
+def _at(scene: Scene, place: str, build: Callable[[], T]) -> T:
+    """What ``build`` gives; its error names file and field."""
+    try:
+        return build()
+    except MultiPhiError as error:
+        raise MultiPhiValueError(f"{scene.path}: {place}: {' '.join(str(error).split())}") from error
+
+
+def _known(matrices: LinearStructure | None) -> LinearStructure:
+    assert matrices is not None, "a structure is a beam or matrices"
+    return matrices

@@ -1,0 +1,109 @@
+"""Measures of how two histories differ, each in one place with its label, unit and definition.
+
+Histories are values at the times of one common grid, (k,); windows start at 0 and end at ``until``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = [
+    "METRICS",
+    "Metric",
+    "agreement_horizon",
+    "closed_time",
+    "first_contact",
+    "first_phase",
+    "inner_losses",
+    "nrmse",
+    "running_nrmse",
+]
+
+LEAVING = 0.25  # of the open level's longest period: an opening longer than this ends a contact phase
+
+
+@dataclass(frozen=True)
+class Metric:
+    """How a measure is written in tables and figures."""
+
+    label: str
+    unit: str
+    definition: str
+
+
+METRICS = {
+    "nrmse": Metric(
+        "difference (NRMSE)",
+        "1",
+        "||y - ref|| / ||ref|| over the samples from 0 to the window's end, y and ref being one point's "
+        "displacements; 0.01 is 1 %. Not divided by a range or a standard deviation.",
+    ),
+    "agreement_horizon": Metric(
+        "agreement horizon",
+        "s",
+        "the first time to which the NRMSE, taken from 0 to that time, of any judged point exceeds the "
+        "tolerance; the end of the run where that never happens.",
+    ),
+    "first_contact": Metric("first contact", "s", "start of the first contact interval after the release."),
+    "inner_losses": Metric(
+        "losses of contact inside the first contact phase",
+        "count",
+        "the first contact phase begins with the first contact and ends with the first opening that lasts "
+        "longer than a quarter of the open level's longest period; counted are the openings inside it.",
+    ),
+    "closed_time": Metric("time in contact", "s", "sum of the contact intervals' lengths."),
+    "impulse": Metric(
+        "contact impulse", "N s", "time integral of the contact force from 0 to the end, impacts included."
+    ),
+}
+
+
+def nrmse(values: np.ndarray, reference: np.ndarray, time: np.ndarray, until: float) -> float:
+    """||values - reference|| / ||reference|| over the samples with time <= until; nan without a reference."""
+    window = time <= until * (1 + 1e-9)
+    size = np.linalg.norm(reference[window])
+    return float(np.linalg.norm((values - reference)[window]) / size) if size > 0 else math.nan
+
+
+def running_nrmse(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """The NRMSE from the first sample to each sample, (k,); 0 while the reference is zero."""
+    size = np.cumsum(reference**2)
+    difference = np.cumsum((values - reference) ** 2)
+    return np.sqrt(np.divide(difference, size, out=np.zeros_like(size), where=size > 0))
+
+
+def agreement_horizon(
+    pairs: Sequence[tuple[np.ndarray, np.ndarray]], time: np.ndarray, tolerance: float
+) -> float:
+    """First time [s] to which the NRMSE of any (values, reference) pair exceeds ``tolerance``."""
+    worst = np.max([running_nrmse(values, reference) for values, reference in pairs], axis=0)
+    beyond = np.flatnonzero(worst > tolerance)
+    return float(time[beyond[0]] if len(beyond) else time[-1])
+
+
+def first_contact(intervals: np.ndarray) -> float | None:
+    """Start [s] of the first of the contact intervals (k, 2); None without contact."""
+    return float(intervals[0, 0]) if len(intervals) else None
+
+
+def first_phase(intervals: np.ndarray, longest_period: float) -> np.ndarray:
+    """The contact intervals, (m, 2), of the first contact phase; ``longest_period`` [s] is the open level's."""
+    if not len(intervals):
+        return intervals
+    openings = intervals[1:, 0] - intervals[:-1, 1]
+    leaving = np.flatnonzero(openings > LEAVING * longest_period)
+    return intervals[: leaving[0] + 1] if len(leaving) else intervals
+
+
+def inner_losses(intervals: np.ndarray, longest_period: float) -> int:
+    """Losses of contact inside the first contact phase."""
+    return max(0, len(first_phase(intervals, longest_period)) - 1)
+
+
+def closed_time(intervals: np.ndarray) -> float:
+    """Sum [s] of the lengths of the contact intervals (k, 2)."""
+    return float(np.sum(intervals[:, 1] - intervals[:, 0])) if len(intervals) else 0.0

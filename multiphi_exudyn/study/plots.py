@@ -1,0 +1,295 @@
+"""The report's pictures, from the data of a comparison; the only module that needs matplotlib.
+
+Every function returns a Figure. One colour per model in all of them (Okabe and Ito's colour-blind-safe
+set), the reference black, its coarser copy and the other full runs grey. Grey areas: the reference is in
+contact, as in Figs 38.8 to 38.10.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from multiphi_exudyn.study.compare import Comparison
+from multiphi_exudyn.study.mode_shapes import LevelModes
+from multiphi_exudyn.study.runs import ModelRun
+
+__all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figure", "mode_figure", "png"]
+
+COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#8A6D00", "#7F3C8D")
+REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
+MARKERS = {"reduced": "o", "user-object": "D", "full": "s"}
+WIDTH = 9.2  # inches
+RESOLUTION = 120  # dots per inch
+LOSSES = {
+    "final": ("still in motion", "#0072B2"),
+    "damping": ("damping", "#56B4E9"),
+    "impact": ("plastic impact", "#D55E00"),
+    "truncation_kinetic": ("truncation, kinetic", "#E69F00"),
+    "truncation_strain": ("truncation, strain", "#CC79A7"),
+}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How one model is drawn."""
+
+    colour: str
+    line: str
+    width: float
+    marker: str
+
+
+def styles(comparison: Comparison) -> dict[str, Style]:
+    """One style per model."""
+    drawn, colours = {}, iter(COLOURS * len(comparison.runs))
+    for name, run in comparison.runs.items():
+        if run is comparison.reference:
+            drawn[name] = Style(REFERENCE, "-", 2.0, MARKERS[run.kind])
+        elif run.kind == "full":
+            drawn[name] = Style(FULL, "-", 1.0, MARKERS[run.kind])
+        else:
+            line = ":" if run.kind == "user-object" else "-"
+            drawn[name] = Style(next(colours), line, 2.2 if line == ":" else 1.3, MARKERS[run.kind])
+    return drawn
+
+
+def history_figure(comparison: Comparison, point: str) -> Figure:
+    """A point's history, its detail in the first contact, and its difference to the reference."""
+    figure, (whole, detail, difference) = _figure(9.0, 3, heights=(1.0, 1.2, 1.0))
+    shown = [comparison.reference, *pictured(comparison)]
+    for axes in (whole, detail):
+        _lines(axes, comparison, shown, point, 1e3)
+        axes.set_ylabel(f"{point} [mm]")
+    _whole(whole, comparison)
+    whole.set_title(f"Displacement of {point}; grey: the reference is in contact")
+    _detail(detail, comparison, point)
+    _differences(difference, comparison, point)
+    _legend(figure, comparison, shown + [run for run in reduced(comparison) if run not in shown])
+    return figure
+
+
+def error_time_figure(comparison: Comparison) -> Figure:
+    """Worst NRMSE of the judged points against online time, with the reference's own uncertainty."""
+    figure, (axes,) = _figure(4.8, 1)
+    until = comparison.headline_window
+    style = styles(comparison)
+    for name, run in comparison.measured.items():
+        error = 100 * comparison.worst_error(run, until)
+        axes.loglog(run.online_s, error, style[name].marker, color=style[name].colour, markersize=9)
+    own = comparison.coarser
+    if own is not None and own.name in comparison.measured:
+        band = 100 * comparison.worst_error(own, until)
+        axes.axhspan(1e-6, band, color=CONTACT, zorder=0)
+        axes.annotate(
+            "the reference's own uncertainty", (0.99, band), xycoords=("axes fraction", "data"),
+            ha="right", va="bottom", fontsize=8, color="#444444",
+        )  # fmt: skip
+    _error_time_frame(axes, comparison, until)
+    _legend(figure, comparison, list(comparison.measured.values()), markers=True)
+    return figure
+
+
+def mode_figure(levels: Sequence[LevelModes]) -> Figure:
+    """The lowest mode shapes of every level along the beam."""
+    count = max(len(level.frequencies) for level in levels)
+    figure = _canvas(2.1 * len(levels) + 0.3)
+    grid = figure.subplots(len(levels), count, sharex=True, sharey=True, squeeze=False)
+    for row, level in zip(grid, levels, strict=True):
+        for i, axes in enumerate(row):
+            axes.axhline(0.0, color="#BBBBBB", linewidth=0.8)
+            axes.plot(level.x, level.shapes[i], color=COLOURS[0], linewidth=1.6)
+            for places, marker, colour in ((level.masses, "s", "#000000"), (level.contacts, "^", "#D55E00")):
+                axes.plot(places, np.interp(places, level.x, level.shapes[i]), marker, color=colour, ms=6)
+            axes.set_title(f"{level.name}, mode {i + 1}\n{level.frequencies[i]:.2f} Hz", fontsize=9)
+            axes.set_yticks([])
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]")
+    return figure
+
+
+def energy_figure(comparison: Comparison) -> Figure:
+    """Energy over time, and where the initial energy is at the end."""
+    figure, (curves, bars) = _figure(7.6, 2, heights=(1.0, 1.1))
+    style = styles(comparison)
+    for run in [comparison.reference, *pictured(comparison)]:
+        if run.ok and len(run.energy):
+            share = 100 * run.energy / run.energy[0]
+            drawn = style[run.name]
+            curves.plot(run.energy_time, share, drawn.line, color=drawn.colour, lw=drawn.width, label=run.label)
+    curves.set_xlabel("time [s]")
+    curves.set_ylabel("energy [% of the initial]")
+    curves.set_ylim(0, None)
+    curves.legend(frameon=False, fontsize=8)
+    _ledger_bars(bars, comparison)
+    return figure
+
+
+def contact_figure(comparison: Comparison, contact: str) -> Figure:
+    """Contact intervals of all models under each other, whole and in the first contact phase."""
+    runs = [run for run in comparison.runs.values() if run.ok]
+    figure, both = _figure(1.6 + 0.46 * len(runs), 2, heights=(1, 1))
+    style = styles(comparison)
+    for axes in both:
+        for row, run in enumerate(runs):
+            bars = [(a, b - a) for a, b in run.contact_intervals[contact]]
+            axes.broken_barh(bars, (row - 0.36, 0.72), color=style[run.name].colour, linewidth=0)
+        axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
+        axes.set_ylim(len(runs) - 0.5, -0.5)
+        axes.grid(axis="x", color="#E8E8E8")
+    both[0].set_xlim(0, comparison.bench.t_end)
+    both[0].set_title(f"In contact with {contact!r}; below, the first contact phase")
+    both[1].set_xlim(*first_contact_span(comparison))
+    both[1].set_xlabel("time [s]")
+    return figure
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as PNG."""
+    buffer = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(buffer)
+    return buffer.getvalue()
+
+
+def reduced(comparison: Comparison) -> list[ModelRun]:
+    """Reduced models and user objects that can be measured."""
+    return [run for run in comparison.measured.values() if run.kind != "full"]
+
+
+def pictured(comparison: Comparison) -> list[ModelRun]:
+    """Those drawn over the reference: with the scene's own number of modes, all where none has it."""
+    specs, modes = comparison.bench.scene.models, comparison.bench.scene.file.modes
+    own = [run for run in reduced(comparison) if getattr(specs[run.name], "modes", None) == modes]
+    return own or reduced(comparison)
+
+
+def first_contact_span(comparison: Comparison) -> tuple[float, float]:
+    """Start and end [s] of the detail around the reference's first contact phase."""
+    phases = [comparison.first_phase(comparison.reference, name) for name in comparison.reference.contact_intervals]
+    phases = [phase for phase in phases if len(phase)]
+    if not phases:
+        return 0.0, comparison.bench.t_end
+    start, end = min(phase[0, 0] for phase in phases), max(phase[-1, 1] for phase in phases)
+    margin = 0.25 * (end - start)
+    return max(0.0, start - margin), min(comparison.bench.t_end, end + margin)
+
+
+def _canvas(height: float) -> Figure:
+    figure = Figure(figsize=(WIDTH, height), dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _figure(height: float, rows: int, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
+    figure = _canvas(height)
+    axes = list(figure.subplots(rows, 1, squeeze=False, height_ratios=heights)[:, 0])
+    for each in axes:
+        each.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _lines(axes: Axes, comparison: Comparison, runs: Sequence[ModelRun], point: str, scale: float) -> None:
+    style = styles(comparison)
+    for run in runs:
+        if run.ok:
+            drawn = style[run.name]
+            axes.plot(run.time, scale * run.points[point], drawn.line, color=drawn.colour, lw=drawn.width)
+    for intervals in comparison.reference.contact_intervals.values():
+        for start, end in intervals:
+            axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
+
+
+def _whole(axes: Axes, comparison: Comparison) -> None:
+    axes.set_xlim(0, comparison.bench.t_end)
+    axes.set_xlabel("time [s]")
+
+
+def _detail(axes: Axes, comparison: Comparison, point: str) -> None:
+    start, end = first_contact_span(comparison)
+    axes.set_xlim(start, end)
+    inside = (comparison.bench.time >= start) & (comparison.bench.time <= end)
+    runs = [run for run in [comparison.reference, *pictured(comparison)] if run.ok]
+    values = np.concatenate([1e3 * run.points[point][inside] for run in runs] or [np.zeros(1)])
+    margin = 0.06 * (np.max(values) - np.min(values)) + 1e-9
+    axes.set_ylim(np.min(values) - margin, np.max(values) + margin)
+    for contact in comparison.bench.mechanics.contacts:
+        if contact.direction == point:
+            axes.axhline(-1e3 * contact.gap, color="#444444", linestyle="--", linewidth=0.8)
+            axes.annotate(
+                f"{contact.name} at {-1e3 * contact.gap:g} mm", (0.995, -1e3 * contact.gap),
+                xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#444444",
+            )  # fmt: skip
+    axes.set_title("Detail of the first contact phase", fontsize=10)
+    axes.set_xlabel("time [s]")
+
+
+def _differences(axes: Axes, comparison: Comparison, point: str) -> None:
+    style, reference = styles(comparison), comparison.reference
+    own = comparison.coarser
+    if own is not None and reference.ok:
+        band = 1e3 * np.maximum.accumulate(np.abs(own.points[point] - reference.points[point]))
+        axes.fill_between(own.time, 1e-9, np.maximum(band, 1e-9), color=CONTACT, lw=0)
+    lowest = 1e-3
+    for run in reduced(comparison):
+        difference = 1e3 * np.maximum.accumulate(np.abs(run.points[point] - reference.points[point]))
+        lowest = min(lowest, max(float(np.min(difference[1:], initial=1e-3)), 1e-5))
+        drawn = style[run.name]
+        axes.semilogy(run.time, np.maximum(difference, 1e-9), drawn.line, color=drawn.colour, lw=drawn.width)
+    axes.set_yscale("log")
+    axes.set_ylim(lowest, None)
+    axes.set_xlim(0, comparison.bench.t_end)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("largest so far [mm]")
+    axes.set_title("Difference to the reference; grey: the reference to its coarser copy", fontsize=10)
+
+
+def _error_time_frame(axes: Axes, comparison: Comparison, until: float) -> None:
+    if comparison.reference.ok:
+        axes.axvline(comparison.reference.online_s, color=REFERENCE, linestyle="--", linewidth=1)
+        axes.annotate(
+            "online time of the reference", (comparison.reference.online_s, 0.98), rotation=90,
+            xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8,
+        )  # fmt: skip
+    errors = [100 * comparison.worst_error(run, until) for run in comparison.measured.values()]
+    errors = [error for error in errors if error > 0]
+    if errors:
+        axes.set_ylim(min(errors) / 3, max(errors) * 3)
+    axes.set_xlabel("online time [s]")
+    axes.set_ylabel(f"NRMSE to {until:g} s [%], worst of {', '.join(comparison.bench.judged_points)}")
+    axes.grid(which="both", color="#EEEEEE")
+
+
+def _ledger_bars(axes: Axes, comparison: Comparison) -> None:
+    runs = [run for run in comparison.runs.values() if run.ok and run.ledger.get("initial")]
+    left = np.zeros(len(runs))
+    for row, (label, colour) in LOSSES.items():
+        share = np.array([100 * run.ledger.get(row, 0.0) / run.ledger["initial"] for run in runs])
+        if np.any(share > 0):
+            axes.barh(range(len(runs)), share, left=left, color=colour, height=0.7, label=label)
+        left = left + share
+    axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlabel("share of the initial energy at the end of the run [%]")
+    axes.set_xlim(0, 100 if not len(left) else max(100.0, float(np.max(left))))
+    axes.legend(frameon=False, fontsize=8, ncols=len(LOSSES), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+def _legend(
+    figure: Figure, comparison: Comparison, runs: Sequence[ModelRun], markers: bool = False
+) -> None:
+    style = styles(comparison)
+    handles: list[Any] = [
+        Line2D([], [], color=style[run.name].colour, linestyle="" if markers else style[run.name].line,
+               linewidth=style[run.name].width, marker=style[run.name].marker if markers else "")
+        for run in runs
+    ]  # fmt: skip
+    labels = [run.label for run in runs]
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)

@@ -1,0 +1,78 @@
+"""The report: one self-contained HTML page from a comparison, its pictures embedded."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from multiphi_exudyn.study import metrics, plots
+from multiphi_exudyn.study.compare import Comparison
+from multiphi_exudyn.study.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.losses import LossTable
+from multiphi_exudyn.study.mode_shapes import LevelModes
+from reference_models.rig import rig
+
+__all__ = ["render"]
+
+TEMPLATE = "report.html.j2"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as a data URI, with its place in the page and its caption."""
+
+    section: str
+    source: str
+    caption: str
+
+
+def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequence[LossTable]) -> str:
+    """The page as HTML."""
+    environment = Environment(
+        loader=PackageLoader("multiphi_exudyn.study"), autoescape=True, undefined=StrictUndefined
+    )
+    environment.filters |= {"percent": percent, "seconds": seconds, "times": times}
+    return environment.get_template(TEMPLATE).render(
+        comparison=comparison,
+        bench=comparison.bench,
+        scene=comparison.bench.scene,
+        findings=findings(comparison),
+        levels=levels,
+        losses=losses,
+        metrics=metrics,
+        pictures=list(_pictures(comparison, levels)),
+        contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
+    )
+
+
+def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[Picture]:
+    if comparison.reference.ok:
+        for point in comparison.bench.points:
+            yield _picture("histories", plots.history_figure(comparison, point), f"{point}.")
+        yield _picture(
+            "cost",
+            plots.error_time_figure(comparison),
+            "Lower left is better. In the grey band a model is as good as the reference can tell.",
+        )
+        for contact in comparison.reference.contact_intervals:
+            yield _picture(
+                "contact", plots.contact_figure(comparison, contact), "A bar is a time span in contact."
+            )
+        yield _picture(
+            "energy",
+            plots.energy_figure(comparison),
+            "Where a bar ends short of 100 %, time integration has lost energy; beyond, it has gained some.",
+        )
+    if levels:
+        yield _picture(
+            "modes", plots.mode_figure(levels), "Square: point mass. Triangle: closed contact. Each scaled to 1."
+        )
+
+
+def _picture(section: str, figure: Figure, caption: str) -> Picture:
+    encoded = base64.b64encode(plots.png(figure)).decode("ascii")
+    return Picture(section, f"data:image/png;base64,{encoded}", caption)

@@ -1,0 +1,259 @@
+"""The format of a scene file: structure + contacts + start + damping + outputs + the models to run.
+
+SI units, angles in radians. Every field is typed and none may be unknown; what the names in a file
+refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scenes`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
+
+__all__ = [
+    "BeamSpec",
+    "BeamStructure",
+    "ContactSpec",
+    "DisplacedStart",
+    "FullModel",
+    "MatrixStructure",
+    "ModalDampingSpec",
+    "RectangleSection",
+    "ReducedModel",
+    "RigStructure",
+    "SceneFile",
+    "UserObjectModel",
+]
+
+
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise PydanticCustomError("zero", "a value that is not zero")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Stiffness = Annotated[float, Field(gt=0)]  # N/m or N m; infinite is ideally rigid
+NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
+Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
+Modes = Annotated[int, Field(ge=1)] | Literal["all"]
+
+
+def _by_key(*keys: str) -> Discriminator:
+    """Choose a table's form by the key that only this form has."""
+
+    def choose(given: Any) -> str | None:
+        return next((f"<{key}>" for key in keys if isinstance(given, Mapping) and key in given), None)
+
+    needed = "a table with the field " + " or ".join(keys)
+    return Discriminator(choose, custom_error_type="form", custom_error_message=needed)
+
+
+class Table(BaseModel):
+    """A table of a scene file: every field typed, none unknown."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class RigStructure(Table):
+    """The paper's rig by one of its parameter sets, with its support and its measured damping."""
+
+    rig: Literal["measured-free", "printed-pinned", "as-published"]
+    support_stiffness: Stiffness  # N/m
+
+
+class RectangleSection(Table):
+    """A piece of rectangular beam, ``height`` along z."""
+
+    start: Finite
+    end: Finite
+    width: Positive
+    height: Positive
+    youngs_modulus: Positive
+    density: Positive
+    poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
+
+
+class GeneralSection(Table):
+    """A piece of beam by its section values."""
+
+    start: Finite
+    end: Finite
+    area: Positive
+    second_moment: Positive
+    youngs_modulus: Positive
+    density: Positive
+    shear_modulus: Positive
+    shear_factor: Positive = 5 / 6
+
+
+class MassSpec(Table):
+    """A point mass with rotary inertia."""
+
+    at: Finite
+    mass: NotNegative
+    inertia: NotNegative = 0.0
+
+
+class ClampSpec(Table):
+    """Stiffness of the beam's first end; infinite is ideally rigid."""
+
+    translation: Annotated[float, Field(ge=0)] = float("inf")
+    rotation: Annotated[float, Field(ge=0)] = float("inf")
+
+
+SectionSpec = Annotated[
+    Annotated[RectangleSection, Tag("<width>")] | Annotated[GeneralSection, Tag("<area>")],
+    _by_key("width", "area"),
+]
+
+
+class BeamSpec(Table):
+    """A straight planar beam in full."""
+
+    sections: Annotated[tuple[SectionSpec, ...], Field(min_length=1)]
+    points: Annotated[dict[Name, Finite], Field(min_length=1)]
+    masses: tuple[MassSpec, ...] = ()
+    clamp: ClampSpec = ClampSpec()
+
+
+class BeamStructure(Table):
+    """A beam described in the scene."""
+
+    beam: BeamSpec
+
+
+class MatrixStructure(Table):
+    """Matrices from an .npz file (arrays mass, stiffness, and optionally damping)."""
+
+    matrices: str  # path, relative to the scene file
+    points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]  # DoF, or a row's array
+
+
+StructureSpec = Annotated[
+    Annotated[RigStructure, Tag("<rig>")]
+    | Annotated[BeamStructure, Tag("<beam>")]
+    | Annotated[MatrixStructure, Tag("<matrices>")],
+    _by_key("rig", "beam", "matrices"),
+]
+
+
+class ContactSpec(Table):
+    """One unilateral contact: g = direction . x + gap."""
+
+    name: Name
+    direction: Name | Annotated[dict[Name, Finite], Field(min_length=1)]
+    gap: Finite
+    stiffness: Stiffness
+
+
+class DisplacedStart(Table):
+    """Static load at ``load_at``, as large as moves ``measured_at`` by ``displacement`` [m]."""
+
+    load_at: Name
+    measured_at: Name
+    displacement: NotZero
+
+
+class LoadedStart(Table):
+    """Static load ``force`` [N] at ``load_at``."""
+
+    load_at: Name
+    force: NotZero
+
+
+StartSpec = Annotated[
+    Annotated[DisplacedStart, Tag("<displacement>")] | Annotated[LoadedStart, Tag("<force>")],
+    _by_key("displacement", "force"),
+]
+
+
+class ModalDampingSpec(Table):
+    """Damping ratios of the open level's modes, lowest first, as fractions."""
+
+    modal_ratios: tuple[NotNegative, ...]
+    beyond: NotNegative = 0.0
+
+
+class RayleighDampingSpec(Table):
+    """C = alpha M + beta K."""
+
+    alpha: NotNegative
+    beta: NotNegative
+
+
+DampingSpec = Annotated[
+    Annotated[ModalDampingSpec, Tag("<modal_ratios>")] | Annotated[RayleighDampingSpec, Tag("<alpha>")],
+    _by_key("modal_ratios", "alpha"),
+]
+
+
+class OutputSpec(Table):
+    """What is recorded and how it is judged."""
+
+    t_end: Positive = 1.0  # s
+    interval: Positive = 1e-4  # s, between the samples of the common time grid
+    points: tuple[Name, ...] = ()  # none named: all of the structure
+    judged_points: tuple[Name, ...] = ()  # those the report's headline figures speak of; none named: all
+    windows: tuple[Positive, ...] = (0.1, 0.3)  # s, from 0; t_end is added
+    tolerances: tuple[Positive, ...] = (0.01, 0.05)  # of the agreement horizon
+
+
+class ReducedModel(Table):
+    """A Multi-Phi model run by itself."""
+
+    kind: Literal["reduced"]
+    name: Name  # "{modes}" stands for the number of modes
+    modes: Modes | None = None  # none given: the scene's
+    contact: Literal["as-given", "rigid"] = "as-given"
+
+
+class UserObjectModel(Table):
+    """A Multi-Phi model as a body inside Exudyn."""
+
+    kind: Literal["user-object"]
+    name: Name
+    step: Positive  # s
+    modes: Annotated[int, Field(ge=1)] | None = None
+    contact: Literal["as-given", "rigid"] = "as-given"
+
+
+class FullModel(Table):
+    """The full nonlinear Exudyn beam with contact elements."""
+
+    kind: Literal["full"]
+    name: Name
+    beam: Literal["ancf", "geometrically-exact"] = "ancf"
+    elements: Annotated[int, Field(ge=1)]
+    step: Positive  # s
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
+    contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
+
+
+ModelSpec = Annotated[ReducedModel | UserObjectModel | FullModel, Field(discriminator="kind")]
+
+
+class ComparisonSpec(Table):
+    """Which model plays which part."""
+
+    reference: Name
+    coarser: Name | None = None  # its difference to the reference is the reference's own uncertainty
+    cheapest: tuple[Name, ...] = ()  # the full model at its cheapest fair setting, at nearby steps
+
+
+class SceneFile(Table):
+    """A whole scene file."""
+
+    title: Annotated[str, Field(min_length=1)]
+    modes: Annotated[int, Field(ge=1)] = 6
+    structure: StructureSpec
+    contacts: tuple[ContactSpec, ...] = ()
+    start: StartSpec
+    damping: DampingSpec | None = None
+    outputs: OutputSpec = OutputSpec()
+    models: Annotated[tuple[ModelSpec, ...], Field(min_length=1)]
+    comparison: ComparisonSpec

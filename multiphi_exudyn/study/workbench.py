@@ -1,0 +1,162 @@
+"""What all models of a scene share: one (M, C, K), the contacts, the start and the time grid.
+
+The structure is the linearisation of the reference's full beam, so a reduced model and its reference
+differ in nothing but the reduction, the geometric nonlinearity and the time integration.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.optimize
+
+from multiphi_exudyn.beam import planar_beam
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.level import LevelOverride
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.modes import complete_modes
+from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.mechanics import Mechanics
+from multiphi_exudyn.study.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scenes import Scene, refuse
+from reference_models.full_beam import FullBeam, FullBeamSettings
+from reference_models.rig import published_override
+
+__all__ = ["Workbench", "damping_matrix", "prepare", "start_configuration"]
+
+START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
+REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
+ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
+
+
+@dataclass(frozen=True)
+class Workbench:
+    """A scene ready to run.
+
+    structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
+    longest_period: of the open level [s]; infinite where it has a rigid-body mode.
+    """
+
+    scene: Scene
+    mechanics: Mechanics
+    structure: LinearStructure
+    structure_s: float
+    time: np.ndarray
+    longest_period: float
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The points whose histories are asked for."""
+        return self.scene.file.outputs.points or self.mechanics.points
+
+    @property
+    def judged_points(self) -> tuple[str, ...]:
+        """The points the headline figures speak of."""
+        return self.scene.file.outputs.judged_points or self.points
+
+    @property
+    def t_end(self) -> float:
+        """End of the run [s]: the last time of the grid."""
+        return float(self.time[-1])
+
+    def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
+        """The scene's contacts, as given or all of them rigid."""
+        given = self.mechanics.contacts
+        return tuple(replace(contact, stiffness=math.inf) for contact in given) if rigid else given
+
+    def model(self, spec: ReducedModel | UserObjectModel) -> MultiPhiModel:
+        """The reduced model of a scene's entry."""
+        overrides = {}
+        if self.mechanics.parameter_set is not None:
+            published = published_override(self.mechanics.parameter_set)
+            overrides = {k: LevelOverride(v.frequencies, v.ratios) for k, v in published.items()}
+        contacts = self.contacts(spec.contact == "rigid")
+        return MultiPhiModel(self.structure, contacts, modes=spec.modes or "all", overrides=overrides)
+
+    def full_beam(self, spec: FullModel) -> FullBeam:
+        """The full model of a scene's entry."""
+        return _full_beam(self.scene, self.mechanics, spec)
+
+
+def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
+    """Build what the scene's models share; raises MultiPhiValueError naming file and field."""
+    started = time.perf_counter()
+    structure = replace(_structure(scene, mechanics), damping=mechanics.damping)
+    elapsed = time.perf_counter() - started
+    _check_modes(scene, structure, len(mechanics.contacts))
+    outputs = scene.file.outputs
+    grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
+    lowest = float(MultiPhiModel(structure, modes=1).level(()).frequencies[0])
+    return Workbench(scene, mechanics, structure, elapsed, grid, 1 / lowest if lowest > 0 else math.inf)
+
+
+def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
+    """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed."""
+    start = bench.scene.file.start
+    if not isinstance(start, DisplacedStart):
+        return model.static_equilibrium({start.load_at: start.force})
+    row = bench.structure.row(start.measured_at)
+    free = MultiPhiModel(bench.structure, modes=1).static_equilibrium({start.load_at: 1.0})
+    needed = start.displacement / float(row @ free)
+
+    def miss(share: float) -> float:
+        """Of the displacement asked for, under a share of the force it needs without contact."""
+        reached = row @ model.static_equilibrium({start.load_at: share * needed})
+        return float(reached / start.displacement - 1)
+
+    root = scipy.optimize.root_scalar(miss, method="secant", x0=0.0, x1=1.0, xtol=START_TOLERANCE)
+    if not (root.converged and abs(miss(root.root)) <= REACHED):
+        raise NumericalFailure(
+            f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
+        )
+    return model.static_equilibrium({start.load_at: root.root * needed})
+
+
+def damping_matrix(structure: LinearStructure) -> np.ndarray | None:
+    """C (n, n) [N s/m] of a structure's damping, however it is given."""
+    given = structure.damping
+    if isinstance(given, ModalDamping):
+        modes = complete_modes(np.asarray(structure.mass), np.asarray(structure.stiffness))
+        momenta = structure.mass @ modes.shapes
+        return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T
+    if isinstance(given, RayleighDamping):
+        return given.alpha * structure.mass + given.beta * structure.stiffness
+    return given
+
+
+def _structure(scene: Scene, mechanics: Mechanics) -> LinearStructure:
+    if mechanics.matrices is not None:
+        return mechanics.matrices
+    full = [model for model in scene.models.values() if isinstance(model, FullModel)]
+    named = [model for model in full if model.name == scene.file.comparison.reference]
+    if named or full:
+        return _full_beam(scene, mechanics, (named or full)[0]).structure
+    assert mechanics.beam is not None, "a structure is a beam or matrices"
+    return planar_beam(mechanics.beam, ELEMENTS)
+
+
+def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
+    assert mechanics.beam is not None, "checked where the scene was loaded"
+    settings = FullBeamSettings(
+        kind=spec.beam,
+        elements=spec.elements,
+        step=spec.step,
+        contact=spec.contact,
+        spectral_radius=spec.spectral_radius,
+        output_step=scene.file.outputs.interval,
+    )
+    return FullBeam(mechanics.beam, mechanics.contacts, settings)
+
+
+def _check_modes(scene: Scene, structure: LinearStructure, contacts: int) -> None:
+    most = structure.n - contacts
+    for model in scene.models.values():
+        modes = 0 if isinstance(model, FullModel) or model.modes in (None, "all") else int(model.modes)
+        if modes > most:
+            refuse(scene, f"modes of {model.name}", modes, f"at most {most} for this structure")
+    if most < 1:
+        raise MultiPhiValueError(f"{scene.path}: structure: got {structure.n} DoFs and {contacts} contacts")

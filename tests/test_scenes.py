@@ -1,0 +1,256 @@
+"""Scene files: the shipped ones, and one line naming file and field for every broken one."""
+
+import copy
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from multiphi_exudyn import MultiPhiValueError, RayleighDamping
+from multiphi_exudyn.study.mechanics import mechanics_of
+from multiphi_exudyn.study.scene_file import FullModel
+from multiphi_exudyn.study.scenes import load_scene, shipped_scenes
+from reference_models.rig import rig
+
+BEAM = {
+    "title": "a small beam over a stop",
+    "structure": {
+        "beam": {
+            "sections": [
+                {
+                    "start": 0.0,
+                    "end": 0.5,
+                    "width": 0.02,
+                    "height": 0.004,
+                    "youngs_modulus": 7e10,
+                    "density": 2700,
+                }
+            ],
+            "points": {"middle": 0.3, "tip": 0.5},
+            "masses": [{"at": 0.5, "mass": 0.05}],
+        }
+    },
+    "contacts": [{"name": "stop", "direction": "middle", "gap": 1e-3, "stiffness": 1e5}],
+    "start": {"load_at": "tip", "measured_at": "tip", "displacement": 0.01},
+    "damping": {"modal_ratios": [0.01, 0.02]},
+    "outputs": {"t_end": 0.1, "points": ["tip"], "interval": 1e-3},
+    "models": [
+        {"kind": "reduced", "name": "all", "modes": "all"},
+        {"kind": "reduced", "name": "r{modes}"},
+    ],
+    "comparison": {"reference": "all"},
+}
+
+
+def toml(value):
+    """A value as TOML, tables inline."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(toml(item) for item in value) + "]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "nan" if math.isnan(value) else f"{'-' if value < 0 else ''}inf"
+    return json.dumps(value)
+
+
+def write(path, data):
+    path.write_text("\n".join(f"{json.dumps(key)} = {toml(value)}" for key, value in data.items()), "utf-8")
+    return str(path)
+
+
+def changed(path, value, data=BEAM):
+    """A copy of ``data`` with the entry at ``path`` replaced, or removed where value is None."""
+    data = copy.deepcopy(data)
+    *outer, last = path
+    table = data
+    for key in outer:
+        table = table[key]
+    if value is None:
+        del table[last]
+    else:
+        table[last] = value
+    return data
+
+
+def complaint(tmp_path, data):
+    """The one line with which a scene is refused."""
+    file = write(tmp_path / "scene.toml", data)
+    with pytest.raises(MultiPhiValueError) as caught:
+        mechanics_of(load_scene(file))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(file + ": ")
+    return line.removeprefix(file + ": ")
+
+
+def test_the_shipped_scenes_cover_holes_directions_and_parameter_sets():
+    scenes = [load_scene(name) for name in shipped_scenes()]
+    assert {"paper-rig", "paper-rig-minus-z", "paper-rig-printed-pinned"} <= {scene.name for scene in scenes}
+    starts = {(scene.file.start.load_at, scene.file.start.displacement > 0) for scene in scenes}
+    assert starts == {(hole, up) for hole in ("hole1", "hole2", "hole3") for up in (True, False)}
+    assert {scene.file.structure.rig for scene in scenes} == {
+        "measured-free",
+        "printed-pinned",
+        "as-published",
+    }
+
+
+@pytest.mark.parametrize("name", shipped_scenes())
+def test_a_shipped_scene_is_complete(name):
+    scene = load_scene(name)
+    mechanics = mechanics_of(scene)
+    (support,) = mechanics.contacts
+    assert support.gap == rig().contact_gap
+    assert mechanics.assumptions
+    assert any(isinstance(model, FullModel) for model in scene.models.values())
+
+
+def test_a_scene_can_describe_its_own_beam(tmp_path):
+    scene = load_scene(write(tmp_path / "mine.toml", BEAM))
+    mechanics = mechanics_of(scene)
+    assert scene.name == "mine"
+    assert list(scene.models) == ["all", "r6"]
+    assert mechanics.points == ("middle", "tip")
+    assert mechanics.beam.masses[0].mass == 0.05
+    assert mechanics.damping.ratios == (0.01, 0.02)
+
+
+def test_a_scene_can_take_matrices_from_a_file(tmp_path):
+    np.savez(tmp_path / "two.npz", mass=np.eye(2), stiffness=np.diag([1.0, 4.0]), difference=[1.0, -1.0])
+    data = changed(["structure"], {"matrices": "two.npz", "points": {"middle": 0, "tip": 1, "d": "difference"}})
+    data["damping"] = {"alpha": 0.1, "beta": 0.0}
+    mechanics = mechanics_of(load_scene(write(tmp_path / "scene.toml", data)))
+    np.testing.assert_array_equal(mechanics.matrices.row("d"), [1.0, -1.0])
+    assert mechanics.damping == RayleighDamping(0.1, 0.0)
+
+
+def test_a_variant_takes_what_it_does_not_say_from_its_base(tmp_path):
+    variant = {"title": "longer", "base": "paper-rig", "outputs": {"t_end": 2.0, "points": ["node3"]}}
+    scene, base = load_scene(write(tmp_path / "longer.toml", variant)), load_scene("paper-rig")
+    assert scene.file.outputs.t_end == 2.0
+    assert scene.file.models == base.file.models
+
+
+def test_end_time_and_modes_are_replaced_and_equal_models_run_once():
+    scene = load_scene("paper-rig", t_end=0.25, modes=12)
+    assert scene.file.outputs.t_end == 0.25
+    assert [name for name in scene.models if name.startswith("compliant")] == ["compliant-r12"]
+    assert "user-object-r12" in scene.models
+    assert "compliant-r12" in load_scene("paper-rig", modes=4).models  # has its own number of modes
+
+
+BROKEN = {
+    "unknown field": (["outputs", "steps"], 3, "outputs.steps: got 3, need no field of this name"),
+    "missing table": (["start"], None, "start: got nothing, need a value"),
+    "missing field": (["contacts", 0, "gap"], None, "contacts[0].gap: got nothing, need a value"),
+    "text for a number": (["contacts", 0, "gap"], "1", "contacts[0].gap: got '1', need a valid number"),
+    "truth for a number": (["contacts", 0, "gap"], True, "contacts[0].gap: got True, need a valid number"),
+    "negative stiffness": (
+        ["contacts", 0, "stiffness"], -1.0, "contacts[0].stiffness: got -1.0, need greater than 0"
+    ),
+    "stiffness nan": (["contacts", 0, "stiffness"], math.nan, "contacts[0].stiffness: got nan, need greater than 0"),
+    "infinite gap": (["contacts", 0, "gap"], math.inf, "contacts[0].gap: got inf, need a finite number"),
+    "negative time": (["outputs", "t_end"], -1.0, "outputs.t_end: got -1.0, need greater than 0"),
+    "no models": (["models"], [], "models: got [], need"),
+    "no modes": (["models", 1, "modes"], 0, "models[1].modes: got 0, need"),
+    "modes by half": (["models", 1, "modes"], 2.5, "models[1].modes: got 2.5, need a valid integer or 'all'"),
+    "no start": (["start", "displacement"], 0.0, "start.displacement: got 0.0, need a value that is not zero"),
+    "another kind": (["models", 0, "kind"], "exact", "models[0]: got"),
+    "structure of no form": (["structure"], {}, "structure: got {}, need a table with the field rig or beam"),
+    "unknown rig": (
+        ["structure"], {"rig": "mine", "support_stiffness": 1e6}, "structure.rig: got 'mine', need 'measured-free'"
+    ),
+    "section without end": (
+        ["structure", "beam", "sections", 0, "end"], None, "structure.beam.sections[0].end: got nothing"
+    ),
+    "section backwards": (["structure", "beam", "sections", 0, "end"], -1.0, "structure.beam: section: got start"),
+    "point off the beam": (["structure", "beam", "points", "tip"], 0.6, "structure.beam: points['tip']: got x"),
+    "unknown load point": (["start", "load_at"], "tap", "start.load_at: got 'tap', need one of the points: middle"),
+    "unknown output": (["outputs", "points"], ["tap"], "outputs.points[0]: got 'tap', need one of the points"),
+    "unknown direction": (["contacts", 0, "direction"], "tap", "contacts[0].direction: got 'tap', need one of"),
+    "unknown coefficient": (["contacts", 0, "direction"], {"tap": 1.0}, "contacts[0].direction: got 'tap', need"),
+    "unknown reference": (["comparison", "reference"], "full", "comparison.reference: got 'full', need one of"),
+    "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need a name of its own"),
+    "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),
+    "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: matrices: got"),
+    "unknown base": (["base"], "paper", "base: got 'paper', need one of: paper-rig"),
+    "base of the wrong kind": (["base"], [1], "base: got [1], need one of: paper-rig"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_wrong_field_is_named_with_what_was_given_and_needed(tmp_path, case):
+    path, value, expected = BROKEN[case]
+    assert complaint(tmp_path, changed(path, value)).startswith(expected)
+
+
+def test_two_contacts_of_one_name_are_refused(tmp_path):
+    data = changed(["contacts"], BEAM["contacts"] * 2)
+    assert complaint(tmp_path, data).startswith("contacts: got 'stop', need a name of its own")
+
+
+def test_a_full_model_needs_a_beam_and_a_finite_stiffness(tmp_path):
+    full = {"kind": "full", "name": "full", "elements": 4, "step": 1e-4}
+    data = changed(["models"], [*BEAM["models"], full])
+    assert "need a finite one" in complaint(tmp_path, changed(["contacts", 0, "stiffness"], math.inf, data))
+    np.savez(tmp_path / "one.npz", mass=np.eye(1), stiffness=np.eye(1))
+    data["structure"] = {"matrices": "one.npz", "points": {"middle": 0, "tip": 0}}
+    assert "matrices have no full model" in complaint(tmp_path, data)
+
+
+@pytest.mark.parametrize("arrays", [{"mass": np.eye(2)}, {"mass": np.eye(2), "stiffness": np.eye(3)}])
+def test_wrong_matrices_are_one_line(tmp_path, arrays):
+    np.savez(tmp_path / "two.npz", **arrays)
+    assert "stiffness" in complaint(tmp_path, changed(["structure"], {"matrices": "two.npz", "points": {"tip": 0}}))
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 broken"])
+def test_a_broken_matrix_file_is_one_line(tmp_path, content):
+    (tmp_path / "two.npz").write_bytes(content)
+    data = changed(["structure"], {"matrices": "two.npz", "points": {"tip": 0}})
+    assert complaint(tmp_path, data).startswith("structure: matrices: got")
+
+
+@pytest.mark.parametrize("source", ["", "no-such-scene", "no/such.toml", "paper-rig.toml", "../paper-rig", "\0"])
+def test_an_unknown_scene_is_answered_with_the_known_ones(source):
+    with pytest.raises(MultiPhiValueError, match="need a TOML file or one of: paper-rig"):
+        load_scene(source)
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.one_of(st.binary(max_size=200), st.text(max_size=200).map(str.encode)))
+def test_any_bytes_are_refused_in_one_line(tmp_path, content):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(content)
+    with pytest.raises(MultiPhiValueError) as caught:
+        load_scene(str(file))
+    assert "\n" not in str(caught.value)
+
+
+def places(value, path=()):
+    """Paths of all entries of nested tables and arrays."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield [*path, key]
+        yield from places(item, (*path, key))
+
+
+JUNK = st.recursive(
+    st.booleans() | st.integers(-(2**60), 2**60) | st.floats() | st.text("ab[]\"\n\\{}.é", max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text("abc", min_size=1), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(path=st.sampled_from(list(places(BEAM))), value=st.none() | JUNK)
+def test_any_value_anywhere_is_taken_or_refused_in_one_line(tmp_path, path, value):
+    file = write(tmp_path / "scene.toml", changed(path, value))
+    try:
+        mechanics_of(load_scene(file))
+    except MultiPhiValueError as error:
+        assert str(error).startswith(file)
+        assert "\n" not in str(error)
