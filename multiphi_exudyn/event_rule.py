@@ -93,17 +93,17 @@ class EventRule:
         constant = there.constant + float(there.position @ move.offset)
         return Row(there.position @ move.matrix, there.rate @ move.matrix, constant)
 
-    def watch(self, state: State) -> tuple[list[tuple[int, bool]], SignalTable]:
+    def watch(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
-        key = (state.closed, state.phases)
+        key = (level.level.indices, phases)
         if key not in self._tables:
             found = [
                 (contact, *wait)
-                for contact, phase in enumerate(state.phases)
-                for wait in self._waiting_for(state.level, contact, phase)
+                for contact, phase in enumerate(phases)
+                for wait in self._waiting_for(level, contact, phase)
             ]
             rows, rates = [item[2] for item in found], [item[3] for item in found]
-            table = SignalTable(state.level.level.response, rows, rates)
+            table = SignalTable(level.level.response, rows, rates)
             self._tables[key] = [(contact, asks) for contact, asks, _, _ in found], table
         return self._tables[key]
 
@@ -158,20 +158,20 @@ class EventRule:
                 state, lost, made = self._answer(state, asking)
                 loss, changes = loss + lost, changes + made
             heard = {change.contact for change in changes} | asking
-            state, asking = self._with_phases(state, heard)
+            state = self._with_phases(state)
+            asking = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
             if not asking:
                 return state, loss, changes
         names = ", ".join(self.model.contacts[i].name for i in sorted(asking))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
 
-    def _with_phases(self, state: State, heard: set[int]) -> tuple[State, set[int]]:
-        """Phases as the state stands, and the contacts that ask to change and have not been heard."""
-        standing = [self._standing(state, contact) for contact in range(len(self._rigid))]
-        asking = {i for i, phase in enumerate(standing) if phase is Phase.REFUSED} - heard
-        return State(state.level, state.displacement, state.velocity, tuple(standing)), asking
+    def _with_phases(self, state: State) -> State:
+        """The state with the phase in which every contact stands."""
+        phases = tuple(self._standing(state, contact) for contact in range(len(self._rigid)))
+        return State(state.level, state.displacement, state.velocity, phases)
 
     def _standing(self, state: State, contact: int) -> Phase:
-        """ARMED where s is or becomes positive, RECOVERING where it is negative and rises, else REFUSED."""
+        """ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
         own = self.function(state.level, contact)
         value = own.sign(state.displacement, state.velocity)
         if value > 0:
@@ -182,7 +182,8 @@ class EventRule:
             value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))
         if value >= 0:
             return Phase.ARMED
-        return Phase.RECOVERING if rate > 0 else Phase.REFUSED
+        pulls = self._rigid[contact] and contact in state.closed
+        return Phase.RECOVERING if rate > 0 and not pulls else Phase.REFUSED
 
     def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         closed = set(state.closed)
@@ -219,7 +220,7 @@ class EventRule:
         after, dropped = struck, loss + plastic
         while closed:
             after = self._at_rest_on(state, struck, compliant | closed)
-            pulling = {i for i in closed if self.function(after.level, i).sign(after.displacement, after.velocity) < 0}
+            pulling = {i for i in closed if self._pulls(state, struck, after.level, i)}
             if not pulling:
                 dropped = self._loss(state, after, released, struck)
                 break
@@ -228,6 +229,16 @@ class EventRule:
         self.transitions += 1
         pushed = dict(zip(touching, impulses, strict=True))
         return after, dropped, self._changes(state, striking, after, compliant, pushed)
+
+    def _pulls(self, state: State, struck: State, level: LoadedLevel, contact: int) -> bool:
+        """Whether the reaction a contact would get in a level is negative, beyond round-off of the way there.
+
+        The same function as ``entered_function``: a refused contact asks where that one says it may.
+        """
+        own, move = self.function(level, contact), self.transition(state.level, level)
+        rate = own.rate @ self.transition(struck.level, level).matrix
+        seen = Row(own.position @ move.matrix, rate, own.constant + float(own.position @ move.offset))
+        return seen.sign(state.displacement, struck.velocity) < 0
 
     def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
         """Displacement straight from the level before the impact, velocity from the one it was computed in."""

@@ -61,21 +61,22 @@ class DescentFinder:
         self._growth = np.maximum(basis.rates.real, 0.0)
         self._eternal = not np.any(basis.powers) and not np.any(self._growth)
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None, None]
+        self._ones = np.ones(len(basis.rates))
         self._tables: dict[float, np.ndarray] = {}
 
-    def first(self, signals: Signals, horizon: float) -> float | None:
-        """Time of the first descent of any of the signals in (0, horizon], None if there is none."""
+    def first(self, signals: Signals, horizon: float, start: float = 0.0) -> float | None:
+        """Time of the first descent of any of the signals in (start, horizon], None if there is none."""
         if len(signals.constants) == 0:
             return None
         derivatives = self._derivatives(signals.coefficients)
         magnitudes = np.abs(derivatives)
-        constants = signals.constants.tolist()
-        start = 0.0
+        constants: list[float] = signals.constants.tolist()
         while start < horizon:
-            step, bounds = self._step(magnitudes, constants, start, horizon)
-            if step is None:
+            bounds: list[list[float]] = (magnitudes @ self._envelope(start, horizon)).T.tolist()
+            if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
-            found = self._search_block(derivatives, signals.constants, bounds, start, step, horizon)
+            step = self._step(constants, bounds, horizon - start)
+            found = self._search_block(derivatives, constants, bounds, start, step, horizon)
             if found is not None:
                 return found
             start += INTERVALS * step
@@ -115,29 +116,19 @@ class DescentFinder:
             stack.append(self.basis.derivative(stack[-1]))
         return np.array(stack)
 
-    def _step(
-        self, magnitudes: np.ndarray, constants: list[float], start: float, horizon: float
-    ) -> tuple[float | None, np.ndarray]:
-        """Sample distance of the next block, None if no signal can ever reach zero; bounds (7, s) from there on.
-
-        The distance is a power of two, at which the remainder is small beside the signals.
-        """
-        if self._eternal and start == 0.0:
-            bounds = magnitudes.sum(axis=2)
-        else:
-            bounds = magnitudes @ self._envelope(start, horizon)
-        sizes, curvatures = bounds[0].tolist(), bounds[4].tolist()
-        if self._eternal and all(c > size for c, size in zip(constants, sizes, strict=True)):
-            return None, bounds
-        step = (horizon - start) / INTERVALS
-        for c, size, curvature in zip(constants, sizes, curvatures, strict=True):
-            wanted = RESOLUTION * (abs(c) + size) / HERMITE
-            if wanted < curvature * step**4:
-                step = math.sqrt(math.sqrt(wanted / curvature))
-        return 2.0 ** math.floor(math.log2(step / self.refine)), bounds
+    def _step(self, constants: list[float], bounds: list[list[float]], remaining: float) -> float:
+        """Sample distance of the next block: a power of two, at which the remainder is small beside the signals."""
+        step = remaining / INTERVALS
+        for constant, bound in zip(constants, bounds, strict=True):
+            wanted = RESOLUTION * (abs(constant) + bound[0]) / HERMITE
+            if wanted < bound[4] * step**4:
+                step = math.sqrt(math.sqrt(wanted / bound[4]))
+        return math.ldexp(0.5, math.frexp(step / self.refine)[1])
 
     def _envelope(self, start: float, horizon: float) -> np.ndarray:
         """Upper bounds of |phi| on [start, horizon], (p,)."""
+        if self._eternal:
+            return self._ones if start == 0.0 else np.exp(self._decay * start)
         envelope = np.exp(self._decay * start + self._growth * horizon)
         return envelope if self.basis.pure else envelope * horizon**self.basis.powers
 
@@ -153,50 +144,67 @@ class DescentFinder:
     def _search_block(
         self,
         derivatives: np.ndarray,
-        constants: np.ndarray,
-        bounds: np.ndarray,
+        constants: list[float],
+        bounds: list[list[float]],
         start: float,
         step: float,
         horizon: float,
     ) -> float | None:
+        """First descent in a block of intervals; all signals are sampled in one product."""
         local = derivatives[:SAMPLED] if start == 0 else self.basis.shifted(derivatives[:SAMPLED], start)
-        samples = (_parts(local).reshape(-1, 2 * local.shape[2]) @ self._table(step)).reshape(*local.shape[:2], -1)
+        orders, count, p = local.shape
+        samples = (_parts(local).reshape(orders * count, 2 * p) @ self._table(step)).reshape(orders, count, -1)
         self.evaluations += INTERVALS + 1
-        samples[0] += constants[:, None]
-        values, inner = samples[0], samples[1] * (step / 3)
-        left, right = values[:, :-1], values[:, 1:]
-        lowest = np.minimum(np.minimum(left, right), np.minimum(left + inner[:, :-1], right - inner[:, 1:]))
-        doubtful = lowest <= (HERMITE * step**4) * bounds[4][:, None]
-        signals, intervals = doubtful.nonzero()
         first: float | None = None
-        search: _Search | None = None
-        for s, interval in zip(signals.tolist(), intervals.tolist(), strict=True):
-            begin = start + interval * step
-            if begin >= horizon or (first is not None and begin >= first):
-                continue  # behind the end, or behind a root already found
-            if search is None or search.signal != s:
-                search = _Search(self, s, derivatives[:, s], float(constants[s]), bounds[:, s])
-            ends = samples[:, s, interval : interval + 2].T.tolist()
-            found = search.descent(begin, begin + step, *ends)
-            if found is not None and found <= horizon and (first is None or found < first):
-                first = found
+        for s in range(count):
+            found = self._search_signal(
+                derivatives[:, s], samples[:, s], constants[s], bounds[s], start, step, horizon if first is None else first
+            )
+            first = found if found is not None else first
         return first
+
+    def _search_signal(
+        self,
+        derivatives: np.ndarray,
+        samples: np.ndarray,
+        constant: float,
+        bounds: list[float],
+        start: float,
+        step: float,
+        horizon: float,
+    ) -> float | None:
+        """First descent of one signal in a block, up to ``horizon``."""
+        samples[0] += constant
+        inner = samples[1] * (step / 3)
+        values = samples[0]
+        lowest = np.minimum(values[:-1], values[1:])
+        np.minimum(lowest, values[:-1] + inner[:-1], out=lowest)
+        np.minimum(lowest, values[1:] - inner[1:], out=lowest)
+        doubtful = (lowest <= HERMITE * step**4 * bounds[4]).nonzero()[0].tolist()
+        if not doubtful:
+            return None
+        search = _Search(self, derivatives, constant, bounds)
+        for interval in doubtful:
+            left = start + interval * step
+            if left >= horizon:
+                return None
+            at_left, at_right = samples[:, interval : interval + 2].T.tolist()
+            found = search.descent(left, left + step, at_left, at_right)
+            if found is not None:
+                return found if found <= horizon else None
+        return None
 
 
 class _Search:
     """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about."""
 
-    def __init__(
-        self, finder: DescentFinder, signal: int, derivatives: np.ndarray, constant: float, bounds: np.ndarray
-    ) -> None:
-        self.signal = signal
+    def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
         self._finder = finder
         self._basis = finder.basis
         self._rows = _parts(derivatives[:SAMPLED])
         self._constant = constant
-        self._bounds: list[float] = bounds.tolist()
-        self._noise = [ZERO * bound for bound in self._bounds]
-        self._noise[0] += ZERO * abs(constant)
+        self._bounds = bounds
+        self._noise = ZERO * (bounds[0] + abs(constant)), ZERO * bounds[1], ZERO * bounds[2]
 
     def descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
         """First descent in [left, right], by division until every interval is decided.

@@ -70,6 +70,11 @@ class MultiPhiModel:
         """Number of levels built so far."""
         return len(self._levels)
 
+    @property
+    def evaluations(self) -> int:
+        """Samples of event signals taken so far, in all levels."""
+        return sum(level.finder.evaluations for level in self._levels.values())
+
     def index(self, name: str) -> int:
         """Position of a contact."""
         for i, contact in enumerate(self.contacts):

@@ -60,10 +60,9 @@ class Motion:
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     message: str = ""
-    evaluations: int = 0
 
     def __post_init__(self) -> None:
-        self._before = self.model.levels_built
+        self._evaluated = self.model.evaluations
         try:
             self.state, self.start_loss, changes = self.rule.start(
                 self.start.displacement, self.start.velocity, self.start.penetrating, self.start.touching
@@ -98,40 +97,39 @@ class Motion:
                 transitions=self.rule.transitions,
                 events=len(self.events),
                 segments=len(self.segments),
-                function_evaluations=self.evaluations,
+                function_evaluations=self.model.evaluations - self._evaluated,
             ),
         )
 
     def _one_segment(self, end: float) -> None:
-        state = self.state
+        """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
+        state, horizon = self.state, end - self.time
         own = state.level.level
         coefficients = state.coefficients()
         if not math.isfinite(abs(complex(coefficients.sum()))):
             raise NumericalFailure("the modal state is not finite")
-        waiting, table = self.rule.watch(state)
-        signals = table.signals(coefficients)
-        before = own.finder.evaluations
-        duration = own.finder.first(signals, end - self.time)
-        self.evaluations += own.finder.evaluations - before
-        length = end - self.time if duration is None else duration
-        self.segments.append(Segment(self.time, self.time + length, state.level, coefficients, state.phases))
-        self.time = end if duration is None else self.time + length
-        reached = State(state.level, *own.response.state(coefficients, length), state.phases)
-        self.state = (
-            reached if duration is None else self._respond(reached, waiting, own.finder.fallen(signals, length))
-        )
-
-    def _respond(self, state: State, waiting: list[tuple[int, bool]], fallen: list[bool]) -> State:
-        """The state after the signals that have reached zero have been answered."""
-        asking = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and asks}
-        armed = {contact for (contact, asks), down in zip(waiting, fallen, strict=True) if down and not asks}
-        if not asking:
-            phases = (Phase.ARMED if i in armed else phase for i, phase in enumerate(state.phases))
-            return State(state.level, state.displacement, state.velocity, tuple(phases))
-        state, loss, changes = self.rule.decide(state, asking)
-        self._record(changes, loss)
-        self._check_chatter(state)
-        return state
+        reached, asking, armed_at = 0.0, set[int](), 0.0
+        phases = state.phases
+        while not asking:
+            waiting, table = self.rule.watch(state.level, phases)
+            signals = table.signals(coefficients)
+            found = own.finder.first(signals, horizon, reached)
+            if found is None:
+                reached = horizon
+                break
+            reached = found
+            fallen = [wait for wait, down in zip(waiting, own.finder.fallen(signals, found), strict=True) if down]
+            asking = {contact for contact, asks in fallen if asks}
+            if not asking:
+                armed, armed_at = {contact for contact, _ in fallen}, found
+                phases = tuple(Phase.ARMED if i in armed else phase for i, phase in enumerate(phases))
+        started, self.time = self.time, end if reached == horizon else self.time + reached
+        self.segments.append(Segment(started, self.time, state.level, coefficients, state.phases, armed_at))
+        self.state = State(state.level, *own.response.state(coefficients, reached), phases)
+        if asking:
+            self.state, loss, changes = self.rule.decide(self.state, asking)
+            self._record(changes, loss)
+            self._check_chatter()
 
     def _record(self, changes: list[Change], loss: Loss) -> None:
         for change in changes:
@@ -139,10 +137,10 @@ class Motion:
             self.events.append(Event(self.time, name, change.kind, loss, change.impulse))
             loss = Loss()
 
-    def _check_chatter(self, state: State) -> None:
+    def _check_chatter(self) -> None:
         if len(self.segments) <= CHATTER_WINDOW:
             return
-        highest = state.level.level.highest_frequency
+        highest = self.state.level.level.highest_frequency
         elapsed = self.time - self.segments[-CHATTER_WINDOW].start
         if highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
             raise NumericalFailure(

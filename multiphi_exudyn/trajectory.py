@@ -35,13 +35,17 @@ class Start:
 
 @dataclass(frozen=True)
 class Segment:
-    """Motion in one level from ``start`` to ``end`` [s]: coefficients c (p,) of the level's exponentials."""
+    """Motion in one level from ``start`` to ``end`` [s]: coefficients c (p,) of the level's exponentials.
+
+    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed.
+    """
 
     start: float
     end: float
     level: LoadedLevel
     coefficients: np.ndarray
     phases: tuple[Phase, ...]
+    armed_at: float
 
     def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """eta or its first or second derivative, (r, k) at times (k,)."""
@@ -198,7 +202,7 @@ class Trajectory:
         depth = 0.0
         for segment in self.segments:
             if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
-                times = np.linspace(segment.start, segment.end, samples)
+                times = np.linspace(segment.start, segment.start + segment.armed_at or segment.end, samples)
                 gaps = segment.level.level.gap_rows[i] @ segment.modal(times) + segment.level.gap_constants[i]
                 depth = min(depth, float(np.min(gaps)))
         return depth
