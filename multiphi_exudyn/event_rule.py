@@ -50,7 +50,7 @@ class EventRule:
         self.model = model
         self.load = load
         self.transitions = 0
-        self._rigid = np.isinf(model.base.stiffnesses)
+        self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
         self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
@@ -152,17 +152,19 @@ class EventRule:
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""
-        loss, changes = Loss(), list[Change]()
+        state, loss, changes = self._answer(state, asking) if asking else (self._with_phases(state), Loss(), [])
+        heard = set(asking)
         for _ in range(ROUNDS):
-            if asking:
-                state, lost, made = self._answer(state, asking)
-                loss, changes = loss + lost, changes + made
-            heard = {change.contact for change in changes} | asking
-            state = self._with_phases(state)
-            asking = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
-            if not asking:
+            if Phase.REFUSED not in state.phases:
                 return state, loss, changes
-        names = ", ".join(self.model.contacts[i].name for i in sorted(asking))
+            unheard = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
+            unheard -= {change.contact for change in changes}
+            if not unheard:
+                return state, loss, changes
+            heard |= unheard
+            state, lost, made = self._answer(state, unheard)
+            loss, changes = loss + lost, changes + made
+        names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
 
     def _with_phases(self, state: State) -> State:
@@ -186,29 +188,32 @@ class EventRule:
         return Phase.RECOVERING if rate > 0 and not pulls else Phase.REFUSED
 
     def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
+        """State with its phases after these contacts have been heard."""
         closed = set(state.closed)
-        rigid = {i for i in asking if self._rigid[i]}
-        if rigid - closed:
-            return self._impact(state, rigid - closed, {i for i in closed ^ (asking - rigid) if not self._rigid[i]})
-        return self._switch(state, asking)
+        striking = {i for i in asking if self._rigid[i]} - closed
+        if not striking:
+            return self._switch(state, asking)
+        compliant = {i for i in closed ^ asking if not self._rigid[i]}
+        after, loss, changes = self._impact(state, striking, compliant)
+        return self._with_phases(after), loss, changes
 
     def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Compliant contacts change where the level they enter admits it, rigid ones open."""
         while asking:
             entered, loss = self._moved(state, self.level(set(state.closed) ^ asking))
-            denied = {i for i in asking if not self._rigid[i] and self._standing(entered, i) is Phase.REFUSED}
+            entered = self._with_phases(entered)
+            denied = {i for i in asking if entered.phases[i] is Phase.REFUSED and not self._rigid[i]}
             if not denied:
                 break
             asking = asking - denied
         if not asking:
-            return state, Loss(), []
+            return self._with_phases(state), Loss(), []
         self.transitions += 1
         opened = sorted(i for i in asking if self._rigid[i])
         if opened:
             entered, _, lost = self._collided(entered, opened)
-            loss = loss + lost
-        kinds = ("open" if i in state.closed else "close" for i in sorted(asking))
-        return entered, loss, [Change(i, kind) for i, kind in zip(sorted(asking), kinds, strict=True)]
+            entered, loss = self._with_phases(entered), loss + lost
+        return entered, loss, [Change(i, "open" if i in state.closed else "close") for i in sorted(asking)]
 
     def _impact(self, state: State, striking: set[int], compliant: set[int]) -> tuple[State, Loss, list[Change]]:
         """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level."""

@@ -19,18 +19,19 @@ for CAGD, ch. 5.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.modal_response import Exponentials
 
-__all__ = ["DescentFinder", "Signals", "ZERO"]
+__all__ = ["Descent", "DescentFinder", "Signals", "ZERO"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
 SAMPLED = 4  # of them, known at every sample
-INTERVALS = 32  # in a block
+INTERVALS = 64  # in a block
 TABLES = 64  # sample tables kept for a basis
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
@@ -47,6 +48,14 @@ class Signals:
     constants: np.ndarray
 
 
+@dataclass(frozen=True)
+class Descent:
+    """time of a first descent, and the position of the signal that falls."""
+
+    time: float
+    signal: int
+
+
 class DescentFinder:
     """Finds first descents of signals on one basis of exponentials; keeps that basis' sample tables.
 
@@ -59,46 +68,43 @@ class DescentFinder:
         self.evaluations = 0
         self._decay = np.minimum(basis.rates.real, 0.0)
         self._growth = np.maximum(basis.rates.real, 0.0)
-        self._eternal = not np.any(basis.powers) and not np.any(self._growth)
-        self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None, None]
-        self._ones = np.ones(len(basis.rates))
-        self._tables: dict[float, np.ndarray] = {}
+        self._eternal = basis.pure and not np.any(self._growth)
+        self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
+        self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
+        self._tables: dict[float, _Table] = {}
 
-    def first(self, signals: Signals, horizon: float, start: float = 0.0) -> float | None:
-        """Time of the first descent of any of the signals in (start, horizon], None if there is none."""
+    def first(self, signals: Signals, horizon: float, start: float = 0.0) -> Descent | None:
+        """First descent of any of the signals in (start, horizon], None if there is none."""
         if len(signals.constants) == 0:
             return None
-        derivatives = self._derivatives(signals.coefficients)
-        magnitudes = np.abs(derivatives)
         constants: list[float] = signals.constants.tolist()
         while start < horizon:
-            bounds: list[list[float]] = (magnitudes @ self._envelope(start, horizon)).T.tolist()
+            bounds = self._bounds(signals.coefficients, start, horizon)
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
             step = self._step(constants, bounds, horizon - start)
-            found = self._search_block(derivatives, constants, bounds, start, step, horizon)
+            found = self._search_block(signals.coefficients, constants, bounds, start, step, horizon)
             if found is not None:
                 return found
             start += INTERVALS * step
         return None
 
-    def fallen(self, signals: Signals, t: float) -> list[bool]:
-        """Which signals (s,) have reached zero at t, the time of a first descent: simultaneous events are one."""
-        coefficients = signals.coefficients
-        if len(coefficients) == 1:
-            return [True]
-        values = self.basis.at(t)
+    def simultaneous(self, signals: Signals, found: Descent) -> list[int]:
+        """The signals that reach zero at a first descent, its own among them."""
+        if len(signals.constants) == 1:
+            return [found.signal]
+        coefficients, values = signals.coefficients, self.basis.at(found.time)
         reached = (coefficients @ values).real + signals.constants
         slopes = (self.basis.derivative(coefficients) @ values).real
         noise = SIMULTANEOUS * (np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants))
         down = (reached <= noise) & (slopes <= 0)
-        if not np.any(down):
-            down[np.argmin(reached - noise)] = True
-        return [bool(fell) for fell in down]
+        down[found.signal] = True
+        result: list[int] = down.nonzero()[0].tolist()
+        return result
 
     def signs(self, signals: Signals) -> list[int]:
         """For each signal: +1 or -1 as it is, or becomes at once, positive or negative at t = 0; 0 if it vanishes."""
-        derivatives = self._derivatives(signals.coefficients)
+        derivatives = self._derivatives(signals.coefficients, DERIVATIVES)
         values = (derivatives @ self.basis.at(0.0)).real
         values[0] += signals.constants
         noise = ZERO * np.abs(derivatives).sum(axis=2)
@@ -107,14 +113,26 @@ class DescentFinder:
         first = np.argmax(decided, axis=0)
         return [int(np.sign(values[order, s])) if decided[order, s] else 0 for s, order in enumerate(first)]
 
-    def _derivatives(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients of g, g', ..., g^(6): (7, s, p)."""
-        if self.basis.pure:
-            return np.asarray(coefficients * self._orders)
+    def _derivatives(self, coefficients: np.ndarray, count: int) -> np.ndarray:
+        """Coefficients of g, g', ...: (count, ..., p)."""
+        if self.basis.pure and coefficients.ndim == 1:
+            return np.asarray(coefficients * self._orders[:count])
         stack = [coefficients]
-        for _ in range(DERIVATIVES - 1):
+        for _ in range(count - 1):
             stack.append(self.basis.derivative(stack[-1]))
         return np.array(stack)
+
+    def _bounds(self, coefficients: np.ndarray, start: float, horizon: float) -> list[list[float]]:
+        """For every signal, upper bounds of |g|, |g'|, ..., |g^(6)| on [start, horizon], constants left out."""
+        if self.basis.pure:
+            weights = self._magnitudes
+            if start > 0.0 or not self._eternal:
+                weights = np.exp(self._decay * start + self._growth * horizon)[:, None] * weights
+            found: list[list[float]] = (np.abs(coefficients) @ weights).tolist()
+            return found
+        envelope = np.exp(self._decay * start + self._growth * horizon) * horizon**self.basis.powers
+        bounds: list[list[float]] = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
+        return bounds
 
     def _step(self, constants: list[float], bounds: list[list[float]], remaining: float) -> float:
         """Sample distance of the next block: a power of two, at which the remainder is small beside the signals."""
@@ -125,88 +143,103 @@ class DescentFinder:
                 step = math.sqrt(math.sqrt(wanted / bound[4]))
         return math.ldexp(0.5, math.frexp(step / self.refine)[1])
 
-    def _envelope(self, start: float, horizon: float) -> np.ndarray:
-        """Upper bounds of |phi| on [start, horizon], (p,)."""
-        if self._eternal:
-            return self._ones if start == 0.0 else np.exp(self._decay * start)
-        envelope = np.exp(self._decay * start + self._growth * horizon)
-        return envelope if self.basis.pure else envelope * horizon**self.basis.powers
-
-    def _table(self, step: float) -> np.ndarray:
-        """Parts of phi at the block's samples, (2p, INTERVALS + 1), from its start."""
+    def _table(self, step: float) -> _Table:
         if step not in self._tables:
             if len(self._tables) > TABLES:
                 self._tables.clear()
-            samples = self.basis.at(step * np.arange(INTERVALS + 1))
-            self._tables[step] = np.ascontiguousarray(samples.view(float).T)
+            self._tables[step] = _Table.of(self.basis, step)
         return self._tables[step]
 
     def _search_block(
         self,
-        derivatives: np.ndarray,
+        coefficients: np.ndarray,
         constants: list[float],
         bounds: list[list[float]],
         start: float,
         step: float,
         horizon: float,
-    ) -> float | None:
+    ) -> Descent | None:
         """First descent in a block of intervals; all signals are sampled in one product."""
-        local = derivatives[:SAMPLED] if start == 0 else self.basis.shifted(derivatives[:SAMPLED], start)
-        orders, count, p = local.shape
-        samples = (_parts(local).reshape(orders * count, 2 * p) @ self._table(step)).reshape(orders, count, -1)
+        local = coefficients if start == 0 else self.basis.shifted(coefficients, start)
+        table = self._table(step)
+        controls = _parts(local) @ table.controls
         self.evaluations += INTERVALS + 1
-        first: float | None = None
-        for s in range(count):
-            found = self._search_signal(
-                derivatives[:, s], samples[:, s], constants[s], bounds[s], start, step, horizon if first is None else first
-            )
-            first = found if found is not None else first
+        first: Descent | None = None
+        for s, constant in enumerate(constants):
+            limit = HERMITE * step**4 * bounds[s][4] - constant
+            doubtful = (controls[s] <= limit).nonzero()[0].tolist()
+            if doubtful:
+                search = _Search(self, self._derivatives(local[s], SAMPLED), constant, bounds[s])
+                end = (horizon if first is None else first.time) - start
+                found = search.in_block(_intervals(doubtful), table, step, end)
+                first = first if found is None else Descent(start + found, s)
         return first
 
-    def _search_signal(
-        self,
-        derivatives: np.ndarray,
-        samples: np.ndarray,
-        constant: float,
-        bounds: list[float],
-        start: float,
-        step: float,
-        horizon: float,
-    ) -> float | None:
-        """First descent of one signal in a block, up to ``horizon``."""
-        samples[0] += constant
-        inner = samples[1] * (step / 3)
-        values = samples[0]
-        lowest = np.minimum(values[:-1], values[1:])
-        np.minimum(lowest, values[:-1] + inner[:-1], out=lowest)
-        np.minimum(lowest, values[1:] - inner[1:], out=lowest)
-        doubtful = (lowest <= HERMITE * step**4 * bounds[4]).nonzero()[0].tolist()
-        if not doubtful:
-            return None
-        search = _Search(self, derivatives, constant, bounds)
-        for interval in doubtful:
-            left = start + interval * step
-            if left >= horizon:
-                return None
-            at_left, at_right = samples[:, interval : interval + 2].T.tolist()
-            found = search.descent(left, left + step, at_left, at_right)
-            if found is not None:
-                return found if found <= horizon else None
-        return None
+
+@dataclass(frozen=True)
+class _Table:
+    """Samples of a basis at 0, h, ..., as real rows for the products with ``_parts``.
+
+    values: (2p, INTERVALS + 1), phi. controls: (2p, 3 INTERVALS + 1), the Bernstein control values of every interval
+    in their order, a sample shared by the two intervals that it bounds.
+    """
+
+    values: np.ndarray
+    controls: np.ndarray
+
+    @classmethod
+    def of(cls, basis: Exponentials, step: float) -> _Table:
+        """The table of one sample distance h [s]."""
+        identity = np.eye(len(basis.rates), dtype=complex)
+        samples = basis.at(step * np.arange(INTERVALS + 1)).T
+        slopes = (basis.derivative(identity) @ samples) * (step / 3)
+        controls = np.empty((len(samples), 3 * INTERVALS + 1), complex)
+        controls[:, ::3] = samples
+        controls[:, 1::3] = samples[:, :-1] + slopes[:, :-1]
+        controls[:, 2::3] = samples[:, 1:] - slopes[:, 1:]
+        return cls(*(np.ascontiguousarray(np.ascontiguousarray(c.T).view(float).T) for c in (samples, controls)))
+
+
+def _intervals(controls: list[int]) -> Iterator[int]:
+    """The intervals, ascending, whose control values are among these."""
+    last = -1
+    for k in controls:
+        interval, position = divmod(k, 3)
+        for candidate in (interval - 1, interval) if position == 0 else (interval,):
+            if last < candidate < INTERVALS:
+                last = candidate
+                yield candidate
 
 
 class _Search:
-    """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about."""
+    """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about.
+
+    derivatives: coefficients (4, p) of g to g'''.
+    """
 
     def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
         self._finder = finder
         self._basis = finder.basis
-        self._rows = _parts(derivatives[:SAMPLED])
+        self._rows = _parts(derivatives)
         self._constant = constant
         self._bounds = bounds
         self._noise = ZERO * (bounds[0] + abs(constant)), ZERO * bounds[1], ZERO * bounds[2]
 
-    def descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
+    def in_block(self, intervals: Iterable[int], table: _Table, step: float, end: float) -> float | None:
+        """First descent in these intervals of a block, up to ``end``, from the block's start."""
+        for interval in intervals:
+            left = interval * step
+            if left >= end:
+                return None
+            ends = (self._rows @ table.values[:, interval : interval + 2]).T.tolist()
+            for values in ends:
+                values[0] += self._constant
+            found = self._descent(left, left + step, *ends)
+            if found is not None:
+                return found if found <= end else None
+        return None
+
+    def _descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
         """First descent in [left, right], by division until every interval is decided.
 
         at_left, at_right: g and its derivatives to the third at the ends.
@@ -244,10 +277,12 @@ class _Search:
             return True, left
         if slope_low > 0:
             return True, None
+        crosses = at_right[0] < -self._noise[0]
+        if slope_high < 0 or width < narrowest:
+            return True, self._root(0, left, right, at_left, at_right) if crosses else None
         curvature_low, curvature_high = self._range(2, at_left, at_right, width)
-        if slope_high < 0 or curvature_high < 0 or width < narrowest:
-            crosses = at_right[0] < -self._noise[0]
-            return True, self._newton(0, left, right, at_left, at_right) if crosses else None
+        if curvature_high < 0:
+            return True, self._root(0, left, right, at_left, at_right) if crosses else None
         if curvature_low > 0:
             return True, self._convex(left, right, at_left, at_right)
         return False, None
@@ -274,28 +309,30 @@ class _Search:
         if at_left[1] >= -self._noise[1]:
             return None
         if at_right[1] > 0:
-            right = self._newton(1, left, right, at_left, at_right)
+            right = self._root(1, left, right, at_left, at_right)
             at_right = self._point(right)
-        return self._newton(0, left, right, at_left, at_right) if at_right[0] < -self._noise[0] else None
+        return self._root(0, left, right, at_left, at_right) if at_right[0] < -self._noise[0] else None
 
-    def _newton(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
-        """Root in [left, right] of g (order 0, falling) or g' (order 1, rising): Newton kept inside its bracket."""
-        rows, constant = self._rows[order : order + 2], self._constant if order == 0 else 0.0
+    def _root(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
+        """Root in [left, right] of g (order 0, falling) or g' (order 1, rising).
+
+        Newton's method with its second-order term, kept inside the bracket, from inverse Hermite interpolation.
+        """
         sign = 1.0 if order == 0 else -1.0
         t = left + (right - left) * _guess(right - left, at_left[order : order + 2], at_right[order : order + 2])
         tolerance = TIME_ROUND_OFF * right
         for _ in range(100):
-            value, slope = (rows @ self._basis.at(t).view(float)).tolist()
-            value += constant
-            self._finder.evaluations += 1
+            value, slope, curvature = self._point(t)[order : order + 3]
             if sign * value >= 0:
                 left = t
             else:
                 right = t
-            following = t - value / slope if slope else left
+            following = left
+            if slope:
+                newton = value / slope
+                following = t - newton - curvature * newton**2 / (2 * slope)
             correction = abs(following - t)
-            # Newton's error after this correction is at most bound/(2 |slope|) correction^2
-            if correction <= tolerance or self._bounds[order + 2] * correction**2 <= 2 * abs(slope) * tolerance:
+            if correction <= tolerance or self._bounds[order + 3] * correction**3 <= abs(slope) * tolerance:
                 return min(max(following, left), right)
             t = following if left < following < right else (left + right) / 2
         return t
@@ -303,7 +340,7 @@ class _Search:
 
 def _parts(coefficients: np.ndarray) -> np.ndarray:
     """Real rows (..., 2p) whose product with the interleaved parts of phi is Re(coefficients phi)."""
-    return np.ascontiguousarray(coefficients.conj()).view(float)
+    return coefficients.conj().view(float)
 
 
 def _guess(width: float, at_left: list[float], at_right: list[float]) -> float:

@@ -117,11 +117,12 @@ class Motion:
             if found is None:
                 reached = horizon
                 break
-            reached = found
-            fallen = [wait for wait, down in zip(waiting, own.finder.fallen(signals, found), strict=True) if down]
+            reached = found.time
+            alone = len(phases) == 1  # one contact's signals exclude each other
+            fallen = [waiting[s] for s in ([found.signal] if alone else own.finder.simultaneous(signals, found))]
             asking = {contact for contact, asks in fallen if asks}
             if not asking:
-                armed, armed_at = {contact for contact, _ in fallen}, found
+                armed, armed_at = {contact for contact, _ in fallen}, reached
                 phases = tuple(Phase.ARMED if i in armed else phase for i, phase in enumerate(phases))
         started, self.time = self.time, end if reached == horizon else self.time + reached
         self.segments.append(Segment(started, self.time, state.level, coefficients, state.phases, armed_at))
