@@ -189,18 +189,17 @@ class EventRule:
 
     def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State with its phases after these contacts have been heard."""
-        closed = set(state.closed)
-        striking = {i for i in asking if self._rigid[i]} - closed
+        striking = {i for i in asking if self._rigid[i] and i not in state.closed}
         if not striking:
             return self._switch(state, asking)
-        compliant = {i for i in closed ^ asking if not self._rigid[i]}
+        compliant = {i for i in asking.symmetric_difference(state.closed) if not self._rigid[i]}
         after, loss, changes = self._impact(state, striking, compliant)
         return self._with_phases(after), loss, changes
 
     def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Compliant contacts change where the level they enter admits it, rigid ones open."""
         while asking:
-            entered, loss = self._moved(state, self.level(set(state.closed) ^ asking))
+            entered, loss = self._moved(state, self.level(asking.symmetric_difference(state.closed)))
             entered = self._with_phases(entered)
             denied = {i for i in asking if entered.phases[i] is Phase.REFUSED and not self._rigid[i]}
             if not denied:

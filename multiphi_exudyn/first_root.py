@@ -24,9 +24,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.modal_response import Exponentials
 
-__all__ = ["Descent", "DescentFinder", "Signals", "ZERO"]
+__all__ = ["ZERO", "Descent", "DescentFinder", "Signals"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
@@ -82,6 +83,10 @@ class DescentFinder:
             bounds = self._bounds(signals.coefficients, start, horizon)
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
+            if not math.isfinite(bounds[0][0]):
+                raise NumericalFailure("the motion is not finite")
+            if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds)) is not None:
+                return near if near.time <= horizon else None
             step = self._step(constants, bounds, horizon - start)
             found = self._search_block(signals.coefficients, constants, bounds, start, step, horizon)
             if found is not None:
@@ -133,6 +138,28 @@ class DescentFinder:
         envelope = np.exp(self._decay * start + self._growth * horizon) * horizon**self.basis.powers
         bounds: list[list[float]] = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
         return bounds
+
+    def _near(self, coefficients: np.ndarray, constants: list[float], bounds: list[list[float]]) -> Descent | None:
+        """A first descent near t = 0 that Taylor's theorem certifies at once, None if it is not that plain.
+
+        2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
+        """
+        if len(constants) == 1 or not self.basis.pure:
+            return None
+        values: list[float] = coefficients.sum(axis=1).real.tolist()
+        slopes: list[float] = (coefficients @ self.basis.rates).real.tolist()
+        for s, (constant, bound) in enumerate(zip(constants, bounds, strict=True)):
+            value, slope = values[s] + constant, slopes[s]
+            if not (value > 0 and slope < 0 and 2 * value * bound[2] < slope**2):
+                continue
+            latest = -2 * value / slope
+            if all(
+                o == s or values[o] + constants[o] > bounds[o][1] * latest or slopes[o] > bounds[o][2] * latest
+                for o in range(len(constants))
+            ):
+                search = _Search(self, self._derivatives(coefficients[s], SAMPLED), constant, bound)
+                return Descent(search.root(latest), s)
+        return None
 
     def _step(self, constants: list[float], bounds: list[list[float]], remaining: float) -> float:
         """Sample distance of the next block: a power of two, at which the remainder is small beside the signals."""
@@ -239,6 +266,10 @@ class _Search:
                 return found if found <= end else None
         return None
 
+    def root(self, latest: float) -> float:
+        """The one root in (0, latest] of a signal that falls all the way."""
+        return self._root(0, 0.0, latest, self._point(0.0), self._point(latest))
+
     def _descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
         """First descent in [left, right], by division until every interval is decided.
 
@@ -261,7 +292,9 @@ class _Search:
     def _point(self, t: float) -> list[float]:
         """g, g', g'', g''' at t."""
         self._finder.evaluations += 1
-        values: list[float] = (self._rows @ self._basis.at(t).view(float)).tolist()
+        basis = self._basis
+        samples = np.exp(basis.rates * t) if basis.pure else basis.at(t)
+        values: list[float] = self._rows.dot(samples.view(float)).tolist()
         values[0] += self._constant
         return values
 

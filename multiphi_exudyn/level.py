@@ -91,8 +91,8 @@ class Asymptotic:
     """What a level's modes cannot represent: its state of rest under gaps and static loads.
 
     configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
-    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of y_inf [J],
-    and the same less f.y_inf.
+    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
+    y_inf [J], and the same less f.y_inf.
     """
 
     configuration: np.ndarray

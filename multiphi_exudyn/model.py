@@ -26,6 +26,7 @@ class MultiPhiModel:
     modes: r of every level, or "all". Levels are truncated from one larger basis, so
     ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
+    rules: what simulations keep for later ones, by static load.
     """
 
     structure: LinearStructure
@@ -33,6 +34,7 @@ class MultiPhiModel:
     modes: int | str = 6
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    rules: dict[bytes, Any] = field(init=False, default_factory=dict, repr=False, compare=False)
     _levels: dict[tuple[int, ...], Level] = field(init=False, default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:

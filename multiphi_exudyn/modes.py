@@ -129,7 +129,7 @@ def _round_off_energy(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
 
 
 def _largest_ratio(mass: Any, stiffness: Any) -> float:
-    return float(np.max(stiffness.diagonal() / mass.diagonal()))
+    return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift serves where nothing is stiff
 
 
 def _orthonormal(mass: Any, basis: np.ndarray) -> np.ndarray:

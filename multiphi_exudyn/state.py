@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from enum import Enum
 
@@ -39,7 +40,7 @@ class State:
     @property
     def kinetic(self) -> float:
         """Kinetic energy [J]."""
-        return 0.5 * float(self.velocity @ self.velocity)
+        return 0.5 * float(self.velocity.dot(self.velocity))
 
     @property
     def potential(self) -> float:
@@ -120,11 +121,17 @@ class Row:
 
     def sign(self, displacement: np.ndarray, velocity: np.ndarray) -> int:
         """Sign of the value, zero where it is round-off of its terms."""
-        return _sign(self.position * displacement + self.rate * velocity, self.constant)
+        terms = self.position * displacement
+        return _sign(terms + self.rate * velocity if self._rated else terms, self.constant)
 
     def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray) -> int:
         """Sign of the time derivative, zero where it is round-off of its terms."""
-        return _sign(self.position * velocity + self.rate * acceleration, 0.0)
+        terms = self.position * velocity
+        return _sign(terms + self.rate * acceleration if self._rated else terms, 0.0)
+
+    @functools.cached_property
+    def _rated(self) -> bool:
+        return bool(np.any(self.rate))
 
 
 def _sign(terms: np.ndarray, constant: float) -> int:

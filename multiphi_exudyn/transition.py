@@ -60,12 +60,12 @@ class LoadedLevel:
 
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the static load [J]."""
-        drive = float(self.asymptotic.drive @ displacement) if self.driven else 0.0
-        return self._oscillation(displacement) - drive + self.asymptotic.potential
+        potential = self._oscillation(displacement) + self.asymptotic.potential
+        return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
 
     def _oscillation(self, displacement: np.ndarray) -> float:
         stretched = self.level.omega * displacement
-        return 0.5 * float(stretched @ stretched)
+        return 0.5 * float(stretched.dot(stretched))
 
     def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """eta'' (r,) from eta, eta' (38.3)."""
