@@ -1,7 +1,22 @@
-"""Exudyn side: from an Exudyn system to a linear structure with contacts."""
+"""Exudyn side: from an Exudyn system to a linear structure with contacts, and from a reduced model to a body.
+
+On import the Create function is also bound to Exudyn's systems, as ``mbs.CreateMultiPhiBody(...)``.
+"""
 
 from __future__ import annotations
 
+from multiphi_exudyn.exudyn_plugin.binding import bind
+from multiphi_exudyn.exudyn_plugin.body import CreateMultiPhiBody, MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
+from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
 
-__all__ = ["LinearizedStructure", "linear_structure_from"]
+__all__ = [
+    "BodyHistories",
+    "CreateMultiPhiBody",
+    "LinearizedStructure",
+    "MultiPhiBody",
+    "body_histories",
+    "linear_structure_from",
+]
+
+bind(CreateMultiPhiBody)

@@ -1,0 +1,348 @@
+"""Multi-Phi body: the reduced model as an object of an Exudyn system.
+
+    M q'' + D q' + K q = drive + (loads and connectors of the system),   q = eta of the present level
+
+NodeGenericODE2 holds q, ObjectGenericODE2 the matrices of the level, NodeGenericData the level: for every contact
+0 open or 1 closed, then for every contact its phase (event_rule.py: 0 armed, 1 recovering, 2 refused).
+
+After every step a certified test (step_test.py) says whether a contact can have asked to change. If so, the step is
+repeated from its start exactly, by the machinery of ``simulate``, with the force of the step's mean held constant;
+where something happened, Exudyn's coordinates, matrices and level are replaced by what came out. The accelerations
+that are written carry the force which loads and connectors give in the new level. Halving the step divides the
+difference to ``simulate`` by four; matched to the step (stepped_level.py) it is round-off for a body on its own.
+
+A load or connector at coordinate k of the node acts on mode k of whichever level holds.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGenericODE2, VObjectGenericODE2
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
+from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
+from multiphi_exudyn.exudyn_plugin.step_test import Sample, StepTest
+from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.switching import bodies_of, running_solver
+from multiphi_exudyn.loads import ConstantLoad
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.simulate import CHATTER_WINDOW, Motion, simulate
+from multiphi_exudyn.state import Event, Phase, State
+
+__all__ = ["CreateMultiPhiBody", "MultiPhiBody"]
+
+NEGLIGIBLE = 1e-9  # of the elastic forces: what Newton's iterations leave unbalanced is no modal force
+SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
+SHORTEST = 1e-12  # s: end of the run by which a start is checked and put into its level
+PHASES = tuple(Phase)
+
+
+def CreateMultiPhiBody(
+    mbs: Any,
+    model: MultiPhiModel,
+    name: str = "",
+    displacement: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    loads: Sequence[ConstantLoad] = (),
+    matchedStepSize: float | None = None,
+    show: bool = True,
+) -> dict[str, Any]:
+    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
+
+    mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
+    displacement, velocity: x, x' (n,) at the start, None for zero. loads: constant loads on the structure.
+    matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
+    with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
+    stepped_level.py. show: as in other Create functions.
+
+    Returns typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
+    sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
+    and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
+    """
+    bodies = bodies_of(mbs)
+    name = name or next(f"multiPhi{i}" for i in itertools.count() if f"multiPhi{i}" not in bodies)
+    if name in bodies:
+        raise MultiPhiValueError(f"name: got {name!r}, which this system has already, need another one")
+    if not isinstance(model, MultiPhiModel):
+        raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
+    body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), matchedStepSize)
+    body.items.update(_add_items(mbs, body, show))
+    body.items.update(add_sensors(mbs, body))
+    bodies[name] = body
+    bodies.install(mbs)
+    return dict(body.items)
+
+
+class MultiPhiBody:
+    """One body: its items, its present state, and what happened to it.
+
+    name, model; items: typed indices; matched_step: h [s] or None; events: of the last run, in order.
+    """
+
+    def __init__(self, name: str, motion: Motion, matched_step: float | None) -> None:
+        self.name = name
+        self.model = motion.model
+        self.items: dict[str, Any] = {}
+        self.matched_step = matched_step
+        self.time = math.nan
+        self._motion = motion
+        self._rule: EventRule = motion.rule
+        self._size = self._rule.level(()).level.modes
+        self._state = motion.state
+        self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
+        self._tests: dict[tuple[int, ...], StepTest] = {}
+        self._step = math.nan
+        self._in_solver = self._stepped(motion.state.closed)
+
+    @property
+    def events(self) -> list[Event]:
+        """Closings and openings with their exact times."""
+        return self._motion.events
+
+    @property
+    def state(self) -> State:
+        """Level, modal displacement and velocity, phases; the last two after an event or at the start of a run."""
+        return self._state
+
+    def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
+        """The level of closed contacts as the solver has it."""
+        return self._stepped(tuple(closed))
+
+    # ------------------------------------------------------------------ a step
+
+    def after_step(self, mbs: Any, t: float) -> None:
+        """Called by Exudyn when a step is done, and at the start."""
+        h = t - self.time
+        if not abs(h - self._step) <= SAME_STEP * h and not self._is_step(mbs, t):
+            return
+        before, after = self._sample, self._test.at(np.concatenate(self._views))
+        self._sample = after
+        if not (self._armed and self._test.passes(before, after, h)):
+            self._repeat(mbs, t, before.x, after.x)
+        self.time = t
+
+    def _is_step(self, mbs: Any, t: float) -> bool:
+        """Whether t ends a step, and not the start of a run or a static solution; takes the step size."""
+        solver = running_solver(mbs, t)
+        self._step = math.nan if solver is None else solver.it.currentStepSize
+        if solver is None:
+            return False
+        if solver.it.currentStepIndex == 0:
+            self._begin(mbs, t)
+            return False
+        if self.matched_step is not None and abs(self._step - self.matched_step) > SAME_STEP * self._step:
+            raise MultiPhiValueError(
+                f"matchedStepSize of {self.name!r}: got {self.matched_step:g} s and a solver's step of "
+                f"{self._step:g} s, need the same"
+            )
+        return t > self.time
+
+    def _repeat(self, mbs: Any, t: float, before: np.ndarray, after: np.ndarray) -> None:
+        """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
+        own, start, known = self._in_solver, self._state, len(self.events)
+        force = self._significant((own.force(before) + own.force(after)) / 2, after)
+        state = self._travel(before, t, force, force)
+        if len(self.events) == known and state.closed == start.closed:
+            self._keep(replace(start, phases=state.phases))
+            return
+        reaction = own.force(after) - self._applied(mbs)  # of constraints, known from the level before only
+        self._write(mbs, state, force)
+        present = self._significant(self._applied(mbs) + reaction, after)
+        if np.any(present != force):
+            del self.events[known:]
+            self._state = start
+            self._write(mbs, self._travel(before, t, force, present), present)
+        self._sample = self._test.at(np.concatenate(self._views))
+
+    def _travel(self, before: np.ndarray, t: float, force: np.ndarray, entered: np.ndarray) -> State:
+        """State at t of the exact motion under ``force`` in the present level and ``entered`` in others."""
+        closed, motion, rule = self._state.closed, self._motion, self._rule
+        if np.any(force) or np.any(entered):
+            rule = ForcedRule(rule, lambda level: force if level == closed else entered)
+        q, q_t, _ = np.split(before, 3)
+        loaded, own = rule.level(closed), self._stepped(closed)
+        r, eta_t = loaded.level.modes, own.velocity(q, q_t, force)
+        motion.state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
+        motion.rule, motion.time = rule, self.time
+        motion.advance(t)
+        if motion.message:
+            raise NumericalFailure(f"body {self.name!r}: {motion.message}")
+        motion.segments.pop()  # those that remain end with events: the chatter check counts them
+        del motion.segments[: -CHATTER_WINDOW - 1]
+        end = motion.state
+        centre = shift(end.level.level, force if end.closed == closed else entered)
+        return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
+
+    def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The modal force, or zeros where it is what an iterative solver leaves."""
+        size = self._size
+        scale = np.max(np.abs(self._in_solver.stiffness @ x[:size]) + np.abs(x[2 * size :]))
+        return force if np.max(np.abs(force)) > NEGLIGIBLE * scale else np.zeros(size)
+
+    def _applied(self, mbs: Any) -> np.ndarray:
+        """Modal force (s,) of loads and connectors in the present state of the system."""
+        solver = mbs.sys["dynamicSolver"]
+        solver.ComputeODE2RHS(mbs)
+        unbalanced = np.array(solver.GetSystemResidual())[self._first : self._first + self._size]
+        return unbalanced + self._in_solver.resisting(*self._views[:2])
+
+    # ------------------------------------------------------------------ start of a run
+
+    def _begin(self, mbs: Any, t: float) -> None:
+        """Take state and level from the system as it stands at the start of a run."""
+        self._check_settings(mbs)
+        self._attach(mbs)
+        if math.isnan(self.time):
+            self.events[:] = [replace(event, time=t) for event in self.events]
+        else:
+            self.events.clear()
+        self._motion.segments.clear()
+        own, (q, q_t, q_tt) = self._in_solver, self._views
+        closed, phases = self._stored_level()
+        if closed != self._in_solver.closed:  # the accelerations have been computed with stale matrices
+            force = self._applied(mbs)
+            own = self._load_matrices(mbs, closed)
+            q_tt[:] = np.linalg.solve(own.mass, force - own.resisting(q, q_t))
+        x = np.concatenate(self._views)
+        r = own.loaded.level.modes
+        eta_t = own.velocity(q, q_t, own.force(x))
+        self._keep(State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases))
+        self._sample = self._test.at(x)
+        self.time = t
+
+    def _attach(self, mbs: Any) -> None:
+        """Views of the body's part of the system's current state; they hold for one run."""
+        state = mbs.systemData.GetSystemStateDict(reference=True)
+        self._first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
+        own = slice(self._first, self._first + self._size)
+        self._views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        if "nGenericData" in self.items:
+            places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
+            self._data = state["dataCoords"][places[0] : places[0] + len(places)]
+
+    def _check_settings(self, mbs: Any) -> None:
+        integration = mbs.sys["simulationSettings"].timeIntegration.generalizedAlpha
+        if not integration.useNewmark and integration.spectralRadius != 1:
+            raise MultiPhiValueError(
+                f"spectralRadius: got {integration.spectralRadius:g}, need 1 (or TrapezoidalIndex2) "
+                f"with the Multi-Phi body {self.name!r}"
+            )
+
+    def check_called(self, mbs: Any, t: float) -> None:
+        """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""
+        solver = mbs.sys.get("dynamicSolver")
+        if self.time == t or solver is None or solver.it.currentStepIndex == 0 or solver.it.currentTime != t:
+            return
+        raise MultiPhiValueError(
+            f"PostStepUserFunction: got a function that replaced the switching of {self.name!r}, need it set "
+            "before CreateMultiPhiBody (it is then called after the switching)"
+        )
+
+    # ------------------------------------------------------------------ levels in Exudyn
+
+    def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
+        """Put a state at the end of a step into the system, with the acceleration under a modal force."""
+        stepped = self._in_solver
+        if state.closed != self._in_solver.closed:
+            stepped = self._load_matrices(mbs, state.closed)
+        for view, values in zip(self._views, stepped.state(state.displacement, state.velocity, force), strict=True):
+            view[:] = values
+        self._keep(state)
+
+    def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
+        """Give the solver the matrices of a level."""
+        stepped = self._in_solver = self._stepped(closed)
+        for parameter, value in _matrices(stepped).items():
+            mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
+        if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
+            mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
+        mbs.solverSignalJacobianUpdate = True
+        return stepped
+
+    def _keep(self, state: State) -> None:
+        """Remember a state, choose its test, and write its level into the data node."""
+        self._state = state
+        self._armed = all(phase is Phase.ARMED for phase in state.phases)
+        if state.closed not in self._tests:
+            level = state.level
+            rows = [self._rule.function(level, contact) for contact in range(len(self.model.contacts))]
+            self._tests[state.closed] = StepTest(self._stepped(state.closed), rows)
+        self._test = self._tests[state.closed]
+        if "nGenericData" in self.items:
+            self._data[:] = _flags(state)
+
+    def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
+        if closed not in self._stepped_levels:
+            self._stepped_levels[closed] = SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
+        return self._stepped_levels[closed]
+
+    def _stored_level(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
+        """Closed contacts and phases from the data node."""
+        if "nGenericData" not in self.items:
+            return (), ()
+        closed, phases = np.split(self._data, 2)
+        return tuple(np.flatnonzero(closed > 0.5).tolist()), tuple(PHASES[round(p)] for p in phases.tolist())
+
+
+def _flags(state: State) -> list[float]:
+    closed = [float(contact in state.closed) for contact in range(len(state.phases))]
+    return closed + [float(PHASES.index(phase)) for phase in state.phases]
+
+
+def _matrices(stepped: SteppedLevel) -> dict[str, np.ndarray]:
+    return {
+        "massMatrix": stepped.mass,
+        "dampingMatrix": stepped.damping,
+        "stiffnessMatrix": stepped.stiffness,
+        "forceVector": stepped.drive,
+    }
+
+
+def _motion(
+    model: MultiPhiModel,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    loads: Sequence[ConstantLoad],
+) -> Motion:
+    """A motion at its start, checked as ``simulate`` checks it."""
+    start = simulate(model, SHORTEST, displacement, velocity, loads)
+    motion = Motion(model, EventRule(model, start.load), start.start)
+    if motion.message:
+        raise NumericalFailure(motion.message)
+    return motion
+
+
+def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
+    stepped, state = body.stepped_level(body.state.closed), body.state
+    q, q_t, _ = stepped.state(state.displacement, state.velocity, np.zeros(stepped.size))
+    node = mbs.AddNode(
+        NodeGenericODE2(
+            name=f"Node:{body.name}",
+            referenceCoordinates=np.zeros(stepped.size),
+            initialCoordinates=q,
+            initialCoordinates_t=q_t,
+            numberOfODE2Coordinates=stepped.size,
+        )
+    )
+    items = {"nGenericODE2": node}
+    items["oGenericODE2"] = mbs.AddObject(
+        ObjectGenericODE2(
+            name=body.name, nodeNumbers=[node], **_matrices(stepped), visualization=VObjectGenericODE2(show=show)
+        )
+    )
+    if body.model.contacts:
+        flags = _flags(state)
+        items["nGenericData"] = mbs.AddNode(
+            NodeGenericData(
+                name=f"Node:{body.name}.level", initialCoordinates=flags, numberOfDataCoordinates=len(flags)
+            )
+        )
+    return items

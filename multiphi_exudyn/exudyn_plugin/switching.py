@@ -1,0 +1,70 @@
+"""Switching: the one function Exudyn calls after every step, for all Multi-Phi bodies of a system.
+
+Exudyn has a single place for such a function. Bodies share it, and what the user had installed before the first
+body is called after them, with the coordinates and levels as the bodies left them. A function installed later
+replaces this one; the level sensor of a body finds out (``check_called``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import exudyn as exu
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+
+if TYPE_CHECKING:
+    from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
+
+__all__ = ["BODIES", "Switching", "bodies_of", "running_solver"]
+
+BODIES = "multiPhi"  # key in mbs.variables
+
+StepFunction = Callable[[Any, float], bool]
+
+
+class Switching(dict[str, "MultiPhiBody"]):
+    """Bodies of one system by name, and their common PostStep user function. ``following``: the user's own, or None."""
+
+    following: StepFunction | None = None
+
+    def after_step(self, mbs: Any, t: float) -> bool:
+        """Called by Exudyn; whether the run goes on."""
+        for body in self.values():
+            body.after_step(mbs, t)
+        return self.following is None or self.following(mbs, t)
+
+    def install(self, mbs: Any) -> None:
+        """Become the system's PostStep function, followed by the present one."""
+        present = mbs.GetPostStepUserFunction()
+        function = present["function"] if isinstance(present, dict) else present
+        if function == self.after_step:
+            return
+        if function and not callable(function):
+            raise MultiPhiTypeError(f"PostStepUserFunction: got {function!r}, need a Python function or 0")
+        self.following = function or None
+        mbs.SetPostStepUserFunction(self.after_step)
+
+
+def bodies_of(mbs: Any) -> Switching:
+    """All Multi-Phi bodies of a system, from ``mbs.variables``."""
+    return mbs.variables.setdefault(BODIES, Switching())
+
+
+def running_solver(mbs: Any, t: float) -> Any:
+    """The implicit dynamic solver at work at time t, None inside SolveStatic."""
+    dynamic = mbs.sys.get("dynamicSolver")
+    if _at_work(dynamic, t):
+        if not isinstance(dynamic, exu.MainSolverImplicitSecondOrder):
+            raise MultiPhiValueError(
+                f"solver: got {type(dynamic).__name__}, need GeneralizedAlpha or TrapezoidalIndex2"
+            )
+        return dynamic
+    if not _at_work(mbs.sys.get("staticSolver"), t):
+        raise MultiPhiValueError("SolveDynamic: got a solver that is not stored, need storeSolver=True")
+    return None
+
+
+def _at_work(solver: Any, t: float) -> bool:
+    return solver is not None and not solver.output.finishedSuccessfully and solver.it.currentTime == t
