@@ -14,7 +14,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from tqdm import tqdm
@@ -116,7 +116,9 @@ def _folder(path: Path) -> Path:
         with tempfile.NamedTemporaryFile(dir=path):
             return path
     except OSError as error:
-        raise MultiPhiValueError(f"--out: got {str(path)!r}, need a folder that can be written: {error.strerror}") from error
+        raise MultiPhiValueError(
+            f"--out: got {str(path)!r}, need a folder that can be written: {error.strerror}"
+        ) from error
 
 
 def _write(comparison: Comparison, folder: Path) -> None:
@@ -124,7 +126,7 @@ def _write(comparison: Comparison, folder: Path) -> None:
     from multiphi_exudyn.study.report import render  # matplotlib, for those who write a report only
 
     arrays = io.BytesIO()
-    np.savez_compressed(arrays, **histories(comparison))
+    np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
     content = json.dumps(summary(comparison), indent=1, allow_nan=False)
     page = render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
     _replace(folder / "histories.npz", arrays.getvalue())

@@ -1,7 +1,10 @@
 """What the whole suite shares: reproducible property tests, and how a bad input has to be refused."""
 
+import os
 from collections.abc import Callable
 from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: on a busy machine threads make small matrices slow
 
 import pytest
 from hypothesis import settings

@@ -15,7 +15,7 @@ import numpy as np
 from multiphi_exudyn.study import metrics
 from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.runs import ModelRun
-from multiphi_exudyn.study.scene_file import DisplacedStart
+from multiphi_exudyn.study.scene_file import ReducedModel, UserObjectModel
 from multiphi_exudyn.study.workbench import Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]
@@ -75,6 +75,19 @@ class Comparison:
         """Agreement horizon [s] of the judged points."""
         pairs = [(run.points[p], self.reference.points[p]) for p in self.bench.judged_points]
         return metrics.agreement_horizon(pairs, run.time, tolerance)
+
+    def twin(self, run: ModelRun) -> ModelRun | None:
+        """Of a user object, the same reduced model run by itself, if there is one that is ok."""
+        specs = self.bench.scene.models
+        own = specs[run.name]
+        if not (isinstance(own, UserObjectModel) and run.ok):
+            return None
+        equal = {
+            name
+            for name, spec in specs.items()
+            if isinstance(spec, ReducedModel) and (spec.modes, spec.contact) == (own.modes, own.contact)
+        }
+        return next((other for name, other in self.runs.items() if name in equal and other.ok), None)
 
     def speedup(self, run: ModelRun) -> float | None:
         """Online time of the reference over the run's own; None where there is no such ratio."""
@@ -148,15 +161,13 @@ def histories(comparison: Comparison) -> dict[str, np.ndarray]:
 
 def _scene(comparison: Comparison) -> dict[str, Any]:
     scene = comparison.bench.scene
-    start = scene.file.start
-    size = {"displacement": start.displacement, "measured_at": start.measured_at}
     return {
         "name": scene.name,
         "title": scene.file.title,
         "t_end": comparison.bench.t_end,
         "points": list(comparison.bench.points),
         "judged_points": list(comparison.bench.judged_points),
-        "start": {"load_at": start.load_at} | (size if isinstance(start, DisplacedStart) else {"force": start.force}),
+        "start": scene.file.start.model_dump(),
         "contacts": {
             contact.name: {"gap": contact.gap, "stiffness": "rigid" if contact.rigid else contact.stiffness}
             for contact in comparison.bench.mechanics.contacts

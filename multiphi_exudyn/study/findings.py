@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from multiphi_exudyn.study import metrics
 from multiphi_exudyn.study.compare import Comparison
 from multiphi_exudyn.study.runs import ModelRun
 from multiphi_exudyn.study.scene_file import DisplacedStart
@@ -36,12 +37,13 @@ def findings(comparison: Comparison) -> Findings:
 
 
 def percent(value: float | None) -> str:
-    """0.0123 -> "1.2 %"; below 0.01 % the size only."""
+    """A share: "12.6 %", "2.32 %", below 0.1 % one figure."""
     if value is None or not math.isfinite(value):
         return "–"
-    if 0 < abs(value) < 1e-4:
-        return f"{100 * value:.0e} %"
-    return f"{100 * value:.2f} %" if abs(value) < 0.1 else f"{100 * value:.1f} %"
+    share = 100 * value
+    if abs(share) < 0.1:
+        return f"{share:.1g} %"
+    return f"{share:.1f} %" if abs(share) >= 10 else f"{share:.2f} %"
 
 
 def seconds(value: float | None) -> str:
@@ -55,10 +57,18 @@ def seconds(value: float | None) -> str:
 
 
 def times(value: float | None) -> str:
-    """A ratio: "812 ×"."""
+    """A ratio: "812 times"."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{value:.0f} ×" if value >= 10 else f"{value:.2g} ×"
+    return f"{value:.0f} times" if value >= 10 else f"{value:.2g} times"
+
+
+def engineering(value: float) -> str:
+    """1e6 -> "1 M", with a prefix from kilo to giga."""
+    for scale, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if value >= scale:
+            return f"{value / scale:g} {prefix}"
+    return f"{value:g} "
 
 
 def first_of(comparison: Comparison, kind: str) -> ModelRun | None:
@@ -69,31 +79,38 @@ def first_of(comparison: Comparison, kind: str) -> ModelRun | None:
 def _compared(comparison: Comparison) -> str:
     contacts = comparison.bench.mechanics.contacts
     stops = " and ".join(
-        f"the contact {c.name} (gap {1e3 * c.gap:g} mm, {'rigid' if c.rigid else f'{c.stiffness:g} N/m'})"
+        f"the contact {c.name} (gap {1e3 * c.gap:g} mm, {'rigid' if c.rigid else f'{engineering(c.stiffness)}N/m'})"
         for c in contacts
     )
     return (
         f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}, "
-        f"released from rest{', and meets ' + stops if stops else ''}. The reference is {comparison.reference.label}."
+        f"released from rest{', and meets ' + stops if stops else ''}. "
+        f"The reference is the {comparison.reference.label}."
     )
 
 
 def _start(comparison: Comparison) -> str:
     start = comparison.bench.scene.file.start
+    what = "the structure" if comparison.bench.mechanics.beam is None else "the beam"
     if isinstance(start, DisplacedStart):
         return (
-            f"a structure is bent by a static force at {start.load_at} until {start.measured_at} "
+            f"{what} is bent by a static force at {start.load_at} until {start.measured_at} "
             f"stands at {1e3 * start.displacement:+g} mm"
         )
-    return f"a structure is bent by a static force of {start.force:+g} N at {start.load_at}"
+    return f"{what} is bent by a static force of {start.force:+g} N at {start.load_at}"
 
 
 def _outcome(comparison: Comparison) -> str:
     if not comparison.reference.ok:
         return f"The reference failed, so nothing can be measured: {comparison.reference.message}"
-    sentences = [_answer(comparison, run) for run in _headline_runs(comparison)]
     failed = [f"{run.name} ({run.message})" for run in comparison.runs.values() if not run.ok]
-    return " ".join([*sentences, *([f"Failed: {'; '.join(failed)}."] if failed else [])])
+    return " ".join(
+        [
+            *(_answer(comparison, run) for run in _headline_runs(comparison)),
+            *_most_accurate(comparison),
+            *([f"Failed: {'; '.join(failed)}."] if failed else []),
+        ]
+    )
 
 
 def _headline_runs(comparison: Comparison) -> list[ModelRun]:
@@ -101,18 +118,30 @@ def _headline_runs(comparison: Comparison) -> list[ModelRun]:
 
 
 def _answer(comparison: Comparison, run: ModelRun) -> str:
-    until = comparison.headline_window
     return (
-        f"{run.label} differs from the reference by {percent(comparison.worst_error(run, until))} to {until:g} s "
+        f"{run.label} differs from the reference by {_error(comparison, run)} to {comparison.headline_window:g} s "
         f"(NRMSE, worst of {_listed(comparison.bench.judged_points)}) and takes {seconds(run.online_s)} instead of "
         f"{seconds(comparison.reference.online_s)}: {times(comparison.speedup(run))} faster."
     )
+
+
+def _most_accurate(comparison: Comparison) -> Iterable[str]:
+    runs = [run for run in comparison.measured.values() if run.kind == "reduced"]
+    best = min(runs, key=lambda run: comparison.worst_error(run, comparison.headline_window), default=None)
+    if best is not None and best is not first_of(comparison, "reduced"):
+        error, speed = _error(comparison, best), times(comparison.speedup(best))
+        yield f"The most accurate reduced model is {best.label}: {error}, {speed} faster."
 
 
 def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
     yield from _contact_law(comparison)
+    if comparison.bench.overrides:
+        yield (
+            "The reduced levels have the printed frequencies and ratios, which no one linear model has. The full "
+            "beam has its own, so this difference is one of data, not of reduction."
+        )
     if comparison.bench.mechanics.assumptions:
         yield (
             "No measurement is compared here. Section, length, tip inertia, hole positions, start and support "
@@ -130,7 +159,10 @@ def _own_uncertainty(comparison: Comparison) -> Iterable[str]:
         yield "The reference's own uncertainty is unknown here: no coarser copy of it ran."
         return
     known = ", ".join(f"{percent(comparison.worst_error(own, w))} to {w:g} s" for w in comparison.windows)
-    yield f"The reference is uncertain itself: it differs from a coarser copy by {known}. Smaller differences say nothing."
+    yield (
+        f"The reference is uncertain itself: it differs from a coarser copy of itself by {known}. "
+        "Smaller differences say nothing."
+    )
 
 
 def _sensitivity(comparison: Comparison) -> Iterable[str]:
@@ -161,26 +193,36 @@ def _contact_law(comparison: Comparison) -> Iterable[str]:
 def _key_figures(comparison: Comparison) -> Iterable[tuple[str, str, str]]:
     if not comparison.reference.ok:
         return
-    until = comparison.headline_window
-    judged = f"NRMSE to {until:g} s, worst of {_listed(comparison.bench.judged_points)}"
-    own, reduced, body = comparison.coarser, first_of(comparison, "reduced"), first_of(comparison, "user-object")
+    judged = f"NRMSE to {comparison.headline_window:g} s, worst of {_listed(comparison.bench.judged_points)}"
+    own, cheapest = comparison.coarser, [run for run in comparison.cheapest if run.ok]
     if own is not None and own.name in comparison.measured:
-        yield "The reference's own uncertainty", percent(comparison.worst_error(own, until)), f"{judged}; against {own.name}"
-    cheapest = [run for run in comparison.cheapest if run.ok]
+        yield "the reference's own uncertainty", _error(comparison, own), f"{judged}; against {own.name}"
     if cheapest:
-        worst = max(comparison.worst_error(run, until) for run in cheapest)
-        source = f"{judged} and of {len(cheapest)} nearby steps; online {seconds(cheapest[0].online_s)}"
-        yield "The full model at its cheapest fair setting", percent(worst), source
-    if reduced:
-        source = f"{seconds(comparison.reference.online_s)} / {seconds(reduced.online_s)}, error {_error(comparison, reduced)}"
-        yield f"{reduced.name} over the reference", f"{times(comparison.speedup(reduced))} faster", source
-    if reduced and cheapest:
-        ratio = cheapest[0].online_s / reduced.online_s
-        source = f"{seconds(cheapest[0].online_s)} / {seconds(reduced.online_s)}"
-        yield f"{reduced.name} over the cheapest fair full model", f"{times(ratio)} faster", source
-    if body:
-        source = f"{seconds(comparison.reference.online_s)} / {seconds(body.online_s)}, error {_error(comparison, body)}"
-        yield f"{body.name} over the reference", f"{times(comparison.speedup(body))} faster", source
+        worst = max(cheapest, key=lambda run: comparison.worst_error(run, comparison.headline_window))
+        source = f"{judged}, and of {len(cheapest)} nearby steps; online {seconds(cheapest[0].online_s)}"
+        yield "the full model at its cheapest fair setting", _error(comparison, worst), source
+    for run in _headline_runs(comparison):
+        yield f"{run.name} over the reference", *_faster(comparison, run, comparison.reference)
+        if cheapest:
+            yield f"{run.name} over the cheapest fair full model", *_faster(comparison, run, cheapest[0])
+    yield from _same_model_twice(comparison)
+
+
+def _same_model_twice(comparison: Comparison) -> Iterable[tuple[str, str, str]]:
+    for run in comparison.runs.values():
+        twin = comparison.twin(run)
+        if twin is not None:
+            worst = max(
+                metrics.nrmse(run.points[point], twin.points[point], run.time, comparison.bench.t_end)
+                for point in comparison.bench.points
+            )
+            source = f"NRMSE to {comparison.bench.t_end:g} s, worst of all points: one model, two ways to run it"
+            yield f"{run.name} against {twin.name}", percent(worst), source
+
+
+def _faster(comparison: Comparison, run: ModelRun, than: ModelRun) -> tuple[str, str]:
+    source = f"{seconds(than.online_s)} / {seconds(run.online_s)}; its error {_error(comparison, run)}"
+    return f"{times(than.online_s / run.online_s)} faster", source
 
 
 def _error(comparison: Comparison, run: ModelRun) -> str:

@@ -6,7 +6,7 @@ so they are given as a table over both parameters, and for rigid and compliant l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study import metrics
+from multiphi_exudyn.study.scene_file import DisplacedStart
 from multiphi_exudyn.study.workbench import Workbench, start_configuration
 
 __all__ = ["LossTable", "loss_tables"]
@@ -24,20 +25,24 @@ FACTORS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the scene's own start
 
 @dataclass(frozen=True)
 class LossTable:
-    """counts: modes -> losses of contact inside the first phase per factor; None where a run failed."""
+    """counts: modes -> losses of contact inside the first phase, per start; None where a run failed.
+
+    starts: how the starts are written, all of them the scene's own times a factor.
+    """
 
     contact: str
     levels: str
-    factors: tuple[float, ...]
+    starts: tuple[str, ...]
     counts: Mapping[int, tuple[int | None, ...]]
 
 
 def loss_tables(bench: Workbench) -> tuple[LossTable, ...]:
-    """One table per kind of level, of the scene's first contact; none without contacts or from a start in contact."""
-    if not bench.mechanics.contacts or not np.isfinite(bench.longest_period) or _starts_closed(bench):
+    """One table per kind of level, of the scene's first contact; none where there is nothing to count."""
+    if not (bench.mechanics.contacts and np.isfinite(bench.longest_period)) or _starts_closed(bench):
         return ()
-    kinds = {contact.rigid for contact in bench.mechanics.contacts[:1]} | {True}
-    return tuple(_table(bench, rigid) for rigid in sorted(kinds))
+    modes = [r for r in MODES if r <= bench.structure.n - len(bench.mechanics.contacts)]
+    rigid = {bench.mechanics.contacts[0].rigid, True}
+    return tuple(_table(bench, modes, kind) for kind in sorted(rigid) if modes)
 
 
 def _starts_closed(bench: Workbench) -> bool:
@@ -46,13 +51,19 @@ def _starts_closed(bench: Workbench) -> bool:
     return min(gaps) <= 0
 
 
-def _table(bench: Workbench, rigid: bool) -> LossTable:
+def _table(bench: Workbench, modes: Sequence[int], rigid: bool) -> LossTable:
     contacts = bench.contacts(rigid)
-    modes = [r for r in MODES if r <= bench.structure.n - len(contacts)]
     model = MultiPhiModel(bench.structure, contacts, modes=modes[0])
     start = start_configuration(bench, model)
     counts = {r: _counts(bench, replace(model, modes=r), start) for r in modes}
-    return LossTable(contacts[0].name, "rigid" if rigid else "compliant", FACTORS, counts)
+    return LossTable(contacts[0].name, "rigid" if rigid else "compliant", _starts(bench), counts)
+
+
+def _starts(bench: Workbench) -> tuple[str, ...]:
+    start = bench.scene.file.start
+    if isinstance(start, DisplacedStart):
+        return tuple(f"{1e3 * factor * start.displacement:+g} mm" for factor in FACTORS)
+    return tuple(f"{factor * start.force:+g} N" for factor in FACTORS)
 
 
 def _counts(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> tuple[int | None, ...]:

@@ -5,8 +5,10 @@ Errors of the mechanical objects get the file and the field they came from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 from zipfile import BadZipFile
@@ -30,7 +32,7 @@ from multiphi_exudyn.study.scene_file import (
     StructureSpec,
 )
 from multiphi_exudyn.study.scenes import Scene, refuse
-from reference_models.rig import assumptions, rig_beam, rig_contact, rig_damping
+from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 
 __all__ = ["Mechanics", "mechanics_of"]
 
@@ -64,7 +66,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
     """Build and check what ``scene`` describes; raises MultiPhiValueError naming file and field."""
     mechanics = _structure(scene, scene.file.structure)
     own = tuple(
-        _at(scene, f"contacts[{i}]", lambda spec=spec: UnilateralContact(**spec.model_dump()))
+        _at(scene, f"contacts[{i}]", partial(UnilateralContact, **spec.model_dump()))
         for i, spec in enumerate(scene.file.contacts)
     )
     mechanics = replace(mechanics, contacts=mechanics.contacts + own)
@@ -82,12 +84,27 @@ def _structure(scene: Scene, spec: StructureSpec) -> Mechanics:
             damping=rig_damping(),
             beam=rig_beam(spec.rig),
             parameter_set=spec.rig,
-            assumptions=assumptions(spec.rig),
+            assumptions=(*assumptions(spec.rig), *_scene_assumptions(scene, spec)),
         )
     if isinstance(spec, MatrixStructure):
         matrices = _at(scene, "structure", lambda: _matrices(scene.path.parent, spec))
         return Mechanics((), matrices.damping, matrices=matrices)
     return Mechanics((), None, beam=_at(scene, "structure.beam", lambda: _beam(spec.beam)))
+
+
+def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
+    """What a scene adds to the rig's own assumptions."""
+    start = scene.file.start
+    if isinstance(start, DisplacedStart):
+        size = f"{1e3 * start.displacement:+g} mm at {start.measured_at}"
+    else:
+        size = f"{start.force:+g} N"
+    yield f"start of this scene: {size} by a static force at {start.load_at} (assumed: no number is printed)"
+    if math.isfinite(spec.support_stiffness):
+        yield (
+            f"support stiffness: {spec.support_stiffness:g} N/m (assumed: the paper's support is ideally rigid, "
+            "a penalty contact element needs a number)"
+        )
 
 
 def _beam(spec: BeamSpec) -> Beam:
@@ -153,12 +170,24 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
     for name in names:
         if names.count(name) > 1:
             refuse(scene, "contacts", name, "a name of its own for every contact")
+    _check_published(scene, mechanics)
     full = [i for i, model in enumerate(scene.file.models) if isinstance(model, FullModel)]
     if full and mechanics.beam is None:
         refuse(scene, f"models[{full[0]}].kind", "full", "reduced or user-object: matrices have no full model")
     rigid = [contact.name for contact in mechanics.contacts if contact.rigid]
     if full and rigid:
         refuse(scene, f"stiffness of contact {rigid[0]}", "inf", "a finite one: the full model is a penalty model")
+
+
+def _check_published(scene: Scene, mechanics: Mechanics) -> None:
+    """Printed frequencies of a closed level are those of a rigid support, and say nothing of another."""
+    if mechanics.parameter_set is None or not published_override(mechanics.parameter_set):
+        return
+    for i, model in enumerate(scene.file.models):
+        if not isinstance(model, FullModel) and model.contact != "rigid":
+            refuse(
+                scene, f"models[{i}].contact", model.contact, "'rigid': the printed frequencies are of a rigid support"
+            )
 
 
 def _at(scene: Scene, place: str, build: Callable[[], T]) -> T:

@@ -76,9 +76,7 @@ def running_nrmse(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
     return np.sqrt(np.divide(difference, size, out=np.zeros_like(size), where=size > 0))
 
 
-def agreement_horizon(
-    pairs: Sequence[tuple[np.ndarray, np.ndarray]], time: np.ndarray, tolerance: float
-) -> float:
+def agreement_horizon(pairs: Sequence[tuple[np.ndarray, np.ndarray]], time: np.ndarray, tolerance: float) -> float:
     """First time [s] to which the NRMSE of any (values, reference) pair exceeds ``tolerance``."""
     worst = np.max([running_nrmse(values, reference) for values, reference in pairs], axis=0)
     beyond = np.flatnonzero(worst > tolerance)

@@ -37,7 +37,7 @@ class LevelModes:
 
     @property
     def name(self) -> str:
-        """"open", or what is closed."""
+        """ "open", or what is closed."""
         return " and ".join(self.closed) + " closed" if self.closed else "open"
 
 

@@ -8,6 +8,7 @@ contact, as in Figs 38.8 to 38.10.
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
 
 from multiphi_exudyn.study.compare import Comparison
 from multiphi_exudyn.study.mode_shapes import LevelModes
@@ -29,6 +31,7 @@ REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
 MARKERS = {"reduced": "o", "user-object": "D", "full": "s"}
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
+SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture
 LOSSES = {
     "final": ("still in motion", "#0072B2"),
     "damping": ("damping", "#56B4E9"),
@@ -43,22 +46,23 @@ class Style:
     """How one model is drawn."""
 
     colour: str
-    line: str
+    line: LineStyleType
     width: float
     marker: str
 
 
 def styles(comparison: Comparison) -> dict[str, Style]:
     """One style per model."""
-    drawn, colours = {}, iter(COLOURS * len(comparison.runs))
+    drawn, colours = {}, itertools.cycle(COLOURS)
     for name, run in comparison.runs.items():
         if run is comparison.reference:
             drawn[name] = Style(REFERENCE, "-", 2.0, MARKERS[run.kind])
         elif run.kind == "full":
             drawn[name] = Style(FULL, "-", 1.0, MARKERS[run.kind])
+        elif run.kind == "user-object":
+            drawn[name] = Style(next(colours), ":", 2.2, MARKERS[run.kind])
         else:
-            line = ":" if run.kind == "user-object" else "-"
-            drawn[name] = Style(next(colours), line, 2.2 if line == ":" else 1.3, MARKERS[run.kind])
+            drawn[name] = Style(next(colours), "-", 1.3, MARKERS[run.kind])
     return drawn
 
 
@@ -66,12 +70,12 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
     """A point's history, its detail in the first contact, and its difference to the reference."""
     figure, (whole, detail, difference) = _figure(9.0, 3, heights=(1.0, 1.2, 1.0))
     shown = [comparison.reference, *pictured(comparison)]
-    for axes in (whole, detail):
-        _lines(axes, comparison, shown, point, 1e3)
-        axes.set_ylabel(f"{point} [mm]")
-    _whole(whole, comparison)
-    whole.set_title(f"Displacement of {point}; grey: the reference is in contact")
-    _detail(detail, comparison, point)
+    _lines(whole, comparison, shown, point, per_second=1.0)
+    whole.set_xlim(0, comparison.bench.t_end)
+    whole.set_xlabel("time [s]")
+    whole.set_title(f"Displacement of {point}; grey: the reference is in contact", fontsize=10)
+    _lines(detail, comparison, shown, point, per_second=1e3)
+    _detail(detail, comparison, shown, point)
     _differences(difference, comparison, point)
     _legend(figure, comparison, shown + [run for run in reduced(comparison) if run not in shown])
     return figure
@@ -79,22 +83,16 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
 
 def error_time_figure(comparison: Comparison) -> Figure:
     """Worst NRMSE of the judged points against online time, with the reference's own uncertainty."""
-    figure, (axes,) = _figure(4.8, 1)
+    figure, (axes,) = _figure(4.6, 1)
     until = comparison.headline_window
     style = styles(comparison)
+    nearby = comparison.cheapest[1:]
     for name, run in comparison.measured.items():
-        error = 100 * comparison.worst_error(run, until)
-        axes.loglog(run.online_s, error, style[name].marker, color=style[name].colour, markersize=9)
-    own = comparison.coarser
-    if own is not None and own.name in comparison.measured:
-        band = 100 * comparison.worst_error(own, until)
-        axes.axhspan(1e-6, band, color=CONTACT, zorder=0)
-        axes.annotate(
-            "the reference's own uncertainty", (0.99, band), xycoords=("axes fraction", "data"),
-            ha="right", va="bottom", fontsize=8, color="#444444",
-        )  # fmt: skip
+        error, drawn = 100 * comparison.worst_error(run, until), style[name]
+        axes.loglog(run.online_s, error, drawn.marker, color=drawn.colour, markersize=9, mec="white")
+        if run not in nearby:
+            axes.annotate(name, (run.online_s, error), (8, 4), textcoords="offset points", fontsize=9)
     _error_time_frame(axes, comparison, until)
-    _legend(figure, comparison, list(comparison.measured.values()), markers=True)
     return figure
 
 
@@ -121,10 +119,11 @@ def energy_figure(comparison: Comparison) -> Figure:
     figure, (curves, bars) = _figure(7.6, 2, heights=(1.0, 1.1))
     style = styles(comparison)
     for run in [comparison.reference, *pictured(comparison)]:
-        if run.ok and len(run.energy):
+        if len(run.energy):
             share = 100 * run.energy / run.energy[0]
             drawn = style[run.name]
             curves.plot(run.energy_time, share, drawn.line, color=drawn.colour, lw=drawn.width, label=run.label)
+    curves.set_xlim(0, comparison.bench.t_end)
     curves.set_xlabel("time [s]")
     curves.set_ylabel("energy [% of the initial]")
     curves.set_ylim(0, None)
@@ -145,10 +144,11 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
         axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
         axes.set_ylim(len(runs) - 0.5, -0.5)
         axes.grid(axis="x", color="#E8E8E8")
+        axes.set_axisbelow(True)
+        axes.set_xlabel("time [s]")
     both[0].set_xlim(0, comparison.bench.t_end)
-    both[0].set_title(f"In contact with {contact!r}; below, the first contact phase")
+    both[0].set_title(f"In contact with {contact}: whole run, and the first contact phase", fontsize=10)
     both[1].set_xlim(*first_contact_span(comparison))
-    both[1].set_xlabel("time [s]")
     return figure
 
 
@@ -196,53 +196,45 @@ def _figure(height: float, rows: int, heights: Sequence[float] = (1.0,)) -> tupl
     return figure, axes
 
 
-def _lines(axes: Axes, comparison: Comparison, runs: Sequence[ModelRun], point: str, scale: float) -> None:
+def _lines(axes: Axes, comparison: Comparison, runs: Sequence[ModelRun], point: str, per_second: float) -> None:
     style = styles(comparison)
     for run in runs:
-        if run.ok:
-            drawn = style[run.name]
-            axes.plot(run.time, scale * run.points[point], drawn.line, color=drawn.colour, lw=drawn.width)
+        drawn = style[run.name]
+        time = per_second * run.time
+        axes.plot(time, 1e3 * run.points[point], drawn.line, color=drawn.colour, lw=drawn.width)
     for intervals in comparison.reference.contact_intervals.values():
-        for start, end in intervals:
+        for start, end in per_second * intervals:
             axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
+    axes.set_ylabel(f"{point} [mm]")
 
 
-def _whole(axes: Axes, comparison: Comparison) -> None:
-    axes.set_xlim(0, comparison.bench.t_end)
-    axes.set_xlabel("time [s]")
-
-
-def _detail(axes: Axes, comparison: Comparison, point: str) -> None:
+def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point: str) -> None:
     start, end = first_contact_span(comparison)
-    axes.set_xlim(start, end)
     inside = (comparison.bench.time >= start) & (comparison.bench.time <= end)
-    runs = [run for run in [comparison.reference, *pictured(comparison)] if run.ok]
-    values = np.concatenate([1e3 * run.points[point][inside] for run in runs] or [np.zeros(1)])
-    margin = 0.06 * (np.max(values) - np.min(values)) + 1e-9
+    values = np.array([1e3 * run.points[point][inside] for run in shown])
+    margin = 0.06 * np.ptp(values) + 1e-9
+    axes.set_xlim(1e3 * start, 1e3 * end)
     axes.set_ylim(np.min(values) - margin, np.max(values) + margin)
     for contact in comparison.bench.mechanics.contacts:
         if contact.direction == point:
-            axes.axhline(-1e3 * contact.gap, color="#444444", linestyle="--", linewidth=0.8)
-            axes.annotate(
-                f"{contact.name} at {-1e3 * contact.gap:g} mm", (0.995, -1e3 * contact.gap),
-                xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#444444",
-            )  # fmt: skip
+            level = -1e3 * contact.gap
+            axes.axhline(level, color="#444444", linestyle="--", linewidth=0.8)
+            place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 3), "textcoords": "offset points"}
+            _note(axes, f"{contact.name}, {level:g} mm", (0.005, level), va="bottom", **place)
     axes.set_title("Detail of the first contact phase", fontsize=10)
-    axes.set_xlabel("time [s]")
+    axes.set_xlabel("time [ms]")
 
 
 def _differences(axes: Axes, comparison: Comparison, point: str) -> None:
-    style, reference = styles(comparison), comparison.reference
-    own = comparison.coarser
-    if own is not None and reference.ok:
-        band = 1e3 * np.maximum.accumulate(np.abs(own.points[point] - reference.points[point]))
-        axes.fill_between(own.time, 1e-9, np.maximum(band, 1e-9), color=CONTACT, lw=0)
-    lowest = 1e-3
+    style, reference = styles(comparison), comparison.reference.points[point]
+    lowest = SMALLEST * 1e3 * float(np.max(np.abs(reference), initial=1e-12))
+    if comparison.coarser is not None:
+        band = _largest_so_far(comparison.coarser, point, reference)
+        axes.fill_between(comparison.bench.time, lowest / 10, np.maximum(band, lowest / 10), color=CONTACT, lw=0)
     for run in reduced(comparison):
-        difference = 1e3 * np.maximum.accumulate(np.abs(run.points[point] - reference.points[point]))
-        lowest = min(lowest, max(float(np.min(difference[1:], initial=1e-3)), 1e-5))
         drawn = style[run.name]
-        axes.semilogy(run.time, np.maximum(difference, 1e-9), drawn.line, color=drawn.colour, lw=drawn.width)
+        values = np.maximum(_largest_so_far(run, point, reference), lowest / 10)
+        axes.plot(run.time, values, drawn.line, color=drawn.colour, lw=drawn.width)
     axes.set_yscale("log")
     axes.set_ylim(lowest, None)
     axes.set_xlim(0, comparison.bench.t_end)
@@ -251,20 +243,33 @@ def _differences(axes: Axes, comparison: Comparison, point: str) -> None:
     axes.set_title("Difference to the reference; grey: the reference to its coarser copy", fontsize=10)
 
 
+def _largest_so_far(run: ModelRun, point: str, reference: np.ndarray) -> np.ndarray:
+    """Largest difference [mm] up to each time."""
+    return np.asarray(1e3 * np.maximum.accumulate(np.abs(run.points[point] - reference)))
+
+
 def _error_time_frame(axes: Axes, comparison: Comparison, until: float) -> None:
-    if comparison.reference.ok:
-        axes.axvline(comparison.reference.online_s, color=REFERENCE, linestyle="--", linewidth=1)
-        axes.annotate(
-            "online time of the reference", (comparison.reference.online_s, 0.98), rotation=90,
-            xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8,
-        )  # fmt: skip
+    own, reference = comparison.coarser, comparison.reference
+    if own is not None and own.name in comparison.measured:
+        axes.axhspan(1e-9, 100 * comparison.worst_error(own, until), color=CONTACT, zorder=0)
+        _note(axes, "the reference's own uncertainty", (0.5, 0.03), ha="center", va="bottom")
+    if reference.ok:
+        axes.axvline(reference.online_s, color=REFERENCE, linestyle="--", linewidth=1)
+        place = {"xycoords": ("data", "axes fraction"), "ha": "right", "va": "top", "rotation": 90}
+        _note(axes, "online time of the reference", (reference.online_s, 0.98), **place)
     errors = [100 * comparison.worst_error(run, until) for run in comparison.measured.values()]
     errors = [error for error in errors if error > 0]
     if errors:
-        axes.set_ylim(min(errors) / 3, max(errors) * 3)
+        axes.set_ylim(min(errors) / 4, max(errors) * 3)
+    axes.margins(x=0.12)
     axes.set_xlabel("online time [s]")
-    axes.set_ylabel(f"NRMSE to {until:g} s [%], worst of {', '.join(comparison.bench.judged_points)}")
+    axes.set_ylabel(f"NRMSE to {until:g} s [%]\nworst of {', '.join(comparison.bench.judged_points)}")
     axes.grid(which="both", color="#EEEEEE")
+    axes.set_axisbelow(True)
+
+
+def _note(axes: Axes, text: str, at: tuple[float, float], **placing: Any) -> None:
+    axes.annotate(text, at, fontsize=8, color="#444444", **{"xycoords": "axes fraction"} | placing)
 
 
 def _ledger_bars(axes: Axes, comparison: Comparison) -> None:
@@ -282,14 +287,11 @@ def _ledger_bars(axes: Axes, comparison: Comparison) -> None:
     axes.legend(frameon=False, fontsize=8, ncols=len(LOSSES), loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
-def _legend(
-    figure: Figure, comparison: Comparison, runs: Sequence[ModelRun], markers: bool = False
-) -> None:
-    style = styles(comparison)
-    handles: list[Any] = [
-        Line2D([], [], color=style[run.name].colour, linestyle="" if markers else style[run.name].line,
-               linewidth=style[run.name].width, marker=style[run.name].marker if markers else "")
-        for run in runs
-    ]  # fmt: skip
+def _legend(figure: Figure, comparison: Comparison, runs: Sequence[ModelRun]) -> None:
+    drawn = styles(comparison)
+    handles = [
+        Line2D([], [], color=style.colour, linestyle=style.line, linewidth=style.width)
+        for style in (drawn[run.name] for run in runs)
+    ]
     labels = [run.label for run in runs]
     figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=8, frameon=False)

@@ -19,6 +19,10 @@ from reference_models.rig import rig
 __all__ = ["render"]
 
 TEMPLATE = "report.html.j2"
+HISTORY = (
+    "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
+    "In the grey area a difference is no larger than the reference's to its own coarser copy."
+)
 
 
 @dataclass(frozen=True)
@@ -32,9 +36,7 @@ class Picture:
 
 def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequence[LossTable]) -> str:
     """The page as HTML."""
-    environment = Environment(
-        loader=PackageLoader("multiphi_exudyn.study"), autoescape=True, undefined=StrictUndefined
-    )
+    environment = Environment(loader=PackageLoader("multiphi_exudyn.study"), autoescape=True, undefined=StrictUndefined)
     environment.filters |= {"percent": percent, "seconds": seconds, "times": times}
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,
@@ -52,16 +54,15 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
 def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[Picture]:
     if comparison.reference.ok:
         for point in comparison.bench.points:
-            yield _picture("histories", plots.history_figure(comparison, point), f"{point}.")
+            yield _picture("histories", plots.history_figure(comparison, point), HISTORY.format(point))
         yield _picture(
             "cost",
             plots.error_time_figure(comparison),
-            "Lower left is better. In the grey band a model is as good as the reference can tell.",
+            "Lower left is better. In the grey band a model is as good as the reference can tell. "
+            "Colours are the same in all pictures.",
         )
         for contact in comparison.reference.contact_intervals:
-            yield _picture(
-                "contact", plots.contact_figure(comparison, contact), "A bar is a time span in contact."
-            )
+            yield _picture("contact", plots.contact_figure(comparison, contact), "A bar is a time span in contact.")
         yield _picture(
             "energy",
             plots.energy_figure(comparison),

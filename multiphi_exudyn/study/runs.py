@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["ModelRun"]
+__all__ = ["ModelRun", "interval_array"]
 
 
 @dataclass(frozen=True)
@@ -54,3 +54,8 @@ class ModelRun:
     def online_s(self) -> float:
         """Median of the repeats [s]; the first run where it was not repeated."""
         return statistics.median(self.repeats_s) if self.repeats_s else self.first_s
+
+
+def interval_array(given: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Contact intervals as (m, 2), also where there are none."""
+    return np.array(given, dtype=float).reshape(-1, 2)

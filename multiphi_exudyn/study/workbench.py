@@ -68,14 +68,17 @@ class Workbench:
         given = self.mechanics.contacts
         return tuple(replace(contact, stiffness=math.inf) for contact in given) if rigid else given
 
+    @property
+    def overrides(self) -> dict[tuple[str, ...], LevelOverride]:
+        """Printed frequencies and ratios that replace the levels' own; none but for ``as-published``."""
+        name = self.mechanics.parameter_set
+        published = {} if name is None else published_override(name)
+        return {level: LevelOverride(given.frequencies, given.ratios) for level, given in published.items()}
+
     def model(self, spec: ReducedModel | UserObjectModel) -> MultiPhiModel:
         """The reduced model of a scene's entry."""
-        overrides = {}
-        if self.mechanics.parameter_set is not None:
-            published = published_override(self.mechanics.parameter_set)
-            overrides = {k: LevelOverride(v.frequencies, v.ratios) for k, v in published.items()}
         contacts = self.contacts(spec.contact == "rigid")
-        return MultiPhiModel(self.structure, contacts, modes=spec.modes or "all", overrides=overrides)
+        return MultiPhiModel(self.structure, contacts, modes=spec.modes or "all", overrides=self.overrides)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""

@@ -1,0 +1,108 @@
+"""Runs a Multi-Phi model as a body inside Exudyn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.study.runs import ModelRun, interval_array
+from multiphi_exudyn.study.scene_file import UserObjectModel
+from multiphi_exudyn.study.timing import repeated, timed
+from multiphi_exudyn.study.workbench import Workbench, start_configuration
+from reference_models.exudyn_quiet import quiet
+
+__all__ = ["run_user_object"]
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What one run needs: model, start x (n,), number of steps and their size [s]."""
+
+    model: MultiPhiModel
+    start: np.ndarray
+    steps: int
+    step: float
+
+
+def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> ModelRun:
+    """Add the body to an empty system, its modes matched to the step, and solve."""
+    task, building = timed(lambda: _task(bench, spec))
+    recorded, first, repeats = repeated(lambda: _solve(bench, task))
+    histories, sampling = timed(lambda: _histories(bench, recorded))
+    return ModelRun(
+        name=spec.name,
+        kind=spec.kind,
+        label=label,
+        dofs=task.model.level(()).modes,
+        steps=task.steps,
+        offline_s=bench.structure_s + building,
+        first_s=first,
+        repeats_s=repeats,
+        sampling_s=sampling,
+        **histories,
+    )
+
+
+def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
+    model = bench.model(spec)
+    steps = int(np.ceil(bench.t_end / spec.step * (1 - 1e-9)))
+    return _Task(model, start_configuration(bench, model), steps, bench.t_end / steps)
+
+
+def _solve(bench: Workbench, task: _Task) -> tuple[BodyHistories, float]:
+    """One run and the solver's time [s]."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    with quiet():
+        items = CreateMultiPhiBody(mbs, task.model, name="body", displacement=task.start, matchedStepSize=task.step)
+        mbs.Assemble()
+        settings = _simulation_settings(bench.t_end, task.steps)
+        trapezoidal = exu.DynamicSolverType.TrapezoidalIndex2
+        _, elapsed = timed(lambda: mbs.SolveDynamic(settings, solverType=trapezoidal))
+    return body_histories(mbs, items, bench.points), elapsed
+
+
+def _simulation_settings(t_end: float, steps: int) -> Any:
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.numberOfSteps = steps
+    settings.timeIntegration.endTime = t_end
+    settings.timeIntegration.verboseMode = 0
+    settings.timeIntegration.newton.useModifiedNewton = True
+    settings.timeIntegration.reuseConstantMassMatrix = True
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = t_end / steps
+    return settings
+
+
+def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
+    """The fields of a ModelRun that the body's sensors give, on the common grid."""
+    points = {
+        name: CubicHermiteSpline(recorded.time, values, recorded.velocities[name])(bench.time)
+        for name, values in recorded.points.items()
+    }
+    return {
+        "time": bench.time,
+        "points": points,
+        "gaps": {name: np.interp(bench.time, recorded.time, gap) for name, gap in recorded.gaps.items()},
+        "contact_force": {
+            name: np.interp(bench.time, recorded.time, force) for name, force in recorded.contact_force.items()
+        },
+        "contact_intervals": {name: interval_array(given) for name, given in recorded.contact_intervals.items()},
+        "impulse": {name: _impulse(recorded, name) for name in recorded.contact_force},
+        "ledger": {
+            row: float(sum(getattr(event.loss, row) for event in recorded.events))
+            for row in ("impact", "truncation_kinetic", "truncation_strain")
+        },
+    }
+
+
+def _impulse(recorded: BodyHistories, contact: str) -> float:
+    """Of the recorded force by the trapezoidal rule, and of the impacts [N s]."""
+    struck = sum(event.impulse for event in recorded.events if event.contact == contact)
+    return float(np.trapezoid(recorded.contact_force[contact], recorded.time) + struck)

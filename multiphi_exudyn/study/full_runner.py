@@ -1,0 +1,82 @@
+"""Runs the full nonlinear beam."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.study.runs import ModelRun, interval_array
+from multiphi_exudyn.study.scene_file import DisplacedStart, FullModel
+from multiphi_exudyn.study.timing import repeated
+from multiphi_exudyn.study.workbench import Workbench, damping_matrix, start_configuration
+from reference_models.full_beam import FullRun
+
+__all__ = ["run_full"]
+
+
+def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool) -> ModelRun:
+    """Run a full beam with the scene's damping on its own mesh; histories come on the common grid."""
+    beam = bench.full_beam(spec)
+    damping = damping_matrix(replace(beam.structure, damping=bench.mechanics.damping))
+    measured_at, displacement = _start_displacement(bench)
+
+    def solve() -> tuple[FullRun, float]:
+        result = beam.run(
+            bench.t_end,
+            load_at=bench.scene.file.start.load_at,
+            measured_at=measured_at,
+            displacement=displacement,
+            damping=damping,
+            progress=progress,
+        )
+        return result, result.online_s
+
+    result, first, repeats = repeated(solve)
+    run = ModelRun(
+        name=spec.name,
+        kind=spec.kind,
+        label=label,
+        dofs=result.dofs,
+        status=result.status,
+        message=result.message,
+        steps=result.steps,
+        offline_s=result.offline_s,
+        first_s=first,
+        repeats_s=repeats,
+    )
+    return replace(run, **_of_full(bench, result)) if run.ok else run
+
+
+def _of_full(bench: Workbench, result: FullRun) -> dict[str, Any]:
+    """The fields of a ModelRun that a full run gives."""
+    balance = result.balance
+    assert balance is not None, "a run that is ok has a balance"
+    return {
+        "time": bench.time,
+        "points": {name: result.points[name] for name in bench.points},
+        "gaps": result.gaps,
+        "contact_force": result.contact_force,
+        "contact_intervals": {name: interval_array(given) for name, given in result.contact_intervals.items()},
+        "impulse": {name: float(np.trapezoid(force, result.time)) for name, force in result.contact_force.items()},
+        "energy_time": result.energy_time,
+        "energy": result.energy,
+        "ledger": {
+            "initial": balance.initial,
+            "damping": balance.dissipated,
+            "final": balance.final,
+            "residual": balance.initial - balance.dissipated - balance.final,
+            "worst_gain": balance.worst_gain * balance.initial,
+        },
+    }
+
+
+def _start_displacement(bench: Workbench) -> tuple[str, float]:
+    """(point, displacement [m]) that the full model's static load has to reach."""
+    start = bench.scene.file.start
+    if isinstance(start, DisplacedStart):
+        return start.measured_at, start.displacement
+    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False))
+    return start.load_at, float(bench.structure.row(start.load_at) @ start_configuration(bench, model))

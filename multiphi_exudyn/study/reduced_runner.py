@@ -1,0 +1,70 @@
+"""Runs a Multi-Phi model by itself.
+
+A level is built when it is first visited, so the first run is longer than its repeats; both are kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.study.runs import ModelRun, interval_array
+from multiphi_exudyn.study.scene_file import ReducedModel
+from multiphi_exudyn.study.timing import repeated, timed
+from multiphi_exudyn.study.workbench import Workbench, start_configuration
+from multiphi_exudyn.trajectory import Trajectory
+
+__all__ = ["run_reduced"]
+
+ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
+
+
+def run_reduced(bench: Workbench, spec: ReducedModel, label: str) -> ModelRun:
+    """Start, simulate, sample; steps are events, of which there are as many as the motion has."""
+    (model, start), building = timed(lambda: _reduced_start(bench, spec))
+    trajectory, first, repeats = repeated(lambda: timed(lambda: simulate(model, bench.t_end, displacement=start)))
+    run = ModelRun(
+        name=spec.name,
+        kind=spec.kind,
+        label=label,
+        dofs=trajectory.segments[0].level.level.modes if trajectory.segments else 0,
+        status=trajectory.status,
+        message=trajectory.message,
+        steps=len(trajectory.events),
+        offline_s=bench.structure_s + building,
+        first_s=first,
+        repeats_s=repeats,
+    )
+    return replace(run, **_sampled(bench, trajectory)) if run.ok else run
+
+
+def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, np.ndarray]:
+    model = bench.model(spec)
+    return model, start_configuration(bench, model)
+
+
+def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:
+    """The fields of a ModelRun that a trajectory gives."""
+    contacts = [contact.name for contact in trajectory.model.contacts]
+
+    def histories() -> dict[str, Any]:
+        points = {name: trajectory.at(name, bench.time) for name in bench.points}
+        return {"points": points, "gaps": {name: trajectory.gap(name, bench.time) for name in contacts}}
+
+    fields, elapsed = timed(histories)
+    energy_time = np.linspace(0.0, bench.t_end, round(bench.t_end / ENERGY_INTERVAL) + 1)
+    ledger = trajectory.ledger
+    return fields | {
+        "time": bench.time,
+        "contact_force": {name: trajectory.contact_force(name, bench.time) for name in contacts},
+        "contact_intervals": {name: interval_array(trajectory.contact_intervals(name)) for name in contacts},
+        "impulse": {name: trajectory.contact_impulse(name, 0.0, bench.t_end) for name in contacts},
+        "energy_time": energy_time,
+        "energy": trajectory.energy(energy_time),
+        "ledger": asdict(ledger) | {"residual": ledger.residual},
+        "sampling_s": elapsed,
+    }

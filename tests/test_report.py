@@ -1,0 +1,213 @@
+"""The report: complete, self-contained, and honest about what failed or is unknown."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_scene import changed, write
+
+from multiphi_exudyn.study import plots
+from multiphi_exudyn.study.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.findings import engineering, findings, percent, seconds, times
+from multiphi_exudyn.study.losses import loss_tables
+from multiphi_exudyn.study.mechanics import mechanics_of
+from multiphi_exudyn.study.mode_shapes import level_modes
+from multiphi_exudyn.study.report import render
+from multiphi_exudyn.study.runs import ModelRun
+from multiphi_exudyn.study.scenes import load_scene
+from multiphi_exudyn.study.workbench import prepare
+
+FULL = {"kind": "full", "elements": 3, "step": 1e-4}
+MODELS = [
+    {"kind": "reduced", "name": "compliant-r{modes}"},
+    {"kind": "reduced", "name": "rigid-r{modes}", "contact": "rigid"},
+    {"kind": "user-object", "name": "body-r{modes}", "step": 1e-3},
+    FULL | {"name": "full"},
+    FULL | {"name": "full-coarser"},
+    FULL | {"name": "full-cheap"},
+]
+PARTS = {"reference": "full", "coarser": "full-coarser", "cheapest": ["full-cheap"]}
+ENVIRONMENT = {"python": "3", "versions": {"numpy": "2"}, "import_s": {"exudyn": 0.2, "multiphi_exudyn": None}}
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    data = changed(["models"], MODELS) | {"comparison": PARTS}
+    scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", data))
+    return prepare(scene, mechanics_of(scene))
+
+
+@pytest.fixture(scope="module")
+def comparison(bench):
+    """Runs drawn by hand: every model is off by a known share, and takes a known time."""
+    shares = dict(zip(bench.scene.models, (0.02, 0.2, 0.03, 0.0, 0.01, 0.04), strict=True))
+    times_s = dict(zip(bench.scene.models, (0.01, 0.01, 0.1, 10.0, 5.0, 1.0), strict=True))
+    runs = {name: drawn(bench, name, share, times_s[name]) for name, share in shares.items()}
+    return Comparison(bench, runs, ENVIRONMENT)
+
+
+def drawn(bench, name, share, online_s):
+    tip = 1e-2 * np.cos(60 * bench.time)
+    return ModelRun(
+        name,
+        bench.scene.models[name].kind,
+        f"model {name}, {'rigid' if name.startswith('rigid') else 'compliant'} levels",
+        dofs=6,
+        time=bench.time,
+        points={"tip": (1 + share) * tip},
+        gaps={"stop": 1e-3 + tip},
+        contact_force={"stop": np.maximum(0, -tip)},
+        contact_intervals={"stop": np.array([[0.03, 0.032], [0.034, 0.04]])},
+        impulse={"stop": 0.5},
+        energy_time=bench.time,
+        energy=np.exp(-bench.time),
+        ledger={"initial": 1.0, "damping": 0.1, "final": 0.9, "residual": 0.0},
+        steps=100,
+        first_s=2 * online_s,
+        repeats_s=(online_s, 3 * online_s, 0.5 * online_s),
+    )
+
+
+@pytest.fixture(scope="module")
+def page(comparison):
+    return render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+
+
+def text_of(page):
+    """What is read: without tags and pictures."""
+    return " ".join(re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL).split())
+
+
+def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
+    found = findings(comparison)
+    assert "until tip stands at +10 mm" in found.compared
+    assert "stop (gap 1 mm, 100 kN/m)" in found.compared
+    assert "differs from the reference by 2.00 % to 0.1 s" in found.outcome
+    assert "takes 10 ms instead of 10 s: 1000 times faster" in found.outcome
+    doubts = " ".join(found.distrust)
+    assert "coarser copy of itself by 1.00 % to 0.1 s" in doubts
+    assert "another contact law" in doubts
+
+
+def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):
+    figures = {what: value for what, value, _ in findings(comparison).key_figures}
+    assert figures == {
+        "the reference's own uncertainty": "1.00 %",
+        "the full model at its cheapest fair setting": "4.00 %",
+        "compliant-r6 over the reference": "1000 times faster",
+        "compliant-r6 over the cheapest fair full model": "100 times faster",
+        "body-r6 over the reference": "100 times faster",
+        "body-r6 over the cheapest fair full model": "10 times faster",
+        "body-r6 against compliant-r6": "0.98 %",
+    }
+
+
+def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
+    sources = re.findall(r'src="([^"]*)"', page)
+    assert len(sources) == 5  # one point, error over time, contact, energy, modes
+    assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
+    assert not re.search(r"href=|url\(|<script|http", page)
+
+
+def test_the_page_names_every_model_metric_and_level(page, comparison):
+    text = text_of(page)
+    for wanted in (*comparison.runs, "NRMSE", "agreement horizon", "stop closed", "Unaccounted"):
+        assert wanted in text
+
+
+def test_the_summary_is_json_with_the_agreed_keys(comparison):
+    content = json.loads(json.dumps(summary(comparison), allow_nan=False))
+    assert set(content) == {
+        "scene", "environment", "reference", "models", "reference_uncertainty", "errors",
+        "agreement_horizon_s", "contact_intervals", "ledger",
+    }  # fmt: skip
+    assert content["reference"] == "full"
+    model = content["models"]["compliant-r6"]
+    wanted = {"kind": "reduced", "dofs": 6, "status": "ok", "message": "", "steps": 100, "online_s": 0.01}
+    assert wanted.items() <= model.items()
+    assert model["speedup"] == pytest.approx(1000)
+    assert content["errors"]["compliant-r6"]["0.1"]["tip"] == pytest.approx(0.02)
+    assert content["reference_uncertainty"]["0.1"]["tip"] == pytest.approx(0.01)
+    assert content["agreement_horizon_s"]["compliant-r6"] == {"0.01": 0.0, "0.05": 0.1}
+    assert content["contact_intervals"]["full"]["stop"] == [[0.03, 0.032], [0.034, 0.04]]
+
+
+def test_the_histories_are_arrays_on_one_grid(comparison):
+    arrays = histories(comparison)
+    assert arrays["rigid-r6/point/tip"].shape == arrays["time"].shape
+    assert {"full/gap/stop", "full/force/stop", "full/energy", "full/energy_time"} <= set(arrays)
+
+
+def test_a_failed_model_is_a_row_with_its_cause(comparison):
+    failed = ModelRun("rigid-r6", "reduced", "rigid", status="failed", message="chatter <at> 0.1 s")
+    spoiled = replace(comparison, runs=dict(comparison.runs) | {"rigid-r6": failed})
+    assert "Failed: rigid-r6 (chatter <at> 0.1 s)" in findings(spoiled).outcome
+    assert "failed: chatter &lt;at&gt; 0.1 s" in render(spoiled, (), ())
+    content = summary(spoiled)
+    assert content["models"]["rigid-r6"]["speedup"] is None
+    assert "rigid-r6" not in content["errors"]
+
+
+def test_without_its_reference_the_report_says_so_and_measures_nothing(comparison):
+    failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence at 0.02 s")
+    spoiled = replace(comparison, runs=dict(comparison.runs) | {"full": failed})
+    text = text_of(render(spoiled, level_modes(spoiled.bench), ()))
+    assert "The reference failed, so nothing can be measured: no convergence at 0.02 s" in text
+    content = summary(spoiled)
+    assert content["errors"] == {} == content["reference_uncertainty"] == content["agreement_horizon_s"]
+
+
+def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison):
+    failed = ModelRun("full-coarser", "full", "full beam", status="failed", message="stopped")
+    spoiled = replace(comparison, runs=dict(comparison.runs) | {"full-coarser": failed})
+    assert "uncertainty is unknown" in " ".join(findings(spoiled).distrust)
+    assert summary(spoiled)["reference_uncertainty"] == {}
+    assert plots.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
+
+
+def test_pictures_leave_no_global_state(comparison):
+    plots.history_figure(comparison, "tip")
+    assert "matplotlib.pyplot" not in __import__("sys").modules
+
+
+def test_every_model_keeps_its_colour_and_the_reference_is_black(comparison):
+    drawn = plots.styles(comparison)
+    assert drawn["full"].colour == "#000000"
+    own = [drawn[name].colour for name, run in comparison.runs.items() if run.kind != "full"]
+    assert len(set(own)) == len(own)
+
+
+def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
+    stiffness = np.array([[300.0, -100.0], [-100.0, 100.0]])
+    np.savez(tmp_path / "two.npz", mass=np.eye(2), stiffness=stiffness)
+    data = changed(["structure"], {"matrices": "two.npz", "points": {"middle": 0, "tip": 1}})
+    data["start"] = {"load_at": "tip", "force": 1.0}
+    data["outputs"]["t_end"] = 2.0
+    scene = load_scene(write(tmp_path / "matrices.toml", changed(["models", 1, "modes"], 1, data)))
+    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
+    assert level_modes(compared.bench) == ()
+    assert "a static force of +1 N at tip" in text_of(render(compared, (), loss_tables(compared.bench)))
+
+
+def test_modes_along_the_beam_have_the_frequencies_of_the_runs(bench):
+    free, closed = level_modes(bench)
+    assert free.frequencies[0] == pytest.approx(1 / bench.longest_period)
+    assert np.all(np.diff(np.ravel(np.column_stack([free.frequencies, closed.frequencies]))) >= 0)
+    assert np.interp(0.3, closed.x, closed.shapes[0]) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("function", "value", "expected"),
+    [
+        (percent, 0.1264, "12.6 %"), (percent, 0.02321, "2.32 %"), (percent, 0.00018, "0.02 %"),
+        (percent, 0.0, "0 %"), (percent, None, "–"), (percent, float("nan"), "–"),
+        (seconds, 10.24, "10.2 s"), (seconds, 0.0252, "25.2 ms"), (seconds, 2.5e-5, "25 µs"),
+        (times, 404.4, "404 times"), (times, 3.14, "3.1 times"), (times, None, "–"),
+        (engineering, 1e6, "1 M"), (engineering, 2.5e4, "25 k"), (engineering, 12.0, "12 "),
+    ],
+)  # fmt: skip
+def test_numbers_are_written_with_the_unit_that_reads_best(function, value, expected):
+    assert function(value) == expected
