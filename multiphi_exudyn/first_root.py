@@ -31,12 +31,13 @@ __all__ = ["ZERO", "Descent", "DescentFinder", "Signals"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
-SAMPLED = 4  # of them, known at every sample
+SAMPLED = 5  # of them, known at every point
 INTERVALS = 64  # in a block
 TABLES = 64  # sample tables kept for a basis
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
 HERMITE = 1 / 384
+LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
 TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal this near to zero at another's root has its root there too
 
@@ -241,7 +242,7 @@ def _intervals(controls: list[int]) -> Iterator[int]:
 class _Search:
     """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about.
 
-    derivatives: coefficients (4, p) of g to g'''.
+    derivatives: coefficients (5, p) of g and its first four derivatives.
     """
 
     def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
@@ -273,7 +274,7 @@ class _Search:
     def _descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
         """First descent in [left, right], by division until every interval is decided.
 
-        at_left, at_right: g and its derivatives to the third at the ends.
+        at_left, at_right: g and its first four derivatives at the ends.
         """
         narrowest = NARROWEST * right
         intervals = [(left, right, at_left, at_right)]
@@ -290,7 +291,7 @@ class _Search:
         return None
 
     def _point(self, t: float) -> list[float]:
-        """g, g', g'', g''' at t."""
+        """g and its first four derivatives at t."""
         self._finder.evaluations += 1
         basis = self._basis
         samples = np.exp(basis.rates * t) if basis.pure else basis.at(t)
@@ -303,7 +304,7 @@ class _Search:
     ) -> tuple[bool, float | None]:
         """(decided, root): what certified bounds of g, g', g'' say about a descent in [left, right]."""
         width = right - left
-        if self._range(0, at_left, at_right, width)[0] > 0 or self._rises(at_left, width):
+        if self._range(0, at_left, at_right, width)[0] > 0 or self._rises(at_left, at_right, width):
             return True, None
         slope_low, slope_high = self._range(1, at_left, at_right, width)
         if at_left[0] < -self._noise[0]:
@@ -328,13 +329,22 @@ class _Search:
         low = min(left, right, inner_left, inner_right) - remainder
         return low, max(left, right, inner_left, inner_right) + remainder
 
-    def _rises(self, at_left: list[float], width: float) -> bool:
-        """True where g starts at zero or above and its first derivative that counts stays positive."""
+    def _rises(self, at_left: list[float], at_right: list[float], width: float) -> bool:
+        """True where g starts at zero or above and stays above it.
+
+        By g/t: the Bernstein coefficients of (g - g0 (1 - u)^3) / u, u = t / h, exceed the remainder, at most
+        h^4/162 max|g^(4)| u; or by the first derivative that counts, with Taylor's remainder.
+        """
+        if at_left[0] < -self._noise[0]:
+            return False
+        inner_left, inner_right = at_left[0] + width * at_left[1] / 3, at_right[0] - width * at_right[1] / 3
+        if min(3 * inner_left, 1.5 * inner_right, at_right[0]) > LIFTED * width**4 * self._bounds[4]:
+            return True
         for order in range(1, 4):
-            if at_left[order - 1] < -self._noise[order - 1]:
-                return False
             if at_left[order] > self._bounds[order + 1] * width:
                 return True
+            if order < 3 and at_left[order] < -self._noise[order]:
+                return False
         return False
 
     def _convex(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
@@ -349,25 +359,24 @@ class _Search:
     def _root(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
         """Root in [left, right] of g (order 0, falling) or g' (order 1, rising).
 
-        Newton's method with its second-order term, kept inside the bracket, from inverse Hermite interpolation.
+        Inverse Taylor series to third order, kept inside the bracket, from inverse Hermite interpolation.
         """
         sign = 1.0 if order == 0 else -1.0
         t = left + (right - left) * _guess(right - left, at_left[order : order + 2], at_right[order : order + 2])
         tolerance = TIME_ROUND_OFF * right
         for _ in range(100):
-            value, slope, curvature = self._point(t)[order : order + 3]
+            value, slope, curvature, third = self._point(t)[order : order + 4]
             if sign * value >= 0:
                 left = t
             else:
                 right = t
-            following = left
             if slope:
-                newton = value / slope
-                following = t - newton - curvature * newton**2 / (2 * slope)
-            correction = abs(following - t)
-            if correction <= tolerance or self._bounds[order + 3] * correction**3 <= abs(slope) * tolerance:
-                return min(max(following, left), right)
-            t = following if left < following < right else (left + right) / 2
+                newton, c2, c3 = value / slope, curvature / (2 * slope), third / (6 * slope)
+                following = t - newton - c2 * newton**2 - (2 * c2**2 - c3) * newton**3
+                left_out = 5 * abs(c2) * (c2**2 + abs(c3)) + self._bounds[order + 4] / (24 * abs(slope))
+                if left_out * newton**4 <= tolerance or abs(newton) <= tolerance:
+                    return min(max(following, left), right)
+            t = following if slope and left < following < right else (left + right) / 2
         return t
 
 
