@@ -29,7 +29,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, Numeri
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
-from multiphi_exudyn.exudyn_plugin.step_test import Sample, StepTest
+from multiphi_exudyn.exudyn_plugin.step_test import StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of, running_solver
 from multiphi_exudyn.loads import ConstantLoad
@@ -43,6 +43,7 @@ NEGLIGIBLE = 1e-9  # of the elastic forces: what Newton's iterations leave unbal
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 SHORTEST = 1e-12  # s: end of the run by which a start is checked and put into its level
 PHASES = tuple(Phase)
+ONE = np.ones(1)
 
 
 def CreateMultiPhiBody(
@@ -99,7 +100,7 @@ class MultiPhiBody:
         self._state = motion.state
         self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
         self._tests: dict[tuple[int, ...], StepTest] = {}
-        self._step = math.nan
+        self._step = self._rounding = math.nan
         self._in_solver = self._stepped(motion.state.closed)
 
     @property
@@ -120,54 +121,79 @@ class MultiPhiBody:
 
     def after_step(self, mbs: Any, t: float) -> None:
         """Called by Exudyn when a step is done, and at the start."""
-        h = t - self.time
-        if not abs(h - self._step) <= SAME_STEP * h and not self._is_step(mbs, t):
+        if not abs(t - self.time - self._step) <= self._rounding and not self._is_step(mbs, t):
             return
-        before, after = self._sample, self._test.at(np.concatenate(self._views))
-        self._sample = after
-        if not (self._armed and self._test.passes(before, after, h)):
-            self._repeat(mbs, t, before.x, after.x)
+        x = np.concatenate(self._parts)
+        least, ahead, speed = self._test.at(x)
+        limit = max(speed, self._speed)
+        if least > limit and self._ahead > limit:
+            self._x, self._ahead, self._speed = x, ahead, speed
+        else:
+            self._repeat(mbs, t, self._x, x)
+            self._sample()
         self.time = t
 
     def _is_step(self, mbs: Any, t: float) -> bool:
         """Whether t ends a step, and not the start of a run or a static solution; takes the step size."""
         solver = running_solver(mbs, t)
-        self._step = math.nan if solver is None else solver.it.currentStepSize
         if solver is None:
+            self._step = math.nan
             return False
         if solver.it.currentStepIndex == 0:
             self._begin(mbs, t)
             return False
-        if self.matched_step is not None and abs(self._step - self.matched_step) > SAME_STEP * self._step:
+        if not t > self.time:
+            return False  # called twice
+        self._take_step(t - self.time)
+        return True
+
+    def _take_step(self, step: float) -> None:
+        """Prepare for steps of this length [s]."""
+        if self.matched_step is not None and abs(step - self.matched_step) > SAME_STEP * step:
             raise MultiPhiValueError(
                 f"matchedStepSize of {self.name!r}: got {self.matched_step:g} s and a solver's step of "
-                f"{self._step:g} s, need the same"
+                f"{step:g} s, need the same"
             )
-        return t > self.time
+        self._step, self._rounding = step, SAME_STEP * step
+        self._tests.clear()
+        self._choose_test()
+        _, self._ahead, self._speed = self._test.at(self._x)
+
+    def _sample(self) -> None:
+        """Take the present state as the start of the next step."""
+        self._x = np.concatenate(self._parts)
+        _, self._ahead, self._speed = self._test.at(self._x)
+        if any(phase is not Phase.ARMED for phase in self._state.phases):
+            self._ahead = -math.inf  # what ends such a phase is looked for exactly
 
     def _repeat(self, mbs: Any, t: float, before: np.ndarray, after: np.ndarray) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
         own, start, known = self._in_solver, self._state, len(self.events)
-        force = self._significant((own.force(before) + own.force(after)) / 2, after)
+        force = (own.force(*self._split(before)) + own.force(*self._split(after))) / 2
+        force = self._significant(force)
         state = self._travel(before, t, force, force)
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
             return
-        reaction = own.force(after) - self._applied(mbs)  # of constraints, known from the level before only
+        reaction = own.force(*self._views) - self._applied(mbs)  # of constraints: known from the level before
         self._write(mbs, state, force)
-        present = self._significant(self._applied(mbs) + reaction, after)
+        present = self._significant(self._applied(mbs) + reaction)
         if np.any(present != force):
             del self.events[known:]
             self._state = start
             self._write(mbs, self._travel(before, t, force, present), present)
-        self._sample = self._test.at(np.concatenate(self._views))
+
+    def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, q', q'' of x = (q, q', q'', 1)."""
+        s = self._size
+        return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
     def _travel(self, before: np.ndarray, t: float, force: np.ndarray, entered: np.ndarray) -> State:
         """State at t of the exact motion under ``force`` in the present level and ``entered`` in others."""
         closed, motion, rule = self._state.closed, self._motion, self._rule
         if np.any(force) or np.any(entered):
             rule = ForcedRule(rule, lambda level: force if level == closed else entered)
-        q, q_t, _ = np.split(before, 3)
+        q, q_t, _ = self._split(before)
         loaded, own = rule.level(closed), self._stepped(closed)
         r, eta_t = loaded.level.modes, own.velocity(q, q_t, force)
         motion.state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
@@ -181,11 +207,11 @@ class MultiPhiBody:
         centre = shift(end.level.level, force if end.closed == closed else entered)
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
 
-    def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def _significant(self, force: np.ndarray) -> np.ndarray:
         """The modal force, or zeros where it is what an iterative solver leaves."""
-        size = self._size
-        scale = np.max(np.abs(self._in_solver.stiffness @ x[:size]) + np.abs(x[2 * size :]))
-        return force if np.max(np.abs(force)) > NEGLIGIBLE * scale else np.zeros(size)
+        q, _, q_tt = self._views
+        scale = np.max(np.abs(self._in_solver.stiffness @ q) + np.abs(q_tt))
+        return force if np.max(np.abs(force)) > NEGLIGIBLE * scale else np.zeros(self._size)
 
     def _applied(self, mbs: Any) -> np.ndarray:
         """Modal force (s,) of loads and connectors in the present state of the system."""
@@ -207,15 +233,16 @@ class MultiPhiBody:
         self._motion.segments.clear()
         own, (q, q_t, q_tt) = self._in_solver, self._views
         closed, phases = self._stored_level()
-        if closed != self._in_solver.closed:  # the accelerations have been computed with stale matrices
+        if closed != own.closed:  # the accelerations have been computed with stale matrices
             force = self._applied(mbs)
             own = self._load_matrices(mbs, closed)
-            q_tt[:] = np.linalg.solve(own.mass, force - own.resisting(q, q_t))
-        x = np.concatenate(self._views)
+            q_tt[:] = own.acceleration(q, q_t, force)
         r = own.loaded.level.modes
-        eta_t = own.velocity(q, q_t, own.force(x))
-        self._keep(State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases))
-        self._sample = self._test.at(x)
+        eta_t = own.velocity(q, q_t, own.force(q, q_t, q_tt))
+        self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
+        self._x = np.concatenate(self._parts)
+        self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
+        self._sample()
         self.time = t
 
     def _attach(self, mbs: Any) -> None:
@@ -224,6 +251,7 @@ class MultiPhiBody:
         self._first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
         own = slice(self._first, self._first + self._size)
         self._views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        self._parts = (*self._views, ONE)
         if "nGenericData" in self.items:
             places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][places[0] : places[0] + len(places)]
@@ -270,14 +298,16 @@ class MultiPhiBody:
     def _keep(self, state: State) -> None:
         """Remember a state, choose its test, and write its level into the data node."""
         self._state = state
-        self._armed = all(phase is Phase.ARMED for phase in state.phases)
-        if state.closed not in self._tests:
-            level = state.level
-            rows = [self._rule.function(level, contact) for contact in range(len(self.model.contacts))]
-            self._tests[state.closed] = StepTest(self._stepped(state.closed), rows)
-        self._test = self._tests[state.closed]
+        self._choose_test()
         if "nGenericData" in self.items:
             self._data[:] = _flags(state)
+
+    def _choose_test(self) -> None:
+        closed = self._state.closed
+        if closed not in self._tests:
+            rows = [self._rule.function(self._state.level, contact) for contact in range(len(self.model.contacts))]
+            self._tests[closed] = StepTest(self._stepped(closed), rows, self._step)
+        self._test = self._tests[closed]
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
         if closed not in self._stepped_levels:
@@ -314,7 +344,7 @@ def _motion(
 ) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
     start = simulate(model, SHORTEST, displacement, velocity, loads)
-    motion = Motion(model, EventRule(model, start.load), start.start)
+    motion = Motion(model, model.rules[start.load.tobytes()], start.start)
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion

@@ -13,7 +13,6 @@ that force is. What fails the test is looked at exactly (body.py): the test may 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,58 +20,44 @@ from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.first_root import HERMITE
 from multiphi_exudyn.state import Row
 
-__all__ = ["Sample", "StepTest"]
-
-
-class Sample(NamedTuple):
-    """State x = (q, q', q'') (3 s,), s and s' of every contact, |S z'|."""
-
-    x: np.ndarray
-    values: list[float]
-    speed: float
+__all__ = ["StepTest"]
 
 
 class StepTest:
-    """The test for the functions ``rows`` of all contacts in one level."""
+    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s].
 
-    def __init__(self, stepped: SteppedLevel, rows: list[Row]) -> None:
-        level, size = stepped.loaded.level, stepped.size
-        r, count = level.modes, len(rows)
+    Every function is divided by the factor of max |S z'| in its condition, so that all have the same right-hand side.
+    """
+
+    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
+        level, size, count = stepped.loaded.level, stepped.size, len(rows)
         along, rate = np.zeros((count, size)), np.zeros((count, size))
-        along[:, :r] = np.reshape([row.position for row in rows], (count, r))
-        rate[:, :r] = np.reshape([row.rate for row in rows], (count, r))
+        along[:, : level.modes] = np.reshape([row.position for row in rows], (count, level.modes))
+        rate[:, : level.modes] = np.reshape([row.rate for row in rows], (count, level.modes))
         omega, none = np.sqrt(np.diagonal(stepped.stiffness)), np.zeros((count, size))
-        signals = np.vstack([np.hstack([along, rate, none]), np.hstack([none, along, rate])])
-        scaled = np.hstack([np.zeros((2 * size, size)), np.diag(np.concatenate([omega, np.ones(size)]))])
-        self._matrix = np.vstack([signals, scaled]) @ stepped.physical
-        self._constants = [row.constant for row in rows]
-        self._bounds = [HERMITE * bound for bound in _bounds(stepped, np.hstack([along, rate]), omega)]
-        self._count, self._signals = count, 2 * count
+        scale = HERMITE * step**4 * _bounds(stepped, np.hstack([along, rate]), omega) + np.finfo(float).tiny
+        value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
+        norm = np.hstack([np.zeros((2 * size, size)), np.diag(np.concatenate([omega, np.ones(size)]))])
+        conditions = np.vstack([value - third, value, value + third]) / np.tile(scale, 3)[:, None]
+        constants = np.tile(np.array([row.constant for row in rows]) / scale, 3)
+        matrix = np.vstack([conditions, norm]) @ stepped.physical
+        self._matrix = np.hstack([matrix, np.concatenate([constants, np.zeros(2 * size)])[:, None]])
+        self._one, self._two, self._three = count, 2 * count, 3 * count
 
-    def at(self, x: np.ndarray) -> Sample:
-        """What the test needs of a state."""
+    def at(self, x: np.ndarray) -> tuple[float, float, float]:
+        """Of a state x = (q, q', q'', 1): least condition for the step before it and after it, and |S z'|.
+
+        A step is clear if the former of its end and the latter of its start exceed the larger |S z'| of the two.
+        """
         y = self._matrix.dot(x)
-        scaled = y[self._signals :]
-        return Sample(x, y[: self._signals].tolist(), math.sqrt(scaled.dot(scaled)))
-
-    def passes(self, before: Sample, after: Sample, h: float) -> bool:
-        """True where no contact's function can have reached zero in the step of length h [s]."""
-        remainder = h**4 * max(before.speed, after.speed)
-        third, n = h / 3, self._count
-        for i, (bound, constant) in enumerate(zip(self._bounds, self._constants, strict=True)):
-            s0, s1 = before.values[i] + constant, after.values[i] + constant
-            least = bound * remainder
-            if s0 <= least or s1 <= least:
-                return False
-            if s0 + third * before.values[n + i] <= least or s1 - third * after.values[n + i] <= least:
-                return False
-        return True
+        conditions, norm = y[: self._three].tolist(), y[self._three :]
+        return min(conditions[: self._two]), min(conditions[self._one :]), math.sqrt(norm.dot(norm))
 
 
-def _bounds(stepped: SteppedLevel, functionals: np.ndarray, omega: np.ndarray) -> list[float]:
+def _bounds(stepped: SteppedLevel, functionals: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """|[P R] A^3 S^-1| of every row [P R] (2 s,)."""
     size = stepped.size
     none, identity = np.zeros((size, size)), np.eye(size)
     system = np.block([[none, identity], [-stepped.stiffness, -stepped.own_damping]])
     scaled = np.block([[none, identity], [-np.diag(omega), -stepped.own_damping]])  # A S^-1, also where omega = 0
-    return np.linalg.norm(functionals @ system @ system @ scaled, axis=1).tolist()
+    return np.asarray(np.linalg.norm(functionals @ system @ system @ scaled, axis=1))

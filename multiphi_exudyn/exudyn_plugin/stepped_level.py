@@ -32,7 +32,7 @@ __all__ = ["SteppedLevel"]
 
 @dataclass(frozen=True)
 class SteppedLevel:
-    """See the module's docstring. All matrices (s, s), s >= r the size of the body; x = (q, q', q'') is (3 s,).
+    """See the module's docstring. All matrices (s, s), s >= r the size of the body.
 
     loaded: the level. mass, damping, stiffness: for the solver. own_damping: Phi^T C Phi. drive: (s,).
     from_displacement, from_velocity, from_force: Q, V, G.
@@ -71,10 +71,13 @@ class SteppedLevel:
         """Number of coordinates s."""
         return len(self.drive)
 
-    def force(self, x: np.ndarray) -> np.ndarray:
+    def force(self, q: np.ndarray, q_t: np.ndarray, q_tt: np.ndarray) -> np.ndarray:
         """Modal force (s,) that acts from outside, by the equation of motion."""
-        q, q_t, q_tt = np.split(x, 3)
         return self.mass @ q_tt + self.resisting(q, q_t)
+
+    def acceleration(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """q'' (s,) under a modal force."""
+        return self._mass_inverse @ (force - self.resisting(q, q_t))
 
     def resisting(self, q: np.ndarray, q_t: np.ndarray) -> np.ndarray:
         """D q' + K q - drive (s,)."""
@@ -82,28 +85,32 @@ class SteppedLevel:
 
     def velocity(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """eta' (s,) of a state in the solver under a modal force."""
-        return self._inverse @ (q_t - self.from_displacement @ q - self.from_force @ (force + self.drive))
+        return self._velocity_inverse @ (q_t - self.from_displacement @ q - self.from_force @ (force + self.drive))
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,)."""
         q, v = np.zeros(self.size), np.zeros(self.size)
         q[: len(eta)], v[: len(eta)] = eta, eta_t
         q_t = self.from_displacement @ q + self.from_velocity @ v + self.from_force @ (force + self.drive)
-        return q, q_t, np.linalg.solve(self.mass, force - self.resisting(q, q_t))
+        return q, q_t, self.acceleration(q, q_t, force)
 
     @functools.cached_property
     def physical(self) -> np.ndarray:
-        """The matrix (3 s, 3 s) from x to (eta, eta', eta''), whatever force acts."""
+        """The matrix (3 s, 3 s) from (q, q', q'') to (eta, eta', eta''), whatever force acts."""
         identity, none = np.eye(self.size), np.zeros((self.size, self.size))
         total = np.hstack([self.stiffness, self.damping, self.mass])
         shown = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ total
-        velocity = self._inverse @ shown
+        velocity = self._velocity_inverse @ shown
         acceleration = total - self.own_damping @ velocity
         acceleration[:, : self.size] -= self.stiffness
         return np.vstack([np.hstack([identity, none, none]), velocity, acceleration])
 
     @functools.cached_property
-    def _inverse(self) -> np.ndarray:
+    def _mass_inverse(self) -> np.ndarray:
+        return np.asarray(np.linalg.inv(self.mass))
+
+    @functools.cached_property
+    def _velocity_inverse(self) -> np.ndarray:
         return np.asarray(np.linalg.inv(self.from_velocity))
 
 
