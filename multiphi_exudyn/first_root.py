@@ -81,7 +81,7 @@ class DescentFinder:
             return None
         constants: list[float] = signals.constants.tolist()
         while start < horizon:
-            bounds = self._bounds(signals.coefficients, start, horizon)
+            bounds = self._bounds(signals.coefficients, start, 2 * horizon - start)  # a block may end behind it
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
             if not math.isfinite(bounds[0][0]):
@@ -163,13 +163,17 @@ class DescentFinder:
         return None
 
     def _step(self, constants: list[float], bounds: list[list[float]], remaining: float) -> float:
-        """Sample distance of the next block: a power of two, at which the remainder is small beside the signals."""
-        step = remaining / INTERVALS
+        """Sample distance of the next block: a power of two, at which the remainder is small beside the signals.
+
+        Never more than what takes the block to the horizon, where it ends at once.
+        """
+        longest = _power_of_two_above(remaining / INTERVALS)
+        step = math.inf
         for constant, bound in zip(constants, bounds, strict=True):
-            wanted = RESOLUTION * (abs(constant) + bound[0]) / HERMITE
-            if wanted < bound[4] * step**4:
-                step = math.sqrt(math.sqrt(wanted / bound[4]))
-        return math.ldexp(0.5, math.frexp(step / self.refine)[1])
+            if bound[4] > 0:
+                wanted = RESOLUTION * (abs(constant) + bound[0]) / HERMITE
+                step = min(step, math.sqrt(math.sqrt(wanted / bound[4])))
+        return min(longest, _power_of_two_above(step / self.refine) / 2) if math.isfinite(step) else longest
 
     def _table(self, step: float) -> _Table:
         if step not in self._tables:
@@ -394,3 +398,8 @@ def _guess(width: float, at_left: list[float], at_right: list[float]) -> float:
         toward_left, toward_right = rise / (slope_left * width), rise / (slope_right * width)
         s = s * s * (3 - 2 * s) + s * (1 - s) * ((1 - s) * toward_left - s * toward_right)
     return min(max(s, 0.01), 0.99)
+
+
+def _power_of_two_above(value: float) -> float:
+    """The smallest power of two that is greater than ``value``."""
+    return math.ldexp(1.0, math.frexp(value)[1])
