@@ -36,6 +36,7 @@ from multiphi_exudyn.loads import ConstantLoad
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.simulate import CHATTER_WINDOW, Motion, simulate
 from multiphi_exudyn.state import Event, Phase, State
+from multiphi_exudyn.structure import is_real
 
 __all__ = ["CreateMultiPhiBody", "MultiPhiBody"]
 
@@ -43,7 +44,6 @@ NEGLIGIBLE = 1e-9  # of the elastic forces: what Newton's iterations leave unbal
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 SHORTEST = 1e-12  # s: end of the run by which a start is checked and put into its level
 PHASES = tuple(Phase)
-ONE = np.ones(1)
 
 
 def CreateMultiPhiBody(
@@ -74,11 +74,13 @@ def CreateMultiPhiBody(
         raise MultiPhiValueError(f"name: got {name!r}, which this system has already, need another one")
     if not isinstance(model, MultiPhiModel):
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
+    _check_step(matchedStepSize)
     body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), matchedStepSize)
     body.items.update(_add_items(mbs, body, show))
     body.items.update(add_sensors(mbs, body))
     bodies[name] = body
-    bodies.install(mbs)
+    if model.contacts or matchedStepSize is not None:
+        bodies.install(mbs)
     return dict(body.items)
 
 
@@ -100,8 +102,11 @@ class MultiPhiBody:
         self._state = motion.state
         self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
         self._tests: dict[tuple[int, ...], StepTest] = {}
-        self._step = self._rounding = math.nan
+        self._step = self._rounding = self._ahead = self._speed = math.nan
+        self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
         self._in_solver = self._stepped(motion.state.closed)
+        self._given = self._in_solver.state(motion.state.displacement, motion.state.velocity, np.zeros(self._size))
+        self._given_events = tuple(motion.events)
 
     @property
     def events(self) -> list[Event]:
@@ -113,6 +118,11 @@ class MultiPhiBody:
         """Level, modal displacement and velocity, phases; the last two after an event or at the start of a run."""
         return self._state
 
+    @property
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """Initial coordinates and velocities (s,) of the node."""
+        return self._given[0], self._given[1]
+
     def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
         """The level of closed contacts as the solver has it."""
         return self._stepped(tuple(closed))
@@ -123,15 +133,22 @@ class MultiPhiBody:
         """Called by Exudyn when a step is done, and at the start."""
         if not abs(t - self.time - self._step) <= self._rounding and not self._is_step(mbs, t):
             return
-        x = np.concatenate(self._parts)
+        x = self._read()
         least, ahead, speed = self._test.at(x)
-        limit = max(speed, self._speed)
+        limit = speed if speed > self._speed else self._speed
         if least > limit and self._ahead > limit:
             self._x, self._ahead, self._speed = x, ahead, speed
         else:
             self._repeat(mbs, t, self._x, x)
             self._sample()
         self.time = t
+
+    def _read(self) -> np.ndarray:
+        """A copy x = (q, q', q'', 1) of the present state, good until the next but one."""
+        self._copies = self._copies[::-1]
+        x, q, q_t, q_tt = self._copies[0]
+        q[:], q_t[:], q_tt[:] = self._views
+        return x
 
     def _is_step(self, mbs: Any, t: float) -> bool:
         """Whether t ends a step, and not the start of a run or a static solution; takes the step size."""
@@ -161,7 +178,7 @@ class MultiPhiBody:
 
     def _sample(self) -> None:
         """Take the present state as the start of the next step."""
-        self._x = np.concatenate(self._parts)
+        self._x = self._read()
         _, self._ahead, self._speed = self._test.at(self._x)
         if any(phase is not Phase.ARMED for phase in self._state.phases):
             self._ahead = -math.inf  # what ends such a phase is looked for exactly
@@ -194,8 +211,8 @@ class MultiPhiBody:
         if np.any(force) or np.any(entered):
             rule = ForcedRule(rule, lambda level: force if level == closed else entered)
         q, q_t, _ = self._split(before)
-        loaded, own = rule.level(closed), self._stepped(closed)
-        r, eta_t = loaded.level.modes, own.velocity(q, q_t, force)
+        loaded = rule.level(closed)
+        r, eta_t = loaded.level.modes, self._stepped(closed).velocity(q, q_t, force)
         motion.state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
         motion.rule, motion.time = rule, self.time
         motion.advance(t)
@@ -226,10 +243,6 @@ class MultiPhiBody:
         """Take state and level from the system as it stands at the start of a run."""
         self._check_settings(mbs)
         self._attach(mbs)
-        if math.isnan(self.time):
-            self.events[:] = [replace(event, time=t) for event in self.events]
-        else:
-            self.events.clear()
         self._motion.segments.clear()
         own, (q, q_t, q_tt) = self._in_solver, self._views
         closed, phases = self._stored_level()
@@ -237,10 +250,15 @@ class MultiPhiBody:
             force = self._applied(mbs)
             own = self._load_matrices(mbs, closed)
             q_tt[:] = own.acceleration(q, q_t, force)
-        r = own.loaded.level.modes
-        eta_t = own.velocity(q, q_t, own.force(q, q_t, q_tt))
+        force = own.force(q, q_t, q_tt)
+        fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
+        self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
+        if fresh:  # only now the force is known, which the velocity of matched modes contains
+            q_t += own.from_force @ force
+            q_tt[:] = own.acceleration(q, q_t, force)
+        r, eta_t = own.loaded.level.modes, own.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
-        self._x = np.concatenate(self._parts)
+        self._x = self._read()
         self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
         self._sample()
         self.time = t
@@ -251,7 +269,7 @@ class MultiPhiBody:
         self._first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
         own = slice(self._first, self._first + self._size)
         self._views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
-        self._parts = (*self._views, ONE)
+        self._copies = tuple((x, *self._split(x)) for x in np.ones((2, 3 * self._size + 1)))
         if "nGenericData" in self.items:
             places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][places[0] : places[0] + len(places)]
@@ -336,6 +354,15 @@ def _matrices(stepped: SteppedLevel) -> dict[str, np.ndarray]:
     }
 
 
+def _check_step(step: float | None) -> None:
+    if step is None:
+        return
+    if not is_real(step):
+        raise MultiPhiTypeError(f"matchedStepSize: got {step!r}, need a step size in s or None")
+    if not (math.isfinite(step) and step > 0):
+        raise MultiPhiValueError(f"matchedStepSize: got {step!r}, need a step size > 0 s or None")
+
+
 def _motion(
     model: MultiPhiModel,
     displacement: np.ndarray | None,
@@ -351,8 +378,7 @@ def _motion(
 
 
 def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
-    stepped, state = body.stepped_level(body.state.closed), body.state
-    q, q_t, _ = stepped.state(state.displacement, state.velocity, np.zeros(stepped.size))
+    stepped, (q, q_t) = body.stepped_level(body.state.closed), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
             name=f"Node:{body.name}",
@@ -369,7 +395,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
         )
     )
     if body.model.contacts:
-        flags = _flags(state)
+        flags = _flags(body.state)
         items["nGenericData"] = mbs.AddNode(
             NodeGenericData(
                 name=f"Node:{body.name}.level", initialCoordinates=flags, numberOfDataCoordinates=len(flags)

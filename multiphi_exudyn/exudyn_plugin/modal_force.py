@@ -11,7 +11,7 @@ Coordinates of such a level are eta - d. A force on coordinate k acts on mode k 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,8 +24,8 @@ __all__ = ["ForcedRule", "shift"]
 
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
     """d (r,) of a modal force (s,), s >= r."""
-    elastic = level.omega > 0
-    return np.where(elastic, force[: level.modes] / np.where(elastic, level.omega, 1.0) ** 2, 0.0)
+    centre = np.zeros(level.modes)
+    return np.divide(force[: level.modes], level.omega**2, out=centre, where=level.omega > 0)
 
 
 class ForcedRule(EventRule):
@@ -45,17 +45,24 @@ class ForcedRule(EventRule):
         return self._forced[key]
 
 
-def _forced(loaded: LoadedLevel, force: np.ndarray) -> LoadedLevel:
-    level, rest = loaded.level, loaded.asymptotic
-    d, p = shift(level, force), force[: level.modes]
-    stored = 0.5 * float(np.sum((level.omega * d) ** 2))
+@dataclass(frozen=True)
+class _ForcedLevel(LoadedLevel):
+    """``plain`` under a modal force; centre: d (r,). Its energies are those of ``plain``, without the force's."""
+
+    plain: LoadedLevel
+    centre: np.ndarray
+
+    def potential(self, displacement: np.ndarray) -> float:
+        """Strain energy less the potential f.x of the static load [J]."""
+        return self.plain.potential(displacement + self.centre)
+
+
+def _forced(plain: LoadedLevel, force: np.ndarray) -> LoadedLevel:
+    level, rest, d = plain.level, plain.asymptotic, shift(plain.level, force)
     asymptotic = replace(
         rest,
         configuration=rest.configuration + level.vectors @ d,
         forces=rest.forces + level.force_rows @ d,
-        drive=rest.drive + np.where(level.omega > 0, 0.0, p),
-        load=rest.load + p,
-        strain=rest.strain + stored + float((rest.load - rest.drive) @ d),
-        potential=rest.potential - stored,
+        drive=rest.drive + np.where(level.omega > 0, 0.0, force[: level.modes]),
     )
-    return LoadedLevel(level, asymptotic, loaded.gap_constants + level.gap_rows @ d)
+    return _ForcedLevel(level, asymptotic, plain.gap_constants + level.gap_rows @ d, plain, d)

@@ -104,7 +104,9 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
         velocities=dict(zip(names, values[1], strict=True)),
         gaps=dict(zip(contacts, values[2], strict=True)),
         contact_force=dict(zip(contacts, values[3], strict=True)),
-        contact_intervals={c: _intervals(body.events, c, bool(f[0]), time) for c, f in zip(contacts, flags.T)},
+        contact_intervals={
+            c: _intervals(body.events, c, bool(f[0]), time) for c, f in zip(contacts, flags.T, strict=True)
+        },
         closed=dict(zip(contacts, flags.T, strict=True)),
         events=tuple(body.events),
     )
@@ -135,7 +137,7 @@ def _rebuilt(
         rates[:, here] = in_base @ own.vectors @ eta_t
         gaps[:, here] = own.gap_rows @ eta + loaded.loaded.gap_constants[:, None]
         pushed = own.force_rows @ eta + own.force_rate_rows @ eta_t + rest.forces[:, None]
-        forces[np.ix_(own.indices, here)] = pushed
+        forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
     return moved, rates, gaps, forces
 
 

@@ -144,7 +144,7 @@ def _matched(omega: np.ndarray, damping: np.ndarray, step: float) -> Maps:
 
 def _second_order(turned: np.ndarray, s: int) -> Maps:
     """M, D, Q, V, G from [A_h B_h] (2 s, 3 s)."""
-    (q, v, g), (below, lower, forced) = np.hsplit(turned[:s], 3), np.hsplit(turned[s:], 3)
+    (q, v, g), (_, lower, forced) = np.hsplit(turned[:s], 3), np.hsplit(turned[s:], 3)
     inverse = np.linalg.inv(v)
     mass = np.linalg.inv(v @ (forced - lower @ inverse @ g))
     damping = -mass @ (q + v @ lower @ inverse)

@@ -1,0 +1,398 @@
+"""The reduced model as an Exudyn object answers as ``simulate`` does, alone, in pairs and with forces on it."""
+
+import functools
+import math
+import runpy
+from pathlib import Path
+
+import exudyn as exu
+import numpy as np
+import pytest
+from exudyn.itemInterface import (
+    CoordinateSpringDamper,
+    LoadCoordinate,
+    MarkerNodeCoordinate,
+    NodePointGround,
+)
+from scipy.integrate import solve_ivp
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+
+RADIUS_ONE = exu.DynamicSolverType.GeneralizedAlpha
+TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
+POINTS = ("node2", "node3")
+COMPLIANT = 1e6  # N/m
+
+
+@pytest.fixture(autouse=True)
+def _quiet():
+    printed, exu.config.printToConsole = exu.config.printToConsole, False
+    yield
+    exu.config.printToConsole = printed
+
+
+@functools.cache
+def rig(stiffness, damped=True):
+    """The rig with r = 6, and its start."""
+    structure = mp.planar_beam(rig_beam(), elements=57, damping=rig_damping() if damped else None)
+    model = mp.MultiPhiModel(structure, [rig_contact(stiffness)], modes=6)
+    bent = model.static_equilibrium({"node3": 1.0})
+    return model, bent * initial_displacement() / float(structure.row("node3") @ bent)
+
+
+def chain(contacts, masses=3, modes="all", grounded=True, damping=None):
+    """Masses of 1 kg in a row, 1e4 N/m between them and to the ground."""
+    stiffness = 1e4 * (2 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1))
+    if not grounded:
+        stiffness[0, 0] = stiffness[-1, -1] = 1e4
+    points = {f"m{i}": i for i in range(masses)}
+    return mp.MultiPhiModel(mp.LinearStructure(np.eye(masses), stiffness, damping, points), contacts, modes=modes)
+
+
+def settings(step, end, radius=1.0):
+    chosen = exu.SimulationSettings()
+    chosen.timeIntegration.numberOfSteps = round(end / step)
+    chosen.timeIntegration.endTime = end
+    chosen.timeIntegration.verboseMode = 0
+    chosen.timeIntegration.generalizedAlpha.spectralRadius = radius
+    chosen.solution.file.write = False
+    chosen.solution.sensors.writePeriod = max(step, 1e-3)
+    return chosen
+
+
+def new_system():
+    container = exu.SystemContainer()
+    return container, container.AddSystem()
+
+
+def run(model, step, end, solver=TRAPEZOIDAL, add=None, **given):
+    """Histories of one body; ``add(mbs, items)`` puts more into its system."""
+    container, mbs = new_system()
+    items = CreateMultiPhiBody(mbs, model, name="body", **given)
+    if add is not None:
+        add(mbs, items)
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(step, end), solverType=solver)
+    del container
+    return body_histories(mbs, items)
+
+
+def difference(histories, trajectory, points):
+    """Relative difference, all points together."""
+    times = np.minimum(histories.time, trajectory.t_end)
+    expected = np.concatenate([trajectory.at(point, times) for point in points])
+    return np.linalg.norm(np.concatenate([histories.points[p] for p in points]) - expected) / np.linalg.norm(expected)
+
+
+def observed_orders(errors):
+    return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+
+
+# ---------------------------------------------------------------------- alone: the native answer
+
+
+@pytest.mark.parametrize("damped", [True, False], ids=["damped", "undamped"])
+@pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])
+def test_matched_to_a_coarse_step_is_native(stiffness, damped):
+    model, start = rig(stiffness, damped)
+    native = mp.simulate(model, 1.0, displacement=start)
+    body = run(model, 5e-4, 1.0, displacement=start, matchedStepSize=5e-4)
+    assert len(native.events) > 40
+    assert [(e.contact, e.kind) for e in body.events] == [(e.contact, e.kind) for e in native.events]
+    assert difference(body, native, POINTS) < 1e-7
+
+
+def test_matched_events_lie_inside_steps_at_native_times():
+    model, start = rig(COMPLIANT)
+    native = mp.simulate(model, 0.2, displacement=start)
+    body = run(model, 5e-4, 0.2, displacement=start, matchedStepSize=5e-4)
+    assert np.allclose([e.time for e in body.events], [e.time for e in native.events], rtol=0, atol=1e-9)
+    assert np.allclose([e.energy_loss for e in body.events], [e.energy_loss for e in native.events], rtol=1e-6)
+    assert np.allclose(body.contact_intervals["support"], native.contact_intervals("support"), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", [RADIUS_ONE, TRAPEZOIDAL])
+@pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])
+def test_plain_modes_converge_to_native_with_second_order(stiffness, solver):
+    model, start = rig(stiffness)
+    native = mp.simulate(model, 0.1, displacement=start)
+    steps = [4e-5, 2e-5, 1e-5, 5e-6]
+    errors = [difference(run(model, h, 0.1, solver, displacement=start), native, POINTS) for h in steps]
+    assert np.all(observed_orders(errors) >= 1.8)
+    assert errors[-1] < 1e-5
+
+
+def test_histories_hold_gap_force_and_velocity_of_native():
+    model, start = rig(math.inf)
+    native = mp.simulate(model, 0.1, displacement=start)
+    body = run(model, 5e-4, 0.1, displacement=start, matchedStepSize=5e-4)
+    times = np.minimum(body.time, native.t_end)
+    velocity = np.array([model.structure.row("node3") @ native.velocity(t) for t in times])
+    assert np.any(body.closed["support"])
+    for ours, theirs in (
+        (body.gaps["support"], native.gap("support", times)),
+        (body.contact_force["support"], native.contact_force("support", times)),
+        (body.velocities["node3"], velocity),
+    ):
+        assert np.max(np.abs(ours - theirs)) < 1e-7 * np.max(np.abs(theirs))
+
+
+def test_constant_load_and_start_on_the_stop():
+    model, _ = rig(COMPLIANT)
+    load = mp.ConstantLoad("node3", -2.0)
+    start = model.static_equilibrium({"node3": -20.0})
+    native = mp.simulate(model, 0.2, displacement=start, loads=[load])
+    body = run(model, 5e-4, 0.2, displacement=start, loads=[load], matchedStepSize=5e-4)
+    assert body.closed["support"][0]
+    assert native.events
+    assert difference(body, native, POINTS) < 1e-7
+
+
+def test_two_contacts_rigid_and_compliant_with_levels_of_unequal_size():
+    contacts = [mp.UnilateralContact("below", "m0", 2e-3), mp.UnilateralContact("above", {"m2": -1.0}, 3e-3, 1e5)]
+    damping = np.diag([0.3, 0.0, 1.0])  # couples the modes
+    model = chain(contacts, damping=damping)
+    start = {"displacement": np.array([0.0, 4e-3, 0.0]), "velocity": np.array([-1.0, 0.0, 1.0])}
+    native = mp.simulate(model, 0.5, **start)
+    body = run(model, 1e-3, 0.5, matchedStepSize=1e-3, **start)
+    assert {e.contact for e in native.events} == {"below", "above"}
+    assert [(e.contact, e.kind) for e in body.events] == [(e.contact, e.kind) for e in native.events]
+    assert difference(body, native, ["m0", "m1", "m2"]) < 1e-8
+
+
+def test_free_structure_falls_on_a_stop():
+    model = chain([mp.UnilateralContact("floor", "m0", 5e-3, 1e5)], grounded=False)
+    weight = mp.ConstantLoad({"m0": 1.0, "m1": 1.0, "m2": 1.0}, -9.81)
+    native = mp.simulate(model, 0.5, loads=[weight])
+    body = run(model, 1e-3, 0.5, loads=[weight], matchedStepSize=1e-3)
+    assert len(native.events) > 2
+    assert difference(body, native, ["m0", "m2"]) < 1e-8
+
+
+def test_without_contacts_nothing_is_switched():
+    model = chain([])
+    container, mbs = new_system()
+    items = mbs.CreateMultiPhiBody(model, displacement=np.array([1e-3, 0.0, 0.0]))
+    del container
+    assert "nGenericData" not in items
+    assert not mbs.GetPostStepUserFunction()
+
+
+# ---------------------------------------------------------------------- with forces of the system
+
+
+def pushed_and_held(mbs, items):
+    """A harmonic force on coordinate 0, a spring-damper from the ground to coordinate 1."""
+    first, second = (
+        mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=items["nGenericODE2"], coordinate=c)) for c in (0, 1)
+    )
+    ground = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=mbs.AddNode(NodePointGround()), coordinate=0))
+    mbs.AddLoad(
+        LoadCoordinate(markerNumber=first, load=1.0, loadUserFunction=lambda mbs, t, load: 20 * math.cos(90 * t))
+    )
+    mbs.AddObject(CoordinateSpringDamper(markerNumbers=[ground, second], stiffness=3e3, damping=5.0))
+
+
+def pushed_and_held_by_rk(model, times):
+    """The same, compliant contact, by scipy: an explicit integrator with its own event location."""
+    levels = {closed: model.level(("stop",) if closed else ()) for closed in (False, True)}
+    base, load = model.base, np.zeros(model.base.modes.count)
+    rests = {closed: level.asymptotic(load) for closed, level in levels.items()}
+
+    def rate(closed, t, z):
+        level, r = levels[closed], len(z) // 2
+        force = -(level.omega**2) * z[:r] - level.damping @ z[r:]
+        force[0] += 20 * math.cos(90 * t)
+        force[1] -= 3e3 * z[1] + 5.0 * z[r + 1]
+        return np.concatenate([z[r:], force])
+
+    def gap(closed, z):
+        level = levels[closed]
+        constant = base.directions.T @ rests[closed].configuration + base.gaps
+        return float((level.gap_rows @ z[: level.modes] + constant)[0])
+
+    def crossing(closed):
+        def event(t, z):
+            return gap(closed, z)
+
+        event.terminal, event.direction = True, (1 if closed else -1)
+        return event
+
+    closed, t, z, values, events = False, 0.0, np.zeros(2 * levels[False].modes), [], 0
+    while t < times[-1]:
+        wanted = times[times >= t]
+        part = solve_ivp(
+            functools.partial(rate, closed),
+            (t, times[-1]),
+            z,
+            "DOP853",
+            wanted,
+            events=crossing(closed),
+            rtol=1e-12,
+            atol=1e-14,
+        )
+        level, y = levels[closed], part.y[: levels[closed].modes]
+        values.append(base.modes.shapes @ (level.vectors @ y + rests[closed].configuration[:, None]))
+        t = times[-1]
+        if part.status == 1:
+            t, z = part.t_events[0][0], part.y_events[0][0]
+            source, target, r = levels[closed], levels[not closed], level.modes
+            move = target.vectors.T @ source.vectors
+            jump = target.vectors.T @ (rests[closed].configuration - rests[not closed].configuration)
+            z = np.concatenate([move @ z[:r] + jump, move @ z[r:]])
+            closed, events = not closed, events + 1
+    return np.hstack(values), events
+
+
+def test_forces_and_springs_on_the_coordinates_converge_to_another_integrator():
+    model = chain([mp.UnilateralContact("stop", "m2", 2e-3, 5e4)], damping=mp.RayleighDamping(1.0, 1e-4))
+    times = np.linspace(0, 0.4, 401)
+    expected, events = pushed_and_held_by_rk(model, times)
+    errors = []
+    for step in (1e-4, 5e-5, 2.5e-5, 1.25e-5):
+        body = run(model, step, 0.4, add=pushed_and_held)
+        errors.append(np.linalg.norm(body.points["m2"] - expected[2]) / np.linalg.norm(expected[2]))
+        assert len(body.events) == events
+    assert events >= 4
+    assert np.all(observed_orders(errors) >= 1.8)
+    assert errors[-1] < 2e-5
+
+
+def test_a_constant_force_on_a_matched_body_is_exact():
+    model = chain([mp.UnilateralContact("stop", "m2", 2e-3, 5e4)], damping=mp.RayleighDamping(1.0, 1e-4))
+
+    def push(mbs, items):
+        marker = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=items["nGenericODE2"], coordinate=0))
+        mbs.AddLoad(LoadCoordinate(markerNumber=marker, load=-30.0))
+
+    coarse, fine = (run(model, h, 0.3, add=push, matchedStepSize=h) for h in (1e-3, 1e-4))
+    assert len(fine.events) > 3
+    assert all(abs(event.energy_loss) < 1e-12 for event in fine.events)
+    same = fine.points["m2"][np.searchsorted(fine.time, coarse.time - 1e-6)]
+    assert np.linalg.norm(coarse.points["m2"] - same) < 1e-8 * np.linalg.norm(same)
+
+
+# ---------------------------------------------------------------------- beside others in one system
+
+
+def test_two_bodies_and_the_users_function_in_one_system():
+    (one, x1), (two, x2) = rig(COMPLIANT), rig(math.inf)
+    container, mbs = new_system()
+    seen = []
+    mbs.SetPostStepUserFunction(lambda mbs, t: seen.append(t) or True)
+    items = [CreateMultiPhiBody(mbs, model, displacement=x) for model, x in ((one, x1), (two, x2))]
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(1e-4, 0.1), solverType=TRAPEZOIDAL)
+    del container
+    assert len(seen) == 1001
+    assert list(mbs.variables["multiPhi"]) == ["multiPhi0", "multiPhi1"]
+    for item, model, x in zip(items, (one, two), (x1, x2), strict=True):
+        alone = run(model, 1e-4, 0.1, displacement=x)
+        together = body_histories(mbs, item)
+        assert len(together.events) == len(alone.events) > 5
+        assert np.allclose(together.points["node3"], alone.points["node3"], rtol=0, atol=1e-9)
+
+
+def test_a_function_set_later_is_found_out():
+    model, start = rig(COMPLIANT)
+    container, mbs = new_system()
+    CreateMultiPhiBody(mbs, model, displacement=start)
+    mbs.SetPostStepUserFunction(lambda mbs, t: True)
+    mbs.Assemble()
+    with pytest.raises(ValueError, match="replaced the switching of 'multiPhi0'"):
+        mbs.SolveDynamic(settings(1e-3, 0.01), solverType=TRAPEZOIDAL)
+    del container
+
+
+def closed_at(model, start):
+    """A time in the middle of the first contact."""
+    begin, end = mp.simulate(model, 0.2, displacement=start).contact_intervals("support")[0]
+    return round((begin + end) / 2, 4)
+
+
+def test_a_run_that_ended_closed_can_be_repeated_and_continued():
+    model, start = rig(COMPLIANT)
+    half = closed_at(model, start)
+    whole = run(model, 5e-5, 2 * half, displacement=start)
+    container, mbs = new_system()
+    items = CreateMultiPhiBody(mbs, model, displacement=start)
+    mbs.Assemble()
+    chosen = settings(5e-5, half)
+    mbs.SolveDynamic(chosen, solverType=TRAPEZOIDAL)
+    first = body_histories(mbs, items)
+    assert first.closed["support"][-1]
+    mbs.SolveDynamic(chosen, solverType=TRAPEZOIDAL, updateInitialValues=True)
+    again = body_histories(mbs, items)
+    assert np.array_equal(first.points["node3"], again.points["node3"])
+    chosen.timeIntegration.startTime, chosen.timeIntegration.endTime = half, 2 * half
+    mbs.SolveDynamic(chosen, solverType=TRAPEZOIDAL)
+    rest = body_histories(mbs, items)
+    del container
+    assert rest.contact_intervals["support"][0][0] == pytest.approx(half)
+    assert rest.points["node3"][-1] == pytest.approx(whole.points["node3"][-1], abs=1e-9)
+
+
+def test_a_static_solution_keeps_the_level():
+    model, start = rig(COMPLIANT)
+    container, mbs = new_system()
+    items = CreateMultiPhiBody(mbs, model, displacement=start)
+    mbs.Assemble()
+    mbs.SolveStatic(settings(1.0, 1.0))
+    coordinates = mbs.GetNodeOutput(items["nGenericODE2"], exu.OutputVariableType.Coordinates)
+    flags = mbs.GetNodeOutput(items["nGenericData"], exu.OutputVariableType.Coordinates)
+    del container
+    assert np.max(np.abs(coordinates)) < 1e-8
+    assert np.array_equal(flags, [0.0, 0.0])
+
+
+# ---------------------------------------------------------------------- what is refused
+
+
+def solve(model, start, chosen, store=True, solver=RADIUS_ONE, **given):
+    container, mbs = new_system()
+    CreateMultiPhiBody(mbs, model, displacement=start, **given)
+    mbs.Assemble()
+    mbs.SolveDynamic(chosen, solverType=solver, storeSolver=store)
+    del container
+
+
+@pytest.mark.parametrize(
+    ("said", "radius", "given"),
+    [
+        ("spectralRadius: got 0.9, need 1", 0.9, {}),
+        ("matchedStepSize of 'multiPhi0': got 0.0002 s", 1.0, {"matchedStepSize": 2e-4}),
+        ("need storeSolver=True", 1.0, {"store": False}),
+        ("need GeneralizedAlpha or TrapezoidalIndex2", 1.0, {"solver": exu.DynamicSolverType.RK44}),
+    ],
+)
+def test_settings_under_which_it_would_be_wrong_are_refused(said, radius, given):
+    model, start = rig(COMPLIANT)
+    with pytest.raises(ValueError, match=said):
+        solve(model, start, settings(1e-3, 0.01, radius), **given)
+
+
+def test_bad_arguments_are_refused(refused):
+    model, start = rig(COMPLIANT)
+    container, mbs = new_system()
+    refused(TypeError, "model:", CreateMultiPhiBody, mbs, "rig")
+    refused(ValueError, "displacement:", CreateMultiPhiBody, mbs, model, displacement=start[:-1])
+    refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=1e-2)
+    refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=-1e-4)
+    refused(TypeError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize="h")
+    CreateMultiPhiBody(mbs, model, name="beam")
+    refused(ValueError, "name:", CreateMultiPhiBody, mbs, model, name="beam")
+    refused(ValueError, "items:", body_histories, mbs, {})
+    del container
+
+
+# ---------------------------------------------------------------------- the example
+
+
+def test_the_example_inside_exudyn_agrees_with_the_model_on_its_own(capsys):
+    path = Path(__file__).parents[1] / "examples" / "inside_exudyn.py"
+    body, distance = runpy.run_path(str(path))["main"]()
+    assert len(body.events) > 40
+    assert distance < 1e-7
+    assert f"{len(body.events)} events" in capsys.readouterr().out
