@@ -34,7 +34,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State
+from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 
 __all__ = ["EventRule"]
@@ -240,9 +240,9 @@ class EventRule:
         The same function as ``entered_function``: a refused contact asks where that one says it may.
         """
         own, move = self.function(level, contact), self.transition(state.level, level)
-        rate = own.rate @ self.transition(struck.level, level).matrix
-        seen = Row(own.position @ move.matrix, rate, own.constant + float(own.position @ move.offset))
-        return seen.sign(state.displacement, struck.velocity) < 0
+        pushed = (own.position @ move.matrix) * state.displacement
+        damped = (own.rate @ self.transition(struck.level, level).matrix) * struck.velocity
+        return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset)) < 0
 
     def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
         """Displacement straight from the level before the impact, velocity from the one it was computed in."""

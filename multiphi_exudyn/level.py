@@ -288,7 +288,7 @@ def _rigid_body_modes(base: Base, directions: np.ndarray) -> int:
     if rigid.size == 0:
         return base.modes.rigid
     singular = np.linalg.svd(rigid, compute_uv=False)
-    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * np.linalg.norm(directions, axis=0).max()))
+    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * _largest_norm(directions)))
 
 
 def _reaction_rows(
@@ -330,7 +330,7 @@ def _rest(
     compliance = base.modes.omega[elastic] ** -2.0
     touching = directions[elastic]
     flexibility = touching.T @ (compliance[:, None] * touching) + np.diag(1 / stiffness)
-    carried = _range(directions[: base.modes.rigid])
+    carried = _range(directions[: base.modes.rigid], INDEPENDENT * _largest_norm(directions))
     coupling = directions[: base.modes.rigid].T @ carried
     matrix = np.block([[flexibility, coupling], [coupling.T, np.zeros((carried.shape[1],) * 2)]])
     given = np.concatenate([-gaps - touching.T @ (compliance * load[elastic]), -carried.T @ load[: base.modes.rigid]])
@@ -340,9 +340,13 @@ def _rest(
     return forces, configuration
 
 
-def _range(matrix: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of the column space."""
+def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:
+    """Orthonormal basis of the column space, singular values up to ``negligible`` taken for zero."""
     if matrix.size == 0:
         return np.zeros((matrix.shape[0], 0))
     left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
-    return left[:, singular > INDEPENDENT * singular[0]] if singular[0] > 0 else left[:, :0]
+    return left[:, singular > negligible]
+
+
+def _largest_norm(directions: np.ndarray) -> float:
+    return float(np.linalg.norm(directions, axis=0).max(initial=0.0))

@@ -12,7 +12,7 @@ from multiphi_exudyn.first_root import ZERO, Signals
 from multiphi_exudyn.modal_response import ModalResponse
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["Change", "Event", "Loss", "Phase", "Row", "SignalTable", "State"]
+__all__ = ["Change", "Event", "Loss", "Phase", "Row", "SignalTable", "State", "sign_of"]
 
 
 class Phase(Enum):
@@ -122,19 +122,20 @@ class Row:
     def sign(self, displacement: np.ndarray, velocity: np.ndarray) -> int:
         """Sign of the value, zero where it is round-off of its terms."""
         terms = self.position * displacement
-        return _sign(terms + self.rate * velocity if self._rated else terms, self.constant)
+        return sign_of(terms + self.rate * velocity if self._rated else terms, self.constant)
 
     def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray) -> int:
         """Sign of the time derivative, zero where it is round-off of its terms."""
         terms = self.position * velocity
-        return _sign(terms + self.rate * acceleration if self._rated else terms, 0.0)
+        return sign_of(terms + self.rate * acceleration if self._rated else terms, 0.0)
 
     @functools.cached_property
     def _rated(self) -> bool:
         return bool(np.any(self.rate))
 
 
-def _sign(terms: np.ndarray, constant: float) -> int:
+def sign_of(terms: np.ndarray, constant: float) -> int:
+    """Sign of a sum, zero where it is round-off of its terms."""
     values = terms.tolist()
     value = sum(values) + constant
     if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant)):
