@@ -31,7 +31,7 @@ from multiphi_exudyn.study.workbench import prepare
 
 __all__ = ["main"]
 
-OK, FAILED, BAD_INPUT = 0, 1, 2
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,6 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MultiPhiError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 class _OneLineParser(argparse.ArgumentParser):
@@ -150,9 +153,9 @@ def _replace(path: Path, content: bytes) -> None:
 def _tell(comparison: Comparison, folder: Path) -> None:
     until = comparison.headline_window
     width = max(map(len, comparison.runs))
+    print(f"{'model':{width}}  {'status':6}  {'online':>9}  {'faster':>10}  NRMSE to {until:g} s")
     for name, run in comparison.runs.items():
-        error = percent(comparison.worst_error(run, until)) if name in comparison.measured else "reference"
-        line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>8}  {error if run.ok else run.message}"
+        error = percent(comparison.worst_error(run, until)) if name in comparison.measured else "the reference"
+        line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
         print(f"{name:{width}}  {run.status:6}  {line}")
-    print(findings(comparison).outcome)
-    print(folder / "report.html")
+    print(f"\n{findings(comparison).outcome}\n{folder / 'report.html'}")

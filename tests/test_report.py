@@ -34,7 +34,7 @@ ENVIRONMENT = {"python": "3", "versions": {"numpy": "2"}, "import_s": {"exudyn":
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    data = changed(["models"], MODELS) | {"comparison": PARTS}
+    data = changed(["outputs", "points"], ["middle", "tip"]) | {"models": MODELS, "comparison": PARTS}
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", data))
     return prepare(scene, mechanics_of(scene))
 
@@ -56,7 +56,7 @@ def drawn(bench, name, share, online_s):
         f"model {name}, {'rigid' if name.startswith('rigid') else 'compliant'} levels",
         dofs=6,
         time=bench.time,
-        points={"tip": (1 + share) * tip},
+        points={"tip": (1 + share) * tip, "middle": (1 + share / 2) * tip},
         gaps={"stop": 1e-3 + tip},
         contact_force={"stop": np.maximum(0, -tip)},
         contact_intervals={"stop": np.array([[0.03, 0.032], [0.034, 0.04]])},
@@ -84,7 +84,7 @@ def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
     found = findings(comparison)
     assert "until tip stands at +10 mm" in found.compared
     assert "stop (gap 1 mm, 100 kN/m)" in found.compared
-    assert "differs from the reference by 2.00 % to 0.1 s" in found.outcome
+    assert "by 2.00 % to 0.1 s (NRMSE, worst of middle and tip)" in found.outcome
     assert "takes 10 ms instead of 10 s: 1000 times faster" in found.outcome
     doubts = " ".join(found.distrust)
     assert "coarser copy of itself by 1.00 % to 0.1 s" in doubts
@@ -106,7 +106,7 @@ def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):
 
 def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
     sources = re.findall(r'src="([^"]*)"', page)
-    assert len(sources) == 5  # one point, error over time, contact, energy, modes
+    assert len(sources) == 6  # two points, error over time, contact, energy, modes
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
     assert not re.search(r"href=|url\(|<script|http", page)
 
@@ -138,6 +138,15 @@ def test_the_histories_are_arrays_on_one_grid(comparison):
     arrays = histories(comparison)
     assert arrays["rigid-r6/point/tip"].shape == arrays["time"].shape
     assert {"full/gap/stop", "full/force/stop", "full/energy", "full/energy_time"} <= set(arrays)
+
+
+def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(comparison):
+    def with_end(t_end):
+        time = 1e-3 * np.arange(round(t_end / 1e-3) + 1)
+        return replace(comparison, bench=replace(comparison.bench, time=time))
+
+    assert [with_end(t_end).windows for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
+    assert [with_end(t_end).headline_window for t_end in (0.05, 0.3, 1.0)] == [0.05, 0.3, 0.3]
 
 
 def test_a_failed_model_is_a_row_with_its_cause(comparison):

@@ -20,6 +20,8 @@ from multiphi_exudyn.study.workbench import Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]
 
+ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -56,12 +58,13 @@ class Comparison:
     def windows(self) -> tuple[float, ...]:
         """Ends [s] of the windows in which errors are given, ascending; the last is the end of the run."""
         end = self.bench.t_end
-        return (*(w for w in sorted(self.bench.scene.file.outputs.windows) if w < end), end)
+        return (*(w for w in sorted(self.bench.scene.file.outputs.windows) if w < ROUND_OFF * end), end)
 
     @property
     def headline_window(self) -> float:
-        """The window the headline figures speak of: the longest before the end of the run."""
-        return self.windows[-2] if len(self.windows) > 1 else self.windows[-1]
+        """The window the headline figures speak of: the longest the scene names that fits into the run."""
+        end = self.bench.t_end
+        return max((w for w in self.bench.scene.file.outputs.windows if w <= end / ROUND_OFF), default=end)
 
     def error(self, run: ModelRun, point: str, until: float) -> float:
         """NRMSE of a point to the reference from 0 to ``until`` [s]."""

@@ -1,0 +1,139 @@
+"""Runs of one scene's models: the start, the shared damping, and models that have to agree."""
+
+import numpy as np
+import pytest
+from small_scene import changed, write
+
+from multiphi_exudyn import ModalDamping, MultiPhiModel, NumericalFailure, RayleighDamping, planar_beam
+from multiphi_exudyn.study.mechanics import mechanics_of
+from multiphi_exudyn.study.metrics import nrmse
+from multiphi_exudyn.study.runners import run_model
+from multiphi_exudyn.study.scenes import load_scene
+from multiphi_exudyn.study.workbench import damping_matrix, prepare, start_configuration
+from reference_models.rig import rig_beam
+
+MODELS = [
+    {"kind": "full", "name": "full", "elements": 6, "step": 1e-4},
+    {"kind": "reduced", "name": "all", "modes": "all"},
+    {"kind": "reduced", "name": "compliant"},
+    {"kind": "user-object", "name": "body", "step": 1e-4},
+    {"kind": "user-object", "name": "coarse-body", "step": 4e-4},
+    {"kind": "reduced", "name": "rigid", "contact": "rigid"},
+]
+
+
+def bench_of(folder, **fields):
+    data = changed(["damping"], {"modal_ratios": [0.05], "beyond": 0.05}) | {"models": MODELS}
+    data |= {"comparison": {"reference": "full"}, "outputs": {"t_end": 0.12, "interval": 1e-4}} | fields
+    scene = load_scene(write(folder / "scene.toml", data))
+    return prepare(scene, mechanics_of(scene))
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    return bench_of(tmp_path_factory.mktemp("scene"))
+
+
+@pytest.fixture(scope="module")
+def runs(bench):
+    return {name: run_model(bench, name, progress=False) for name in bench.scene.models}
+
+
+def difference(runs, one, other, until=0.12):
+    return max(nrmse(runs[one].points[p], runs[other].points[p], runs[one].time, until) for p in ("middle", "tip"))
+
+
+def test_every_model_runs_to_the_end_on_one_grid_and_meets_the_stop(runs):
+    assert [run.message for run in runs.values()] == [""] * len(runs)
+    for run in runs.values():
+        assert len(run.points["tip"]) == len(run.gaps["stop"]) == len(run.time) == 1201
+        assert run.contact_intervals["stop"].shape[1] == 2
+        assert len(run.contact_intervals["stop"]) > 0
+        assert run.impulse["stop"] > 0
+        assert run.online_s > 0
+
+
+def test_full_and_linear_model_share_start_matrices_and_damping(tmp_path):
+    """Off the stop nothing but large displacements is left between them: a difference that falls with the start."""
+    errors = []
+    for displacement in (1e-3, 1e-4):
+        start = {"load_at": "tip", "measured_at": "tip", "displacement": displacement}
+        bench = bench_of(tmp_path, start=start)
+        runs = {name: run_model(bench, name, progress=False) for name in ("full", "all")}
+        assert len(runs["full"].contact_intervals["stop"]) == 0
+        errors.append(difference(runs, "all", "full"))
+    assert errors[0] < 2e-4
+    assert errors[1] < 2e-5
+
+
+def test_a_body_in_exudyn_answers_as_the_model_by_itself(runs):
+    assert difference(runs, "body", "compliant") < 1e-9
+    np.testing.assert_allclose(
+        runs["body"].contact_intervals["stop"], runs["compliant"].contact_intervals["stop"], atol=1e-9
+    )
+    assert runs["body"].impulse["stop"] == pytest.approx(runs["compliant"].impulse["stop"], rel=1e-2)
+
+
+def test_a_body_with_a_coarse_step_is_put_on_the_common_grid(runs):
+    assert difference(runs, "coarse-body", "compliant") < 2e-5
+
+
+def test_rigid_levels_have_another_contact_law(runs):
+    assert runs["rigid"].ledger["impact"] > 0 == runs["compliant"].ledger["impact"]
+    assert difference(runs, "rigid", "compliant") > 1e-3
+
+
+@pytest.mark.parametrize("displacement", [0.01, -0.01])
+def test_the_start_reaches_its_displacement_with_the_right_contacts_closed(tmp_path, displacement):
+    start = {"load_at": "tip", "measured_at": "tip", "displacement": displacement}
+    bench = bench_of(tmp_path, start=start)
+    for rigid in (False, True):
+        model = MultiPhiModel(bench.structure, bench.contacts(rigid))
+        x = start_configuration(bench, model)
+        gap = bench.structure.row("middle") @ x + 1e-3
+        assert bench.structure.row("tip") @ x == pytest.approx(displacement, rel=1e-9)
+        assert gap > 1e-3 if displacement > 0 else gap <= 1e-12
+
+
+def test_a_start_by_force_is_the_static_equilibrium_for_every_model(tmp_path):
+    bench = bench_of(tmp_path, start={"load_at": "tip", "force": 2.0})
+    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False))
+    expected = bench.structure.row("tip") @ model.static_equilibrium({"tip": 2.0})
+    for name in ("full", "all"):
+        assert run_model(bench, name, progress=False).points["tip"][0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_start_that_no_force_reaches_is_a_failed_run_with_its_cause(tmp_path):
+    """Pressed onto the stop from above, the tip beyond it rises again."""
+    beam = {"points": {"inside": 0.15, "middle": 0.3, "tip": 0.5}}
+    start = {"load_at": "inside", "measured_at": "tip", "displacement": -0.05}
+    data = changed(["structure", "beam", "points"], beam["points"]) | {"start": start}
+    bench = bench_of(tmp_path, structure=data["structure"], start=start)
+    with pytest.raises(NumericalFailure, match=r"no force at inside moves tip by -0\.05 m"):
+        start_configuration(bench, MultiPhiModel(bench.structure, bench.contacts(rigid=False)))
+    run = run_model(bench, "compliant", progress=False)
+    assert run.status == "failed"
+    assert "no force at inside" in run.message
+
+
+def test_the_damping_matrix_has_the_ratios_it_was_given():
+    given = ModalDamping((0.04, 0.02), beyond=0.01)
+    structure = planar_beam(rig_beam(), 10, given)
+    values = np.sort_complex(np.linalg.eigvals(_first_order(structure, damping_matrix(structure))))
+    ratios = sorted((-v.real / abs(v), abs(v)) for v in values if v.imag > 0)
+    by_frequency = [ratio for ratio, _ in sorted(ratios, key=lambda pair: pair[1])]
+    np.testing.assert_allclose(by_frequency[:5], [0.04, 0.02, 0.01, 0.01, 0.01], rtol=1e-4)
+
+
+def test_rayleigh_damping_is_its_sum_and_a_matrix_is_itself():
+    structure = planar_beam(rig_beam(), 10, RayleighDamping(0.3, 2e-5))
+    expected = 0.3 * structure.mass + 2e-5 * structure.stiffness
+    np.testing.assert_allclose(damping_matrix(structure), expected)
+    assert damping_matrix(planar_beam(rig_beam(), 10)) is None
+    assert np.array_equal(damping_matrix(planar_beam(rig_beam(), 10, expected)), expected)
+
+
+def _first_order(structure, damping):
+    inverse = np.linalg.inv(structure.mass)
+    zero, one = np.zeros_like(inverse), np.eye(len(inverse))
+    return np.block([[zero, one], [-inverse @ structure.stiffness, -inverse @ damping]])
