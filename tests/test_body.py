@@ -18,6 +18,9 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+from multiphi_exudyn.exudyn_plugin.step_test import Lookahead
+from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.transition import LoadedLevel
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 RADIUS_ONE = exu.DynamicSolverType.GeneralizedAlpha
@@ -178,6 +181,34 @@ def test_without_contacts_nothing_is_switched():
     del container
     assert "nGenericData" not in items
     assert not mbs.GetPostStepUserFunction()
+
+
+@pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])
+def test_looking_ahead_changes_nothing(stiffness):
+    model, start = rig(stiffness)
+    ahead = run(model, 5e-5, 0.2, displacement=start)
+    every = run(
+        model, 5e-5, 0.2, displacement=start, add=lambda mbs, items: mbs.SetPreStepUserFunction(lambda *_: True)
+    )
+    assert [e.time for e in ahead.events] == pytest.approx([e.time for e in every.events], abs=1e-10)
+    assert np.allclose(ahead.points["node3"], every.points["node3"], rtol=0, atol=1e-9)
+
+
+def test_lookahead_steps_as_exudyn_does():
+    model = chain([], damping=np.diag([0.3, 0.0, 1.0]))
+    container, mbs = new_system()
+    items = CreateMultiPhiBody(mbs, model, displacement=np.array([1e-3, 0.0, 0.0]))
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(1e-3, 0.05), solverType=TRAPEZOIDAL)
+    table = [
+        mbs.GetSensorStoredData(items[key])[:, 1:] for key in ("sCoordinates", "sCoordinates_t", "sCoordinates_tt")
+    ]
+    del container
+    states = np.hstack([*table, np.ones((len(table[0]), 1))])
+    loaded = LoadedLevel.of(model.level(), np.zeros(3))
+    lookahead = Lookahead(SteppedLevel.of(loaded, 3, None), [], 1e-3)
+    reached = lookahead.after(states[5], 20)
+    assert np.allclose(reached, states[25], rtol=0, atol=1e-9 * np.max(np.abs(states)))
 
 
 # ---------------------------------------------------------------------- with forces of the system

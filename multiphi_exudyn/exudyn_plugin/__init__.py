@@ -6,7 +6,8 @@ On import the Create function is also bound to Exudyn's systems, as ``mbs.Create
 from __future__ import annotations
 
 from multiphi_exudyn.exudyn_plugin.binding import bind
-from multiphi_exudyn.exudyn_plugin.body import CreateMultiPhiBody, MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
 

@@ -16,72 +16,28 @@ A load or connector at coordinate k of the node acts on mode k of whichever leve
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGenericODE2, VObjectGenericODE2
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
-from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
-from multiphi_exudyn.exudyn_plugin.step_test import StepTest
+from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.switching import bodies_of, running_solver
-from multiphi_exudyn.loads import ConstantLoad
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.simulate import CHATTER_WINDOW, Motion, simulate
+from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
+from multiphi_exudyn.simulate import CHATTER_WINDOW, Motion
 from multiphi_exudyn.state import Event, Phase, State
-from multiphi_exudyn.structure import is_real
 
-__all__ = ["CreateMultiPhiBody", "MultiPhiBody"]
+__all__ = ["MultiPhiBody", "flags", "matrices"]
 
 NEGLIGIBLE = 1e-9  # of the elastic forces: what Newton's iterations leave unbalanced is no modal force
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
-SHORTEST = 1e-12  # s: end of the run by which a start is checked and put into its level
+LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
 PHASES = tuple(Phase)
-
-
-def CreateMultiPhiBody(
-    mbs: Any,
-    model: MultiPhiModel,
-    name: str = "",
-    displacement: np.ndarray | None = None,
-    velocity: np.ndarray | None = None,
-    loads: Sequence[ConstantLoad] = (),
-    matchedStepSize: float | None = None,
-    show: bool = True,
-) -> dict[str, Any]:
-    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
-
-    mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: constant loads on the structure.
-    matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
-    with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
-    stepped_level.py. show: as in other Create functions.
-
-    Returns typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
-    sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
-    and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
-    """
-    bodies = bodies_of(mbs)
-    name = name or next(f"multiPhi{i}" for i in itertools.count() if f"multiPhi{i}" not in bodies)
-    if name in bodies:
-        raise MultiPhiValueError(f"name: got {name!r}, which this system has already, need another one")
-    if not isinstance(model, MultiPhiModel):
-        raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
-    _check_step(matchedStepSize)
-    body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), matchedStepSize)
-    body.items.update(_add_items(mbs, body, show))
-    body.items.update(add_sensors(mbs, body))
-    bodies[name] = body
-    if model.contacts or matchedStepSize is not None:
-        bodies.install(mbs)
-    return dict(body.items)
 
 
 class MultiPhiBody:
@@ -101,8 +57,10 @@ class MultiPhiBody:
         self._size = self._rule.level(()).level.modes
         self._state = motion.state
         self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
-        self._tests: dict[tuple[int, ...], StepTest] = {}
+        self._tests: dict[tuple[int, ...], tuple[StepTest, Lookahead]] = {}
         self._step = self._rounding = self._ahead = self._speed = math.nan
+        self._alone, self._clear, self._wait = False, 0, 0
+        self._x = np.zeros(0)
         self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
         self._in_solver = self._stepped(motion.state.closed)
         self._given = self._in_solver.state(motion.state.displacement, motion.state.velocity, np.zeros(self._size))
@@ -133,15 +91,23 @@ class MultiPhiBody:
         """Called by Exudyn when a step is done, and at the start."""
         if not abs(t - self.time - self._step) <= self._rounding and not self._is_step(mbs, t):
             return
+        self.time, begun = t, self.time
+        if self._clear:
+            self._clear -= 1
+            if not self._clear:
+                self._sample()
+            return
         x = self._read()
         least, ahead, speed = self._test.at(x)
         limit = speed if speed > self._speed else self._speed
-        if least > limit and self._ahead > limit:
-            self._x, self._ahead, self._speed = x, ahead, speed
-        else:
-            self._repeat(mbs, t, self._x, x)
+        if not (least > limit and self._ahead > limit):
+            self._repeat(mbs, begun, self._x, x)
             self._sample()
-        self.time = t
+            return
+        self._x, self._ahead, self._speed = x, ahead, speed
+        self._wait -= 1
+        if not self._wait:
+            self._look_ahead()
 
     def _read(self) -> np.ndarray:
         """A copy x = (q, q', q'', 1) of the present state, good until the next but one."""
@@ -161,6 +127,9 @@ class MultiPhiBody:
             return False
         if not t > self.time:
             return False  # called twice
+        if self._clear:
+            self._x = self._lookahead.after(self._x, self._lookahead.steps - self._clear)
+            self._clear = 0
         self._take_step(t - self.time)
         return True
 
@@ -182,13 +151,21 @@ class MultiPhiBody:
         _, self._ahead, self._speed = self._test.at(self._x)
         if any(phase is not Phase.ARMED for phase in self._state.phases):
             self._ahead = -math.inf  # what ends such a phase is looked for exactly
+        elif self._alone:
+            self._look_ahead()
 
-    def _repeat(self, mbs: Any, t: float, before: np.ndarray, after: np.ndarray) -> None:
+    def _look_ahead(self) -> None:
+        """Skip the test of steps that are clear already; only for a body on which nothing acts."""
+        clear = self._lookahead.clear(self._x, self._speed)
+        self._clear = self._lookahead.steps if clear else 0
+        self._wait = LOOK_AGAIN
+
+    def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
         own, start, known = self._in_solver, self._state, len(self.events)
         force = (own.force(*self._split(before)) + own.force(*self._split(after))) / 2
         force = self._significant(force)
-        state = self._travel(before, t, force, force)
+        state = self._travel(before, begun, force, force)
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
             return
@@ -198,15 +175,15 @@ class MultiPhiBody:
         if np.any(present != force):
             del self.events[known:]
             self._state = start
-            self._write(mbs, self._travel(before, t, force, present), present)
+            self._write(mbs, self._travel(before, begun, force, present), present)
 
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q', q'' of x = (q, q', q'', 1)."""
         s = self._size
         return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
-    def _travel(self, before: np.ndarray, t: float, force: np.ndarray, entered: np.ndarray) -> State:
-        """State at t of the exact motion under ``force`` in the present level and ``entered`` in others."""
+    def _travel(self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray) -> State:
+        """State now, of the exact motion from ``before`` under ``force`` in its level and ``entered`` in others."""
         closed, motion, rule = self._state.closed, self._motion, self._rule
         if np.any(force) or np.any(entered):
             rule = ForcedRule(rule, lambda level: force if level == closed else entered)
@@ -214,8 +191,8 @@ class MultiPhiBody:
         loaded = rule.level(closed)
         r, eta_t = loaded.level.modes, self._stepped(closed).velocity(q, q_t, force)
         motion.state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
-        motion.rule, motion.time = rule, self.time
-        motion.advance(t)
+        motion.rule, motion.time = rule, begun
+        motion.advance(self.time)
         if motion.message:
             raise NumericalFailure(f"body {self.name!r}: {motion.message}")
         motion.segments.pop()  # those that remain end with events: the chatter check counts them
@@ -243,6 +220,8 @@ class MultiPhiBody:
         """Take state and level from the system as it stands at the start of a run."""
         self._check_settings(mbs)
         self._attach(mbs)
+        self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
+        self._clear = self._wait = 0
         self._motion.segments.clear()
         own, (q, q_t, q_tt) = self._in_solver, self._views
         closed, phases = self._stored_level()
@@ -306,7 +285,7 @@ class MultiPhiBody:
     def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
         """Give the solver the matrices of a level."""
         stepped = self._in_solver = self._stepped(closed)
-        for parameter, value in _matrices(stepped).items():
+        for parameter, value in matrices(stepped).items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
@@ -318,14 +297,15 @@ class MultiPhiBody:
         self._state = state
         self._choose_test()
         if "nGenericData" in self.items:
-            self._data[:] = _flags(state)
+            self._data[:] = flags(state)
 
     def _choose_test(self) -> None:
         closed = self._state.closed
         if closed not in self._tests:
             rows = [self._rule.function(self._state.level, contact) for contact in range(len(self.model.contacts))]
-            self._tests[closed] = StepTest(self._stepped(closed), rows, self._step)
-        self._test = self._tests[closed]
+            given = self._stepped(closed), rows, self._step
+            self._tests[closed] = StepTest(*given), Lookahead(*given)
+        self._test, self._lookahead = self._tests[closed]
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
         if closed not in self._stepped_levels:
@@ -340,65 +320,17 @@ class MultiPhiBody:
         return tuple(np.flatnonzero(closed > 0.5).tolist()), tuple(PHASES[round(p)] for p in phases.tolist())
 
 
-def _flags(state: State) -> list[float]:
+def flags(state: State) -> list[float]:
+    """Coordinates of the data node."""
     closed = [float(contact in state.closed) for contact in range(len(state.phases))]
     return closed + [float(PHASES.index(phase)) for phase in state.phases]
 
 
-def _matrices(stepped: SteppedLevel) -> dict[str, np.ndarray]:
+def matrices(stepped: SteppedLevel) -> dict[str, np.ndarray]:
+    """Parameters of the ObjectGenericODE2."""
     return {
         "massMatrix": stepped.mass,
         "dampingMatrix": stepped.damping,
         "stiffnessMatrix": stepped.stiffness,
         "forceVector": stepped.drive,
     }
-
-
-def _check_step(step: float | None) -> None:
-    if step is None:
-        return
-    if not is_real(step):
-        raise MultiPhiTypeError(f"matchedStepSize: got {step!r}, need a step size in s or None")
-    if not (math.isfinite(step) and step > 0):
-        raise MultiPhiValueError(f"matchedStepSize: got {step!r}, need a step size > 0 s or None")
-
-
-def _motion(
-    model: MultiPhiModel,
-    displacement: np.ndarray | None,
-    velocity: np.ndarray | None,
-    loads: Sequence[ConstantLoad],
-) -> Motion:
-    """A motion at its start, checked as ``simulate`` checks it."""
-    start = simulate(model, SHORTEST, displacement, velocity, loads)
-    motion = Motion(model, model.rules[start.load.tobytes()], start.start)
-    if motion.message:
-        raise NumericalFailure(motion.message)
-    return motion
-
-
-def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
-    stepped, (q, q_t) = body.stepped_level(body.state.closed), body.start
-    node = mbs.AddNode(
-        NodeGenericODE2(
-            name=f"Node:{body.name}",
-            referenceCoordinates=np.zeros(stepped.size),
-            initialCoordinates=q,
-            initialCoordinates_t=q_t,
-            numberOfODE2Coordinates=stepped.size,
-        )
-    )
-    items = {"nGenericODE2": node}
-    items["oGenericODE2"] = mbs.AddObject(
-        ObjectGenericODE2(
-            name=body.name, nodeNumbers=[node], **_matrices(stepped), visualization=VObjectGenericODE2(show=show)
-        )
-    )
-    if body.model.contacts:
-        flags = _flags(body.state)
-        items["nGenericData"] = mbs.AddNode(
-            NodeGenericData(
-                name=f"Node:{body.name}.level", initialCoordinates=flags, numberOfDataCoordinates=len(flags)
-            )
-        )
-    return items

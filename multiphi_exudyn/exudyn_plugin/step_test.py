@@ -8,6 +8,9 @@ h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(omega, I). |S z'| is an energy norm of the
 velocities: under a constant force it cannot grow, so the values at the two ends bound it in between, whatever
 that force is. What fails the test is looked at exactly (body.py): the test may not decide, but it does not err.
+
+The states ahead of a body on which nothing acts are powers of the trapezoidal rule's matrix times the present one,
+so that one product answers for many steps at once (Lookahead).
 """
 
 from __future__ import annotations
@@ -20,28 +23,20 @@ from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.first_root import HERMITE
 from multiphi_exudyn.state import Row
 
-__all__ = ["StepTest"]
+__all__ = ["Lookahead", "StepTest"]
+
+KNOTS = 8  # intervals a lookahead is divided into
+SPACING = 0.5  # rad, the phase of the highest mode in one of them
 
 
 class StepTest:
-    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s].
-
-    Every function is divided by the factor of max |S z'| in its condition, so that all have the same right-hand side.
-    """
+    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s]."""
 
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
-        level, size, count = stepped.loaded.level, stepped.size, len(rows)
-        along, rate = np.zeros((count, size)), np.zeros((count, size))
-        along[:, : level.modes] = np.reshape([row.position for row in rows], (count, level.modes))
-        rate[:, : level.modes] = np.reshape([row.rate for row in rows], (count, level.modes))
-        omega, none = np.sqrt(np.diagonal(stepped.stiffness)), np.zeros((count, size))
-        scale = HERMITE * step**4 * _bounds(stepped, np.hstack([along, rate]), omega) + np.finfo(float).tiny
-        value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-        norm = np.hstack([np.zeros((2 * size, size)), np.diag(np.concatenate([omega, np.ones(size)]))])
-        conditions = np.vstack([value - third, value, value + third]) / np.tile(scale, 3)[:, None]
-        constants = np.tile(np.array([row.constant for row in rows]) / scale, 3)
-        matrix = np.vstack([conditions, norm]) @ stepped.physical
-        self._matrix = np.hstack([matrix, np.concatenate([constants, np.zeros(2 * size)])[:, None]])
+        size, count = stepped.size, len(rows)
+        scaled = np.concatenate([_omega(stepped), np.ones(size)])[:, None] * stepped.physical[size:]
+        norm = np.hstack([scaled, np.zeros((2 * size, 1))])
+        self._matrix = np.vstack([_conditions(stepped, rows, step), norm])
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
     def at(self, x: np.ndarray) -> tuple[float, float, float]:
@@ -59,10 +54,69 @@ class StepTest:
         return min(conditions[: self._two], default=math.inf), min(conditions[self._one :], default=math.inf), speed
 
 
-def _bounds(stepped: SteppedLevel, functionals: np.ndarray, omega: np.ndarray) -> np.ndarray:
+class Lookahead:
+    """The test for many steps of a body on which nothing acts. steps: how many."""
+
+    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
+        each = max(1, int(SPACING / (np.max(_omega(stepped)) * step)))
+        self.steps = KNOTS * each
+        conditions, count = _conditions(stepped, rows, each * step), len(rows)
+        self._one_step = _step_matrix(stepped, step)
+        flow = np.linalg.matrix_power(self._one_step, each)
+        knots = [conditions]
+        for _ in range(KNOTS):
+            knots.append(knots[-1] @ flow)
+        knots[0], knots[-1] = knots[0][count:], knots[-1][: 2 * count]
+        self._matrix = np.vstack(knots)
+
+    def clear(self, x: np.ndarray, speed: float) -> bool:
+        """Whether nothing can happen in the next steps, from a state x and its |S z'|."""
+        least: float = min(self._matrix.dot(x).tolist(), default=math.inf)
+        return least > speed
+
+    def after(self, x: np.ndarray, steps: int) -> np.ndarray:
+        """The state some steps after x."""
+        return np.asarray(np.linalg.matrix_power(self._one_step, steps) @ x)
+
+
+def _conditions(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
+    """s - h s'/3, s, s + h s'/3 of all contacts as functions of x = (q, q', q'', 1), (3 c, 3 s + 1).
+
+    Each is divided by its factor of max |S z'|, so that all have the same right-hand side.
+    """
+    modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
+    along, rate, none = np.zeros((3, count, size))
+    along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
+    rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
+    value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
+    scale = HERMITE * step**4 * _bounds(stepped, np.hstack([along, rate])) + np.finfo(float).tiny
+    functions = np.vstack([value - third, value, value + third]) @ stepped.physical
+    constants = np.tile([row.constant for row in rows], 3)
+    return np.hstack([functions, constants[:, None]]) / np.tile(scale, 3)[:, None]
+
+
+def _step_matrix(stepped: SteppedLevel, step: float) -> np.ndarray:
+    """One step of the trapezoidal rule under a constant force, x_1 = matrix x_0, (3 s + 1, 3 s + 1)."""
+    s, m, d, k = stepped.size, stepped.mass, stepped.damping, stepped.stiffness
+    identity, none, h = np.eye(s), np.zeros((s, s)), step / 2
+    q = np.hstack([identity, step * identity, h**2 * identity])
+    q_t = np.hstack([none, identity, h * identity])
+    q_tt = np.linalg.solve(m + h * d + h**2 * k, np.hstack([k, d, m]) - d @ q_t - k @ q)
+    matrix = np.eye(3 * s + 1)
+    matrix[: 3 * s, : 3 * s] = np.vstack([q + h**2 * q_tt, q_t + h * q_tt, q_tt])
+    return matrix
+
+
+def _omega(stepped: SteppedLevel) -> np.ndarray:
+    return np.asarray(np.sqrt(np.diagonal(stepped.stiffness)))
+
+
+def _bounds(stepped: SteppedLevel, functionals: np.ndarray) -> np.ndarray:
     """|[P R] A^3 S^-1| of every row [P R] (2 s,)."""
     size = stepped.size
     none, identity = np.zeros((size, size)), np.eye(size)
     system = np.block([[none, identity], [-stepped.stiffness, -stepped.own_damping]])
-    scaled = np.block([[none, identity], [-np.diag(omega), -stepped.own_damping]])  # A S^-1, also where omega = 0
+    scaled = np.block(
+        [[none, identity], [-np.diag(_omega(stepped)), -stepped.own_damping]]
+    )  # A S^-1, also where omega = 0
     return np.asarray(np.linalg.norm(functionals @ system @ system @ scaled, axis=1))

@@ -7,7 +7,8 @@ replaces this one; the level sensor of a body finds out (``check_called``).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import exudyn as exu
@@ -17,7 +18,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 if TYPE_CHECKING:
     from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 
-__all__ = ["BODIES", "Switching", "bodies_of", "running_solver"]
+__all__ = ["BODIES", "Switching", "bodies_of", "nothing_acts_on", "running_solver"]
 
 BODIES = "multiPhi"  # key in mbs.variables
 
@@ -64,6 +65,27 @@ def running_solver(mbs: Any, t: float) -> Any:
     if not _at_work(mbs.sys.get("staticSolver"), t):
         raise MultiPhiValueError("SolveDynamic: got a solver that is not stored, need storeSolver=True")
     return None
+
+
+def nothing_acts_on(mbs: Any, node: Any, body: Any) -> bool:
+    """Whether no item of the system refers to a node or its body, and no user function could change them."""
+    if bodies_of(mbs).following or mbs.GetPreStepUserFunction() or mbs.GetPostNewtonUserFunction():
+        return False
+    own = mbs.GetObject(body)
+    if any(own[key] for key in own if key.endswith("UserFunction")):
+        return False
+    data = mbs.systemData
+    markers = (mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
+    others = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(data.NumberOfObjects()) if i != int(body))
+    return not any(_refers(item, node, body) for item in itertools.chain(markers, others))
+
+
+def _refers(item: Mapping[str, Any], node: Any, body: Any) -> bool:
+    nodes = [item.get("nodeNumber"), *item.get("nodeNumbers", ())]
+    bodies = [item.get("bodyNumber"), item.get("objectNumber"), *item.get("bodyNumbers", ())]
+    return int(node) in (int(n) for n in nodes if n is not None) or int(body) in (
+        int(b) for b in bodies if b is not None
+    )
 
 
 def _at_work(solver: Any, t: float) -> bool:
