@@ -14,6 +14,7 @@ from multiphi_exudyn.study.scene_file import DisplacedStart
 __all__ = ["Findings", "findings", "percent", "seconds", "times"]
 
 GONE = 0.05  # NRMSE above which a pointwise comparison says little
+MUCH = 0.02  # of the initial energy lost to truncation: worth a word
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,7 @@ def _most_accurate(comparison: Comparison) -> Iterable[str]:
 def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
+    yield from _truncation(comparison)
     yield from _contact_law(comparison)
     if comparison.bench.overrides:
         yield (
@@ -174,6 +176,20 @@ def _sensitivity(comparison: Comparison) -> Iterable[str]:
         yield (
             f"Contact makes nearby runs separate. Curve by curve the comparison holds to 5 % until: {listed}; "
             "after that compare contact times and energies, not curves."
+        )
+
+
+def _truncation(comparison: Comparison) -> Iterable[str]:
+    shares = {
+        run.name: (run.ledger["truncation_kinetic"] + run.ledger["truncation_strain"]) / run.ledger["initial"]
+        for run in comparison.measured.values()
+        if run.kind == "reduced" and run.ledger.get("initial") and "truncation_kinetic" in run.ledger
+    }
+    if any(share > MUCH for share in shares.values()):
+        listed = ", ".join(f"{name} {percent(share)}" for name, share in shares.items())
+        yield (
+            "At every transition a reduced model drops what the next level's modes cannot hold. Of the initial "
+            f"energy that is: {listed}. Where it is much, take more modes."
         )
 
 
@@ -221,8 +237,9 @@ def _same_model_twice(comparison: Comparison) -> Iterable[tuple[str, str, str]]:
 
 
 def _faster(comparison: Comparison, run: ModelRun, than: ModelRun) -> tuple[str, str]:
-    source = f"{seconds(than.online_s)} / {seconds(run.online_s)}; its error {_error(comparison, run)}"
-    return f"{times(than.online_s / run.online_s)} faster", source
+    sampled = times(than.online_s / (run.online_s + run.sampling_s))
+    source = f"{seconds(than.online_s)} / {seconds(run.online_s)} ({sampled} with its histories sampled)"
+    return f"{times(than.online_s / run.online_s)} faster", f"{source}; its error {_error(comparison, run)}"
 
 
 def _error(comparison: Comparison, run: ModelRun) -> str:
