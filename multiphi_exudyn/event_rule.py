@@ -128,10 +128,13 @@ class EventRule:
         level, changes, admissible = self.level(penetrating), list[Change](), velocity
         if touching:
             rows = self.model.base.directions[:, list(touching)].T
-            admissible, _ = nearest_admissible(rows, velocity)
+            admissible, impulses = nearest_admissible(rows, velocity)
             open_state = self._entered(level, displacement, admissible)
-            decided, _, changes = self._impact(open_state, set(touching), set(penetrating))
-            level = decided.level
+            level = self._impact(open_state, set(touching), set(penetrating))[0].level
+            pushed = dict(zip(touching, impulses.tolist(), strict=True))
+            struck = [i for i in touching if pushed[i] > 0 or i in level.level.indices]
+            changes = [Change(i, "close", pushed[i]) for i in struck]
+            changes += [Change(i, "open") for i in struck if i not in level.level.indices]
         state = self._entered(level, displacement, admissible)
         kinetic = 0.5 * float(admissible @ admissible)
         loss = Loss(
@@ -140,7 +143,7 @@ class EventRule:
             truncation_strain=self.potential(displacement, penetrating) - state.potential,
         )
         state, lost, made = self.decide(state, set())
-        return state, loss + lost, [change for change in changes if change.kind == "close"] + made
+        return state, loss + lost, changes + made
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
@@ -220,7 +223,7 @@ class EventRule:
         touching = sorted(held | striking)
         released, loss = self._moved(state, self.level(compliant))
         struck, impulses, plastic = self._collided(released, touching)
-        closed = self._pressing(struck, touching)
+        closed = self._pressing(released, struck, touching)
         after, dropped = struck, loss + plastic
         while closed:
             after = self._at_rest_on(state, struck, compliant | closed)
@@ -230,9 +233,11 @@ class EventRule:
                 break
             closed = closed - pulling
             after = struck
+        changes = self._changes(state, striking, after, compliant, dict(zip(touching, impulses, strict=True)))
+        if not changes:
+            return state, Loss(), []
         self.transitions += 1
-        pushed = dict(zip(touching, impulses, strict=True))
-        return after, dropped, self._changes(state, striking, after, compliant, pushed)
+        return after, dropped, changes
 
     def _pulls(self, state: State, struck: State, level: LoadedLevel, contact: int) -> bool:
         """Whether the reaction a contact would get in a level is negative, beyond round-off of the way there.
@@ -273,11 +278,12 @@ class EventRule:
         after = replace(state, velocity=velocity)
         return after, impulses, Loss(impact=state.kinetic - after.kinetic)
 
-    def _pressing(self, state: State, touching: list[int]) -> set[int]:
-        """Contacts at rest relative to their stop whose free acceleration would close them further."""
+    def _pressing(self, released: State, state: State, touching: list[int]) -> set[int]:
+        """Contacts at rest relative to their stop after an impact whose free acceleration would close them further."""
         own = state.level.level
         rows = own.gap_rows[touching]
-        resting = np.abs(rows @ state.velocity) <= RESTING * np.abs(rows) @ np.abs(state.velocity)
+        speeds = np.abs(released.velocity) + np.abs(state.velocity)
+        resting = np.abs(rows @ state.velocity) <= RESTING * np.abs(rows) @ speeds
         if not np.any(resting):
             return set()
         acceleration = state.level.acceleration(state.displacement, state.velocity)

@@ -67,7 +67,9 @@ class Motion:
             self.state, self.start_loss, changes = self.rule.start(
                 self.start.displacement, self.start.velocity, self.start.penetrating, self.start.touching
             )
-            self._record(changes, Loss())
+            if changes:
+                self._record(changes, self.start_loss)
+                self.start_loss = Loss()
         except NumericalFailure as failure:
             self.message = f"at t = 0 s: {failure}"
 
