@@ -129,7 +129,7 @@ class EventRule:
         if touching:
             rows = self.model.base.directions[:, list(touching)].T
             admissible, impulses = nearest_admissible(rows, velocity)
-            open_state = self._entered(level, displacement, admissible)
+            open_state = self._entered(level, displacement, velocity)
             level = self._impact(open_state, set(touching), set(penetrating))[0].level
             pushed = dict(zip(touching, impulses.tolist(), strict=True))
             struck = [i for i in touching if pushed[i] > 0 or i in level.level.indices]
@@ -170,10 +170,12 @@ class EventRule:
         names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
 
-    def _with_phases(self, state: State) -> State:
-        """The state with the phase in which every contact stands."""
-        phases = tuple(self._standing(state, contact) for contact in range(len(self._rigid)))
-        return State(state.level, state.displacement, state.velocity, phases)
+    def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
+        """The state with the phase in which every contact stands; ``refused``: those that asked in vain."""
+        phases = [self._standing(state, contact) for contact in range(len(self._rigid))]
+        for contact in refused:
+            phases[contact] = Phase.ARMED if phases[contact] is Phase.ARMED else Phase.REFUSED
+        return State(state.level, state.displacement, state.velocity, tuple(phases))
 
     def _standing(self, state: State, contact: int) -> Phase:
         """ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
@@ -197,7 +199,7 @@ class EventRule:
             return self._switch(state, asking)
         compliant = {i for i in asking.symmetric_difference(state.closed) if not self._rigid[i]}
         after, loss, changes = self._impact(state, striking, compliant)
-        return self._with_phases(after), loss, changes
+        return self._with_phases(after, () if changes else asking), loss, changes
 
     def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Compliant contacts change where the level they enter admits it, rigid ones open."""
@@ -209,7 +211,7 @@ class EventRule:
                 break
             asking = asking - denied
         if not asking:
-            return self._with_phases(state), Loss(), []
+            return self._with_phases(state, denied), Loss(), []
         self.transitions += 1
         opened = sorted(i for i in asking if self._rigid[i])
         if opened:
@@ -279,7 +281,10 @@ class EventRule:
         return after, impulses, Loss(impact=state.kinetic - after.kinetic)
 
     def _pressing(self, released: State, state: State, touching: list[int]) -> set[int]:
-        """Contacts at rest relative to their stop after an impact whose free acceleration would close them further."""
+        """Contacts at rest relative to their stop after an impact whose free motion would close them further.
+
+        Motion is acceleration, or where that presses none of them the first derivative that counts.
+        """
         own = state.level.level
         rows = own.gap_rows[touching]
         speeds = np.abs(released.velocity) + np.abs(state.velocity)
@@ -288,7 +293,9 @@ class EventRule:
             return set()
         acceleration = state.level.acceleration(state.displacement, state.velocity)
         _, multipliers = nearest_admissible(rows[resting], acceleration)
-        return {i for i, force in zip(np.array(touching)[resting], multipliers, strict=True) if force > 0}
+        at_rest = np.array(touching)[resting].tolist()
+        pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
+        return pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
 
     def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
         """The state in another level (eq. 38.6), and what truncation took."""

@@ -308,7 +308,8 @@ class _Search:
     ) -> tuple[bool, float | None]:
         """(decided, root): what certified bounds of g, g', g'' say about a descent in [left, right]."""
         width = right - left
-        if self._range(0, at_left, at_right, width)[0] > 0 or self._rises(at_left, at_right, width):
+        low, high = self._range(0, at_left, at_right, width)
+        if low > 0 or max(-low, high) <= self._noise[0] or self._rises(at_left, at_right, width):
             return True, None
         slope_low, slope_high = self._range(1, at_left, at_right, width)
         if at_left[0] < -self._noise[0]:

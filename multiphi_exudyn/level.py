@@ -45,6 +45,7 @@ BASE_MARGIN = 4  # modes of an incomplete base for each mode of a level taken fr
 COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and static shapes
 ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
+UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 INDEPENDENT = 1e-10  # of the largest: singular values of contact directions below it are dependent contacts
 
 
@@ -247,7 +248,7 @@ def build_level(base: Base, indices: tuple[int, ...]) -> Level:
         base=base,
         omega=omega,
         vectors=vectors,
-        damping=vectors.T @ base.damping @ vectors,
+        damping=_projected_damping(base, omega, vectors),
         gap_rows=base.directions.T @ vectors,
         force_rows=forces,
         force_rate_rows=rates,
@@ -269,6 +270,15 @@ def _base_damping(structure: LinearStructure, modes: Modes) -> np.ndarray:
         return np.diag(given.alpha + given.beta * modes.omega**2)
     projected = modes.shapes.T @ (given @ modes.shapes)
     return (projected + projected.T) / 2
+
+
+def _projected_damping(base: Base, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own."""
+    damping: np.ndarray = vectors.T @ base.damping @ vectors
+    free = omega == 0
+    negligible = np.abs(damping) <= UNDAMPED * np.max(np.abs(base.damping), initial=0.0)
+    damping[negligible & (free[:, None] | free[None, :])] = 0.0
+    return damping
 
 
 def _null_space(base: Base, pinned: np.ndarray, names: list[str]) -> np.ndarray:
