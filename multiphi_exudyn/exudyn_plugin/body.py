@@ -34,7 +34,7 @@ from multiphi_exudyn.state import Event, Phase, State
 
 __all__ = ["MultiPhiBody", "flags", "matrices"]
 
-NEGLIGIBLE = 1e-9  # of the elastic forces: what Newton's iterations leave unbalanced is no modal force
+NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
 PHASES = tuple(Phase)
@@ -163,15 +163,14 @@ class MultiPhiBody:
     def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
         own, start, known = self._in_solver, self._state, len(self.events)
-        force = (own.force(*self._split(before)) + own.force(*self._split(after))) / 2
-        force = self._significant(force)
+        force = self._significant((own.force(before) + own.force(after)) / 2, after)
         state = self._travel(before, begun, force, force)
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
             return
-        reaction = own.force(*self._views) - self._applied(mbs)  # of constraints: known from the level before
+        reaction = own.force(after) - self._applied(mbs)  # of constraints: known from the level before
         self._write(mbs, state, force)
-        present = self._significant(self._applied(mbs) + reaction)
+        present = self._significant(self._applied(mbs) + reaction, after)
         if np.any(present != force):
             del self.events[known:]
             self._state = start
@@ -201,11 +200,10 @@ class MultiPhiBody:
         centre = shift(end.level.level, force if end.closed == closed else entered)
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
 
-    def _significant(self, force: np.ndarray) -> np.ndarray:
-        """The modal force, or zeros where it is what an iterative solver leaves."""
-        q, _, q_tt = self._views
-        scale = np.max(np.abs(self._in_solver.stiffness @ q) + np.abs(q_tt))
-        return force if np.max(np.abs(force)) > NEGLIGIBLE * scale else np.zeros(self._size)
+    def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The modal force, or zeros where it is what an iterative solver leaves of the accelerations in x."""
+        q_tt = x[2 * self._size : -1]
+        return force if force.dot(force) > NEGLIGIBLE**2 * q_tt.dot(q_tt) else np.zeros(self._size)
 
     def _applied(self, mbs: Any) -> np.ndarray:
         """Modal force (s,) of loads and connectors in the present state of the system."""
@@ -229,7 +227,7 @@ class MultiPhiBody:
             force = self._applied(mbs)
             own = self._load_matrices(mbs, closed)
             q_tt[:] = own.acceleration(q, q_t, force)
-        force = own.force(q, q_t, q_tt)
+        force = own.force(self._read())
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
         self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
         if fresh:  # only now the force is known, which the velocity of matched modes contains

@@ -25,7 +25,7 @@ from multiphi_exudyn.state import Row
 
 __all__ = ["Lookahead", "StepTest"]
 
-KNOTS = 8  # intervals a lookahead is divided into
+KNOTS = 16  # intervals a lookahead is divided into
 SPACING = 0.5  # rad, the phase of the highest mode in one of them
 
 

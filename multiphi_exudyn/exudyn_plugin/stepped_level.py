@@ -71,9 +71,9 @@ class SteppedLevel:
         """Number of coordinates s."""
         return len(self.drive)
 
-    def force(self, q: np.ndarray, q_t: np.ndarray, q_tt: np.ndarray) -> np.ndarray:
-        """Modal force (s,) that acts from outside, by the equation of motion."""
-        return self.mass @ q_tt + self.resisting(q, q_t)
+    def force(self, x: np.ndarray) -> np.ndarray:
+        """Modal force (s,) that acts from outside, by the equation of motion, from x = (q, q', q'', ...)."""
+        return self._total.dot(x[: 3 * self.size]) - self.drive
 
     def acceleration(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """q'' (s,) under a modal force."""
@@ -81,11 +81,12 @@ class SteppedLevel:
 
     def resisting(self, q: np.ndarray, q_t: np.ndarray) -> np.ndarray:
         """D q' + K q - drive (s,)."""
-        return self.damping @ q_t + self.stiffness @ q - self.drive
+        return self.damping.dot(q_t) + self.stiffness.dot(q) - self.drive
 
     def velocity(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """eta' (s,) of a state in the solver under a modal force."""
-        return self._velocity_inverse @ (q_t - self.from_displacement @ q - self.from_force @ (force + self.drive))
+        shown = q_t - self.from_displacement.dot(q) - self.from_force.dot(force + self.drive)
+        return self._velocity_inverse.dot(shown)
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,)."""
@@ -98,12 +99,15 @@ class SteppedLevel:
     def physical(self) -> np.ndarray:
         """The matrix (3 s, 3 s) from (q, q', q'') to (eta, eta', eta''), whatever force acts."""
         identity, none = np.eye(self.size), np.zeros((self.size, self.size))
-        total = np.hstack([self.stiffness, self.damping, self.mass])
-        shown = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ total
+        shown = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ self._total
         velocity = self._velocity_inverse @ shown
-        acceleration = total - self.own_damping @ velocity
+        acceleration = self._total - self.own_damping @ velocity
         acceleration[:, : self.size] -= self.stiffness
         return np.vstack([np.hstack([identity, none, none]), velocity, acceleration])
+
+    @functools.cached_property
+    def _total(self) -> np.ndarray:
+        return np.hstack([self.stiffness, self.damping, self.mass])
 
     @functools.cached_property
     def _mass_inverse(self) -> np.ndarray:
