@@ -199,7 +199,19 @@ class EventRule:
             return self._switch(state, asking)
         compliant = {i for i in asking.symmetric_difference(state.closed) if not self._rigid[i]}
         after, loss, changes = self._impact(state, striking, compliant)
-        return self._with_phases(after, () if changes else asking), loss, changes
+        if changes:
+            return self._with_phases(after), loss, changes
+        return self._close_without_impact(state, striking)
+
+    def _close_without_impact(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
+        """Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
+        held = set(state.closed)
+        willing = {i for i in asking if not self._pulls(state, state, self.level(held | {i}), i)}
+        if not willing:
+            return self._with_phases(state, asking), Loss(), []
+        self.transitions += 1
+        entered, loss = self._moved(state, self.level(held | willing))
+        return self._with_phases(entered), loss, [Change(i, "close") for i in sorted(willing)]
 
     def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Compliant contacts change where the level they enter admits it, rigid ones open."""
