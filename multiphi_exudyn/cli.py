@@ -26,10 +26,13 @@ from multiphi_exudyn.study.findings import findings, percent, seconds, times
 from multiphi_exudyn.study.losses import loss_tables
 from multiphi_exudyn.study.mechanics import mechanics_of
 from multiphi_exudyn.study.mode_shapes import level_modes
+from multiphi_exudyn.study.report import render
 from multiphi_exudyn.study.scenes import load_scene, shipped_scenes
 from multiphi_exudyn.study.workbench import prepare
 
-__all__ = ["main"]
+__all__ = ["command", "main"]
+
+THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -113,6 +116,18 @@ def _compare(given: argparse.Namespace) -> int:
     return OK if all(run.ok for run in comparison.runs.values()) else FAILED
 
 
+def command() -> NoReturn:
+    """Entry of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
+
+    More threads cost the small matrices of a modal model more than they give. numpy reads the number when it is
+    loaded, hence the restart.
+    """
+    if os.name == "posix" and not any(name in os.environ for name in THREAD_SETTINGS):
+        os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+    sys.exit(main())
+
+
 def _folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -126,8 +141,6 @@ def _folder(path: Path) -> Path:
 
 def _write(comparison: Comparison, folder: Path) -> None:
     """Results first, the report last; each file appears whole or not at all."""
-    from multiphi_exudyn.study.report import render  # matplotlib, for those who write a report only
-
     arrays = io.BytesIO()
     np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
     content = json.dumps(summary(comparison), indent=1, allow_nan=False)

@@ -5,35 +5,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import exudyn as exu
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
+from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.study.runs import ModelRun, interval_array
 from multiphi_exudyn.study.scene_file import UserObjectModel
 from multiphi_exudyn.study.timing import repeated, timed
 from multiphi_exudyn.study.workbench import Workbench, start_configuration
-from reference_models.exudyn_quiet import quiet
+from reference_models.body_alone import solve_body_alone
 
 __all__ = ["run_user_object"]
 
 
 @dataclass(frozen=True)
 class _Task:
-    """What one run needs: model, start x (n,), number of steps and their size [s]."""
+    """What one run needs: model, start x (n,), number of steps."""
 
     model: MultiPhiModel
     start: np.ndarray
     steps: int
-    step: float
 
 
 def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> ModelRun:
     """Add the body to an empty system, its modes matched to the step, and solve."""
     task, building = timed(lambda: _task(bench, spec))
-    recorded, first, repeats = repeated(lambda: _solve(bench, task))
+    recorded, first, repeats = repeated(
+        lambda: solve_body_alone(task.model, task.start, bench.t_end, task.steps, bench.points)
+    )
     histories, sampling = timed(lambda: _histories(bench, recorded))
     return ModelRun(
         name=spec.name,
@@ -52,32 +52,7 @@ def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> Mode
 def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
     model = bench.model(spec)
     steps = int(np.ceil(bench.t_end / spec.step * (1 - 1e-9)))
-    return _Task(model, start_configuration(bench, model), steps, bench.t_end / steps)
-
-
-def _solve(bench: Workbench, task: _Task) -> tuple[BodyHistories, float]:
-    """One run and the solver's time [s]."""
-    container = exu.SystemContainer()
-    mbs = container.AddSystem()
-    with quiet():
-        items = CreateMultiPhiBody(mbs, task.model, name="body", displacement=task.start, matchedStepSize=task.step)
-        mbs.Assemble()
-        settings = _simulation_settings(bench.t_end, task.steps)
-        trapezoidal = exu.DynamicSolverType.TrapezoidalIndex2
-        _, elapsed = timed(lambda: mbs.SolveDynamic(settings, solverType=trapezoidal))
-    return body_histories(mbs, items, bench.points), elapsed
-
-
-def _simulation_settings(t_end: float, steps: int) -> Any:
-    settings = exu.SimulationSettings()
-    settings.timeIntegration.numberOfSteps = steps
-    settings.timeIntegration.endTime = t_end
-    settings.timeIntegration.verboseMode = 0
-    settings.timeIntegration.newton.useModifiedNewton = True
-    settings.timeIntegration.reuseConstantMassMatrix = True
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = t_end / steps
-    return settings
+    return _Task(model, start_configuration(bench, model), steps)
 
 
 def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:

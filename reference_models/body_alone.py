@@ -1,0 +1,47 @@
+"""A Multi-Phi body alone in an Exudyn system: the same question as the native run, answered by Exudyn's solver."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
+from multiphi_exudyn.model import MultiPhiModel
+from reference_models.exudyn_quiet import quiet
+
+__all__ = ["solve_body_alone"]
+
+
+def solve_body_alone(
+    model: MultiPhiModel, start: np.ndarray, t_end: float, steps: int, points: Sequence[str]
+) -> tuple[BodyHistories, float]:
+    """Histories of the body released from ``start``, x (n,), and the solver's time [s].
+
+    steps: equal trapezoidal steps from 0 to t_end [s]; the body's modes are matched to them. points: names recorded.
+    """
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    with quiet():
+        items = CreateMultiPhiBody(mbs, model, name="body", displacement=start, matchedStepSize=t_end / steps)
+        mbs.Assemble()
+        settings = _simulation_settings(t_end, steps)
+        started = time.perf_counter()
+        mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+        elapsed = time.perf_counter() - started
+    return body_histories(mbs, items, points), elapsed
+
+
+def _simulation_settings(t_end: float, steps: int) -> Any:
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.numberOfSteps = steps
+    settings.timeIntegration.endTime = t_end
+    settings.timeIntegration.verboseMode = 0
+    settings.timeIntegration.newton.useModifiedNewton = True
+    settings.timeIntegration.reuseConstantMassMatrix = True
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = t_end / steps
+    return settings
