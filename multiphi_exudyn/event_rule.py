@@ -155,17 +155,17 @@ class EventRule:
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""
-        state, loss, changes = self._answer(state, asking) if asking else (self._with_phases(state), Loss(), [])
+        state, loss, changes = self._answer(state, asking, asking) if asking else (self._with_phases(state), Loss(), [])
         heard = set(asking)
         for _ in range(ROUNDS):
             if Phase.REFUSED not in state.phases:
                 return state, loss, changes
+            heard |= {change.contact for change in changes}
             unheard = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
-            unheard -= {change.contact for change in changes}
             if not unheard:
                 return state, loss, changes
             heard |= unheard
-            state, lost, made = self._answer(state, unheard)
+            state, lost, made = self._answer(state, unheard, heard)
             loss, changes = loss + lost, changes + made
         names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
@@ -192,16 +192,16 @@ class EventRule:
         pulls = self._rigid[contact] and contact in state.closed
         return Phase.RECOVERING if rate > 0 and not pulls else Phase.REFUSED
 
-    def _answer(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
-        """State with its phases after these contacts have been heard."""
-        striking = {i for i in asking if self._rigid[i] and i not in state.closed}
-        if not striking:
+    def _answer(self, state: State, asking: set[int], heard: set[int]) -> tuple[State, Loss, list[Change]]:
+        """State with its phases after these contacts have been heard; ``heard``: all that touch at this instant."""
+        striking = {i for i in heard if self._rigid[i] and i not in state.closed}
+        if not striking & asking:
             return self._switch(state, asking)
         compliant = {i for i in asking.symmetric_difference(state.closed) if not self._rigid[i]}
         after, loss, changes = self._impact(state, striking, compliant)
         if changes:
             return self._with_phases(after), loss, changes
-        return self._close_without_impact(state, striking)
+        return self._close_without_impact(state, striking & asking)
 
     def _close_without_impact(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
