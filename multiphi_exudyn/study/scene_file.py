@@ -231,6 +231,7 @@ class FullModel(Table):
     elements: Annotated[int, Field(ge=1)]
     step: Positive  # s
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
+    newton_tolerance: Positive = 1e-5  # relative and absolute
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
 

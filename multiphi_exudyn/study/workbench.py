@@ -150,6 +150,7 @@ def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
         step=spec.step,
         contact=spec.contact,
         spectral_radius=spec.spectral_radius,
+        newton_tolerance=spec.newton_tolerance,
         output_step=scene.file.outputs.interval,
     )
     return FullBeam(mechanics.beam, mechanics.contacts, settings)
