@@ -87,9 +87,7 @@ class PointMass:
     def __post_init__(self) -> None:
         _check_numbers("point mass", at=self.at, mass=self.mass, inertia=self.inertia)
         if not (math.isfinite(self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
-            raise MultiPhiValueError(
-                f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0"
-            )
+            raise MultiPhiValueError(f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0")
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-o
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
 SERIES_BELOW = 0.5  # |s T| under which exp is integrated by its series, to SERIES_TERMS terms
 SERIES_TERMS = 20
-WORST_CONDITION = 1e7  # of the scaled eigenvectors: times round-off it is the error of the motion; a double root has 1e8
+WORST_CONDITION = 1e7  # of the scaled eigenvectors; times round-off it is the motion's error (a double root has 1e8)
 
 
 @dataclass(frozen=True)

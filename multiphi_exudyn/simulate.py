@@ -60,7 +60,7 @@ class Motion:
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     message: str = ""
-    start_loss: Loss = Loss()
+    start_loss: Loss = field(default_factory=Loss)
 
     def __post_init__(self) -> None:
         self._evaluated, self._transitions = self.model.evaluations, self.rule.transitions

@@ -39,9 +39,7 @@ def free_bar(elements: int) -> LinearStructure:
     return LinearStructure(mass, stiffness, points={"bottom": 0, "top": elements, "centre": centre})
 
 
-def _matrices(
-    elements: int, size: float, *, stiffness: float, density: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _matrices(elements: int, size: float, *, stiffness: float, density: float) -> tuple[np.ndarray, np.ndarray]:
     """Assembled rho A h/6 [2 1; 1 2] and EA/h [1 -1; -1 1]."""
     ends = np.r_[1.0, np.full(elements - 1, 2.0), 1.0]
     beside = np.eye(elements + 1, k=1) + np.eye(elements + 1, k=-1)

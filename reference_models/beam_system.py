@@ -142,9 +142,7 @@ def _add_clamp(mbs: Any, beam: Beam, kind: str, ground: Any, node: Any) -> None:
         if math.isinf(stiffness):
             mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=markers))
         elif stiffness > 0:
-            mbs.AddObject(
-                eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, stiffness=stiffness)
-            )
+            mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, stiffness=stiffness))
 
 
 def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: Any) -> None:
@@ -160,9 +158,7 @@ def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: 
     )
 
 
-def _add_circle_contact(
-    mbs: Any, contact: PointContact, radius: float, x: float, elements: list[Any]
-) -> None:
+def _add_circle_contact(mbs: Any, contact: PointContact, radius: float, x: float, elements: list[Any]) -> None:
     """A circle under (over) the node; every element that ends there meets it and takes its share."""
     side = 1.0 if contact.above else -1.0
     centre = [x, side * (contact.distance + radius), 0.0]
@@ -170,9 +166,7 @@ def _add_circle_contact(
         eii.MarkerNodePosition(nodeNumber=mbs.AddNode(eii.NodePointGround(referenceCoordinates=centre)))
     )
     for element in elements:
-        shape = mbs.AddMarker(
-            eii.MarkerBodyCable2DShape(bodyNumber=element, numberOfSegments=_CIRCLE_SEGMENTS)
-        )
+        shape = mbs.AddMarker(eii.MarkerBodyCable2DShape(bodyNumber=element, numberOfSegments=_CIRCLE_SEGMENTS))
         mbs.AddObject(
             eii.ObjectContactCircleCable2D(
                 markerNumbers=[marker, shape],

@@ -33,9 +33,7 @@ SCAN_STEP = 0.02  # of a mode's wave number pi/L: far below the distance of two 
 ROOT_TOLERANCE = 1e-14  # of the wave number, relative
 
 
-def exact_frequencies(
-    beam: Beam, count: int, pins: Sequence[float] = (), *, shear: bool = True
-) -> np.ndarray:
+def exact_frequencies(beam: Beam, count: int, pins: Sequence[float] = (), *, shear: bool = True) -> np.ndarray:
     """The lowest ``count`` natural frequencies [Hz] above zero, (count,), ascending.
 
     pins: positions [m] where w = 0. shear: Timoshenko beam; False for Euler-Bernoulli.

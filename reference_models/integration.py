@@ -22,9 +22,7 @@ class Integration:
     wall_s: float
 
 
-def integrate(
-    mbs: Any, simulation_settings: Any, recorder: Recorder, cpu_limit_s: float | None
-) -> Integration:
+def integrate(mbs: Any, simulation_settings: Any, recorder: Recorder, cpu_limit_s: float | None) -> Integration:
     """Integrate from the initial state and record; Ctrl-C stops the solver and raises KeyboardInterrupt."""
     mbs.SetPostStepUserFunction(recorder)
     started = time.perf_counter()

@@ -65,9 +65,7 @@ def point_contacts(beam: Beam, contacts: Sequence[UnilateralContact]) -> tuple[P
 
 def _point_contact(beam: Beam, contact: UnilateralContact) -> PointContact:
     if contact.rigid:
-        raise MultiPhiValueError(
-            f"contact {contact.name!r} stiffness: got inf, need a finite one (a penalty spring)"
-        )
+        raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one (a penalty spring)")
     point, coefficient = _point_and_coefficient(contact)
     if point not in beam.points:
         known = ", ".join(sorted(beam.points)) or "none"

@@ -25,9 +25,7 @@ class Recorder:
     watched: indices of the ODE2 coordinates kept at every step.
     """
 
-    def __init__(
-        self, mbs: Any, watched: np.ndarray, output_step: float, t_end: float, progress: bool
-    ) -> None:
+    def __init__(self, mbs: Any, watched: np.ndarray, output_step: float, t_end: float, progress: bool) -> None:
         self.times: list[float] = []
         self.watched: list[np.ndarray] = []
         self.velocity_steps: list[int] = []

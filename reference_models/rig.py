@@ -97,9 +97,7 @@ def rig() -> Rig:
     data = _data()
     known = {key: value for key, value in data["known"].items() if key in Rig.__dataclass_fields__}
     known["points"] = MappingProxyType(dict(data["known"]["points"]))
-    return Rig(
-        paper=data["source"]["paper"], contradiction=data["published"]["contradiction"]["statement"], **known
-    )
+    return Rig(paper=data["source"]["paper"], contradiction=data["published"]["contradiction"]["statement"], **known)
 
 
 def published_frequencies() -> Mapping[str, PublishedLevel]:
@@ -186,8 +184,7 @@ def _headline(parameter_set: str) -> str:
     if "shapes_of" not in given:
         return f"parameter set {parameter_set}: fitted to the {fitted_to}"
     return (
-        f"parameter set {parameter_set}: {given['caution']}; shapes of {given['shapes_of']}, "
-        f"fitted to the {fitted_to}"
+        f"parameter set {parameter_set}: {given['caution']}; shapes of {given['shapes_of']}, fitted to the {fitted_to}"
     )
 
 

@@ -22,9 +22,7 @@ def refused() -> Callable[..., None]:
     Its message is one line, starts with ``begins`` and says what is needed.
     """
 
-    def check(
-        kind: type[Exception], begins: str, build: Callable[..., Any], *given: Any, **named: Any
-    ) -> None:
+    def check(kind: type[Exception], begins: str, build: Callable[..., Any], *given: Any, **named: Any) -> None:
         with pytest.raises(kind) as caught:
             build(*given, **named)
         message = str(caught.value)

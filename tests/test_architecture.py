@@ -80,7 +80,7 @@ def test_nothing_light_is_imported_inside_a_function(path):
 
 def test_the_floors_see_a_breach():
     assert floor("multiphi_exudyn.study.report") > floor("multiphi_exudyn.model")
-    assert list(imported(ast.parse("from multiphi_exudyn.study import report").body[0]))[0] == "multiphi_exudyn.study"
+    assert next(imported(ast.parse("from multiphi_exudyn.study import report").body[0])) == "multiphi_exudyn.study"
 
 
 def test_importing_the_package_loads_neither_exudyn_nor_matplotlib():

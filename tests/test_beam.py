@@ -161,9 +161,7 @@ class TestStatics:
 
     def test_elastic_clamp_adds_its_own_flexibility(self):
         rigid, soft = (planar_beam(beam(clamp=clamp), 6) for clamp in (Clamp(), Clamp(2e4, 30.0)))
-        rigid_tip, soft_tip = (
-            s.row("tip") @ np.linalg.solve(s.stiffness, s.row("tip")) for s in (rigid, soft)
-        )
+        rigid_tip, soft_tip = (s.row("tip") @ np.linalg.solve(s.stiffness, s.row("tip")) for s in (rigid, soft))
         assert soft_tip - rigid_tip == pytest.approx(1 / 2e4 + LENGTH**2 / 30.0, rel=1e-9)
 
 
@@ -215,9 +213,7 @@ class TestClampLimits:
     def test_a_stiff_clamp_tends_to_the_rigid_one_and_a_soft_one_to_none(self):
         rigid, stiff = (frequencies(planar_beam(beam(clamp=c), 12), 3) for c in (Clamp(), Clamp(1e11, 1e8)))
         assert_allclose(stiff, rigid, rtol=1e-6)
-        free, soft = (
-            frequencies(planar_beam(beam(clamp=c), 12), 4) for c in (Clamp(0.0, 0.0), Clamp(1e-6, 1e-8))
-        )
+        free, soft = (frequencies(planar_beam(beam(clamp=c), 12), 4) for c in (Clamp(0.0, 0.0), Clamp(1e-6, 1e-8)))
         assert_allclose(soft[2:], free[2:], rtol=1e-6)
 
     def test_holding_only_the_deflection_leaves_a_hinge(self):
@@ -236,9 +232,7 @@ POSITION = st.floats(0.0, LENGTH)
 class TestNodes:
     @given(st.lists(POSITION, max_size=6), st.lists(POSITION, max_size=3), st.integers(1, 60))
     def test_stand_exactly_at_points_and_masses(self, points, masses, elements):
-        subject = beam(
-            points={f"p{i}": x for i, x in enumerate(points)}, masses=[PointMass(x, 0.1) for x in masses]
-        )
+        subject = beam(points={f"p{i}": x for i, x in enumerate(points)}, masses=[PointMass(x, 0.1) for x in masses])
         nodes = beam_nodes(subject, elements)
         for x in (*points, *masses, 0.0, LENGTH):
             assert np.min(np.abs(nodes - x)) <= 1e-9 * LENGTH

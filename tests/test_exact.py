@@ -120,9 +120,7 @@ class TestBouncingBar:
         slope = (self.bar.displacement(10.0, t) - self.bar.displacement(10.0 - 1e-6, t)) / 1e-6
         assert_allclose(slope, 0, atol=1e-7)
 
-    @pytest.mark.parametrize(
-        ("time", "velocity"), [(1 - 1e-9, -10), (5 / 3 + 1e-9, 10), (11 / 3 - 1e-9, -10)]
-    )
+    @pytest.mark.parametrize(("time", "velocity"), [(1 - 1e-9, -10), (5 / 3 + 1e-9, 10), (11 / 3 - 1e-9, -10)])
     def test_velocity_is_uniform_at_impact_and_release(self, time, velocity):
         assert_allclose(self.bar.velocity(np.linspace(0.1, 10, 50), time), velocity, atol=1e-6)
 
@@ -176,9 +174,7 @@ class TestBilinearOscillator:
             return [state[1], force / 2]
 
         times = np.linspace(0, 2 * self.oscillator.period, 97)
-        solution = solve_ivp(
-            rate, (0, times[-1]), [0.01, 0], t_eval=times, rtol=1e-10, atol=1e-14, max_step=1e-2
-        )
+        solution = solve_ivp(rate, (0, times[-1]), [0.01, 0], t_eval=times, rtol=1e-10, atol=1e-14, max_step=1e-2)
         assert_allclose(self.oscillator.displacement(times), solution.y[0], rtol=0, atol=1e-9)
         assert_allclose(self.oscillator.velocity(times), solution.y[1], rtol=0, atol=1e-8)
 

@@ -82,9 +82,7 @@ def difference(one, other, names=("node2", "node3")):
 
 
 class TestStructure:
-    @pytest.mark.parametrize(
-        ("kind", "elements", "ceiling"), [(ANCF, 20, 7e-4), (EXACT, 57, 3e-3), (EXACT, 228, 3e-4)]
-    )
+    @pytest.mark.parametrize(("kind", "elements", "ceiling"), [(ANCF, 20, 7e-4), (EXACT, 57, 3e-3), (EXACT, 228, 3e-4)])
     def test_frequencies_are_those_of_the_timoshenko_beam(self, kind, elements, ceiling):
         found = modes(FullBeam(RIG, (), FullBeamSettings(kind=kind, elements=elements)).structure)[0]
         expected = modes(planar_beam(RIG, 57))[0]
@@ -106,9 +104,7 @@ class TestStructure:
         expected = planar_beam(beam, 80)
         np.testing.assert_allclose(modes(structure)[0][:5], modes(expected)[0][:5], rtol=1.5e-3)
         for name in beam.points:
-            found, wanted = (
-                s.row(name) @ np.linalg.solve(s.stiffness, s.row("tip")) for s in (structure, expected)
-            )
+            found, wanted = (s.row(name) @ np.linalg.solve(s.stiffness, s.row("tip")) for s in (structure, expected))
             assert found == pytest.approx(wanted, rel=1e-3)
 
     @pytest.mark.parametrize("kind", [ANCF, EXACT])
@@ -161,9 +157,7 @@ class TestFreeFlight:
     def test_energy_and_dissipation_balance(self):
         _, found = run(0.06, contacts=(), step=1e-4)
         assert found.balance.dissipated > 0.1 * found.balance.initial
-        assert found.balance.final + found.balance.dissipated == pytest.approx(
-            found.balance.initial, rel=3e-4
-        )
+        assert found.balance.final + found.balance.dissipated == pytest.approx(found.balance.initial, rel=3e-4)
 
     def test_small_amplitudes_converge_to_the_linear_damped_beam(self):
         """Order 2 mode by mode; 1.5 to 2 for a release, whose higher modes are resolved one after another."""
@@ -228,9 +222,7 @@ class TestContact:
     def test_a_stop_above_is_the_mirror_image(self):
         above = UnilateralContact("support", {"node2": -1.0}, 1.35e-3, 1e6)
         _, found = run(0.08, elements=6, step=5e-5)
-        _, mirrored = run(
-            0.08, elements=6, step=5e-5, contacts=[above], start=START | {"displacement": -0.02}
-        )
+        _, mirrored = run(0.08, elements=6, step=5e-5, contacts=[above], start=START | {"displacement": -0.02})
         np.testing.assert_allclose(mirrored.points["node3"], -found.points["node3"], atol=1e-8)
         np.testing.assert_allclose(mirrored.gaps["support"], found.gaps["support"], atol=1e-8)
 

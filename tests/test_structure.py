@@ -252,9 +252,7 @@ class TestProperties:
             matrices[which] = scipy.sparse.csr_array(matrices[which])
         refused(ValueError, f"{which}: got a value that is NaN", LinearStructure, **matrices)
 
-    @given(
-        st.one_of(st.none(), st.text(), st.booleans(), st.complex_numbers(), st.lists(st.text()), st.binary())
-    )
+    @given(st.one_of(st.none(), st.text(), st.booleans(), st.complex_numbers(), st.lists(st.text()), st.binary()))
     def test_nothing_else_is_taken_for_a_matrix(self, thing):
         with pytest.raises(MultiPhiError):
             LinearStructure(thing, thing)

@@ -255,9 +255,7 @@ def _given_rows(mbs: Any, name: str, given: Any) -> dict[str, np.ndarray]:
 def _node_coordinate_row(mbs: Any, name: str, node: Any, coordinate: int) -> np.ndarray:
     rows = list(_node_rows(mbs, exu.NodeIndex(int(node))).values())
     if not 0 <= coordinate < len(rows):
-        raise MultiPhiValueError(
-            f"points[{name!r}]: got coordinate {coordinate}, need 0 <= coordinate < {len(rows)}"
-        )
+        raise MultiPhiValueError(f"points[{name!r}]: got coordinate {coordinate}, need 0 <= coordinate < {len(rows)}")
     return rows[coordinate]
 
 
