@@ -312,7 +312,8 @@ def _reaction_rows(
     rows = np.zeros((pinned.shape[1], len(omega)))
     for k in range(len(omega)):
         total = squared[:, 0] + omega[k] ** 2
-        weight = np.where(total > 0, 1 / np.where(total > 0, total, 1.0), 0.0)
+        weight = 1 / np.where(total > 0, total, np.min(total[total > 0], initial=np.inf))
+        weight = np.where(np.any(total > 0), weight, 1.0)
         residual = (squared[:, 0] - omega[k] ** 2) * vectors[:, k] - spring_forces[:, k]
         rows[:, k] = np.linalg.solve(pinned.T @ (weight[:, None] * pinned), pinned.T @ (weight * residual))
     return rows
