@@ -155,8 +155,12 @@ class EventRule:
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""
-        state, loss, changes = self._answer(state, asking, asking) if asking else (self._with_phases(state), Loss(), [])
-        heard = set(asking)
+        heard, freed = set(asking), self._held(state, asking)
+        loss, changes = Loss(), list[Change]()
+        if asking:
+            state, loss, changes = self._answer(state, asking, heard, freed)
+        else:
+            state = self._with_phases(state)
         for _ in range(ROUNDS):
             if Phase.REFUSED not in state.phases:
                 return state, loss, changes
@@ -165,7 +169,8 @@ class EventRule:
             if not unheard:
                 return state, loss, changes
             heard |= unheard
-            state, lost, made = self._answer(state, unheard, heard)
+            freed |= self._held(state, unheard)
+            state, lost, made = self._answer(state, unheard, heard, freed)
             loss, changes = loss + lost, changes + made
         names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
@@ -192,13 +197,22 @@ class EventRule:
         pulls = self._rigid[contact] and contact in state.closed
         return Phase.RECOVERING if rate > 0 and not pulls else Phase.REFUSED
 
-    def _answer(self, state: State, asking: set[int], heard: set[int]) -> tuple[State, Loss, list[Change]]:
-        """State with its phases after these contacts have been heard; ``heard``: all that touch at this instant."""
+    def _held(self, state: State, contacts: Iterable[int]) -> set[int]:
+        """Those of these contacts that are rigid and closed."""
+        return {i for i in contacts if self._rigid[i] and i in state.closed}
+
+    def _answer(
+        self, state: State, asking: set[int], heard: set[int], freed: set[int]
+    ) -> tuple[State, Loss, list[Change]]:
+        """State with its phases after these contacts have been heard.
+
+        heard: all that touch at this instant. freed: those of them whose reaction has fallen to zero at it.
+        """
         striking = {i for i in heard if self._rigid[i] and i not in state.closed}
         if not striking & asking:
             return self._switch(state, asking)
         compliant = {i for i in asking.symmetric_difference(state.closed) if not self._rigid[i]}
-        after, loss, changes = self._impact(state, striking, compliant)
+        after, loss, changes = self._impact(state, striking, compliant, freed)
         if changes:
             return self._with_phases(after), loss, changes
         return self._close_without_impact(state, striking & asking)
@@ -206,7 +220,7 @@ class EventRule:
     def _close_without_impact(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
         held = set(state.closed)
-        willing = {i for i in asking if not self._pulls(state, state, self.level(held | {i}), i)}
+        willing = {i for i in asking if self._reaction_sign(state, state, self.level(held | {i}), i) >= 0}
         if not willing:
             return self._with_phases(state, asking), Loss(), []
         self.transitions += 1
@@ -231,9 +245,14 @@ class EventRule:
             entered, loss = self._with_phases(entered), loss + lost
         return entered, loss, [Change(i, "open" if i in state.closed else "close") for i in sorted(asking)]
 
-    def _impact(self, state: State, striking: set[int], compliant: set[int]) -> tuple[State, Loss, list[Change]]:
-        """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level."""
-        held = {i for i in state.closed if self._rigid[i]}
+    def _impact(
+        self, state: State, striking: set[int], compliant: set[int], freed: Iterable[int] = ()
+    ) -> tuple[State, Loss, list[Change]]:
+        """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level.
+
+        One of ``freed`` stays closed only with a reaction that is more than round-off of zero.
+        """
+        held = self._held(state, state.closed)
         touching = sorted(held | striking)
         released, loss = self._moved(state, self.level(compliant))
         struck, impulses, plastic = self._collided(released, touching)
@@ -241,7 +260,7 @@ class EventRule:
         after, dropped = struck, loss + plastic
         while closed:
             after = self._at_rest_on(state, struck, compliant | closed)
-            pulling = {i for i in closed if self._pulls(state, struck, after.level, i)}
+            pulling = {i for i in closed if self._reaction_sign(state, struck, after.level, i) < (i in freed)}
             if not pulling:
                 dropped = self._loss(state, after, released, struck)
                 break
@@ -253,15 +272,15 @@ class EventRule:
         self.transitions += 1
         return after, dropped, changes
 
-    def _pulls(self, state: State, struck: State, level: LoadedLevel, contact: int) -> bool:
-        """Whether the reaction a contact would get in a level is negative, beyond round-off of the way there.
+    def _reaction_sign(self, state: State, struck: State, level: LoadedLevel, contact: int) -> int:
+        """Sign of the reaction a contact would get in a level, zero where it is round-off of the way there.
 
         The same function as ``entered_function``: a refused contact asks where that one says it may.
         """
         own, move = self.function(level, contact), self.transition(state.level, level)
         pushed = (own.position @ move.matrix) * state.displacement
         damped = (own.rate @ self.transition(struck.level, level).matrix) * struck.velocity
-        return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset)) < 0
+        return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset))
 
     def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
         """Displacement straight from the level before the impact, velocity from the one it was computed in."""

@@ -93,6 +93,8 @@ def lowest_modes(mass: Any, stiffness: Any, count: int, rows: np.ndarray) -> Mod
 
 def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Singular values ascending (m,) and right singular vectors (n, m) of a (k, n) matrix, k >= n."""
+    if matrix.shape[1] == 0:
+        return np.zeros(0), np.zeros((0, 0))
     # joba=2 ('F'): row pivoting, full accuracy also for row-graded matrices; jobv=0: V wanted; jobu=3: no U
     values, _, vectors, work, _, info = scipy.linalg.lapack.dgejsv(
         matrix, joba=2, jobu=3, jobv=0, jobr=0, jobt=0, jobp=0
