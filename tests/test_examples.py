@@ -1,0 +1,30 @@
+"""The examples run, and each is checked by one number."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_own_matrices(capsys):
+    trajectory = load("own_matrices").main()
+    assert abs(trajectory.ledger.residual) < 1e-12
+    assert "levels built: 3 of 4" in capsys.readouterr().out
+
+
+def test_paper_rig(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["paper_rig.py", str(tmp_path / "rig.png")])
+    trajectories = load("paper_rig").main()
+    first = [trajectory.contact_intervals("support")[0][0] for trajectory in trajectories.values()]
+    assert first == pytest.approx([0.06897, 0.06897], abs=2e-5)
+    assert (tmp_path / "rig.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.count("ok") == 2
