@@ -136,8 +136,8 @@ class Level:
 
     @functools.cached_property
     def highest_frequency(self) -> float:
-        """The highest of them [Hz]."""
-        return float(np.max(self.frequencies))
+        """The highest of them [Hz], zero where there is none."""
+        return float(np.max(self.frequencies, initial=0.0))
 
     @property
     def ratios(self) -> np.ndarray:
@@ -321,7 +321,7 @@ def _reaction_rows(
 
 def _check(base: Base, omega: np.ndarray, vectors: np.ndarray, closed: int) -> None:
     """Mass normalisation and interlacing."""
-    error = np.max(np.abs(vectors.T @ vectors - np.eye(len(omega))))
+    error = np.max(np.abs(vectors.T @ vectors - np.eye(len(omega))), initial=0.0)
     open_omega = base.modes.omega
     slack = INTERLACING * open_omega + np.finfo(float).eps * np.max(open_omega, initial=0.0)
     below, above = (open_omega - slack)[: len(omega)], (open_omega + slack)[closed:]

@@ -138,13 +138,13 @@ class ModalResponse:
     def _from_state(self) -> np.ndarray:
         """[A, B] on real and imaginary parts, (2p, 2r): one real product where two complex ones stood."""
         both = np.hstack([self.from_displacement, self.from_velocity])
-        return np.stack([both.real, both.imag], axis=1).reshape(2 * len(both), -1)
+        return np.stack([both.real, both.imag], axis=1).reshape(2 * both.shape[0], both.shape[1])
 
     @functools.cached_property
     def _to_state(self) -> np.ndarray:
         """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), where every power is zero."""
         both = np.vstack([self.shapes, self.shapes * self.basis.rates])
-        return np.stack([both.real, -both.imag], axis=2).reshape(len(both), -1)
+        return np.stack([both.real, -both.imag], axis=2).reshape(both.shape[0], 2 * both.shape[1])
 
     def dissipated(self, coefficients: np.ndarray, damping: np.ndarray, duration: float) -> float:
         """Work of damping, the integral of eta'^T D eta' over [0, duration], for the motion with these c (p,).

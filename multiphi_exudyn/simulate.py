@@ -142,9 +142,10 @@ class Motion:
     def _check_chatter(self) -> None:
         if len(self.segments) <= CHATTER_WINDOW:
             return
-        highest = self.state.level.level.highest_frequency
-        elapsed = self.time - self.segments[-CHATTER_WINDOW].start
-        if highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
+        window = self.segments[-CHATTER_WINDOW:]
+        elapsed = self.time - window[0].start
+        highest = max(segment.level.level.highest_frequency for segment in window)
+        if elapsed == 0 or 0 < highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
             raise NumericalFailure(
                 f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {EVENTS_PER_PERIOD} "
                 f"in a period of the highest kept mode ({highest:g} Hz)"

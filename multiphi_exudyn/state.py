@@ -151,8 +151,8 @@ class SignalTable:
 
     def __init__(self, response: ModalResponse, rows: list[Row], rates: list[bool]) -> None:
         r = response.shapes.shape[0]
-        position = np.array([row.position for row in rows]).reshape(-1, r)
-        rate = np.array([row.rate for row in rows]).reshape(-1, r)
+        position = np.array([row.position for row in rows]).reshape(len(rows), r)
+        rate = np.array([row.rate for row in rows]).reshape(len(rows), r)
         self._basis = response.basis
         self._position = position @ response.shapes
         self._rate = rate @ response.shapes if np.any(rate) else None

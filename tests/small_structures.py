@@ -13,9 +13,7 @@ def chain(n, *, damping=None, ends=1, mass=1.0, stiffness=1.0):
     matrix[-1, -1] = 1.0
     if ends == 0:
         matrix[0, 0] = 1.0 if n > 1 else 0.0
-    return LinearStructure(
-        mass * np.eye(n), stiffness * matrix, damping=damping, points={f"m{i}": i for i in range(n)}
-    )
+    return LinearStructure(mass * np.eye(n), stiffness * matrix, damping=damping, points={f"m{i}": i for i in range(n)})
 
 
 def stop(at="m0", gap=1.0, stiffness=math.inf, name="stop"):

@@ -23,9 +23,7 @@ from multiphi_exudyn import (
 def model(seed=0, *stiffnesses, rigid_body=False, modes="all", damping=None):
     """A random structure with a contact per stiffness, in random directions, gaps 0.1, 0.2, ..."""
     n, mass, stiffness, _, random = random_structure(seed, rigid_body=rigid_body)
-    contacts = [
-        UnilateralContact(f"c{i}", random.normal(size=n), 0.1 * (i + 1), k) for i, k in enumerate(stiffnesses)
-    ]
+    contacts = [UnilateralContact(f"c{i}", random.normal(size=n), 0.1 * (i + 1), k) for i, k in enumerate(stiffnesses)]
     structure = LinearStructure(mass, stiffness, damping=damping, points={f"m{i}": i for i in range(n)})
     return MultiPhiModel(structure, contacts, modes=modes)
 

@@ -141,7 +141,7 @@ class TestModalResponse:
             return
         c = response.coefficients(*start(r))
         exact = by_matrix_exponential(omega, damping, *start(r), 0, 0.6)
-        assert_allclose(by_response(response, c, 0.6), exact, rtol=0, atol=2e-6)
+        assert_allclose(by_response(response, c, 0.6), exact, rtol=0, atol=2e-8)
 
     @settings(max_examples=60)
     @given(st.integers(1, 4), st.integers(0, 2**31), st.floats(0.3, 3.0), st.booleans())

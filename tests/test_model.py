@@ -62,6 +62,7 @@ class TestMultiPhiModel:
 
     def test_another_structure_or_contact_is_built_anew(self):
         m = MultiPhiModel(chain(6), [stop()], modes=2)
+        m.level(("stop",))
         for changes in ({"contacts": [stop(gap=0.3)]}, {"structure": chain(6, stiffness=4.0)}):
             other = dataclasses.replace(m, **changes)
             fresh = MultiPhiModel(other.structure, other.contacts, modes=2)
