@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Event, Loss, Phase
 from multiphi_exudyn.structure import At
@@ -173,7 +173,9 @@ class Trajectory:
 
     @functools.cached_property
     def ledger(self) -> Ledger:
-        """Where the energy went; computed when it is asked for."""
+        """Where the energy went; computed when it is asked for. A run that failed at its start has none."""
+        if not self.segments:
+            raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = sum((event.loss for event in self.events), self.start_loss)
         y0, v0 = self.start.displacement, self.start.velocity
         base, closed = self.model.base, list(self.start.penetrating)

@@ -4,8 +4,9 @@ The paper's "Phi_m^-1" is the M-projection, the best approximation in the kineti
 
     eta_m = T eta_l + c,   eta'_m = T eta'_l,   T = Phi_m^T M Phi_l,   c = Phi_m^T M (x_inf,l - x_inf,m)
 
-T is r x r and computed once for a pair of levels. A transition can only take energy out (for one
-physical M, K); what it took is truncation, kinetic and strain.
+T is r x r and computed once for a pair of levels. A transition from an admissible state can
+only take energy out (for one physical M, K); what it took is truncation, kinetic and strain. Where truncation has left
+a gap that is not zero, the strain part can be negative; the ledger shows it.
 
 A rigid contact that closes is an impact first (Moreau, restitution 0), in the basis of a level where it is open:
 
