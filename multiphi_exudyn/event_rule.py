@@ -147,11 +147,7 @@ class EventRule:
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
-        base, closed = self.model.base, list(penetrating)
-        gaps = base.directions[:, closed].T @ displacement + base.gaps[closed]
-        stretched = base.modes.omega * displacement
-        springs = float(np.sum(base.stiffnesses[closed] * gaps**2))
-        return 0.5 * float(stretched @ stretched) + 0.5 * springs - float(self.load @ displacement)
+        return self.model.base.strain(displacement, penetrating) - float(self.load @ displacement)
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""

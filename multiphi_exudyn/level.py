@@ -86,6 +86,13 @@ class Base:
         """Contact stiffnesses (c,) [N/m], inf where rigid."""
         return np.array([contact.stiffness for contact in self.contacts])
 
+    def strain(self, configuration: np.ndarray, closed: Sequence[int]) -> float:
+        """Strain energy [J] of y (m,) and of the compliant ones among these closed contacts."""
+        index = list(closed)
+        closing = self.gaps[index] + self.directions[:, index].T @ configuration
+        springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
+        return 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
+
 
 @dataclass(frozen=True)
 class Asymptotic:
@@ -197,9 +204,7 @@ class Level:
         forces, configuration = _rest(base, directions, base.gaps[index], stiffness, load)
         projected = self.vectors.T @ load
         drive = np.where(self.omega > 0, 0.0, projected + self.vectors.T @ (directions @ forces))
-        closing = base.gaps[index] + directions.T @ configuration
-        springs = np.where(np.isinf(stiffness), 0.0, stiffness)
-        strain = 0.5 * float(np.sum((base.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
+        strain = base.strain(configuration, index)
         return Asymptotic(configuration, forces, drive, projected, strain, strain - float(load @ configuration))
 
 

@@ -178,15 +178,11 @@ class Trajectory:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = sum((event.loss for event in self.events), self.start_loss)
         y0, v0 = self.start.displacement, self.start.velocity
-        base, closed = self.model.base, list(self.start.penetrating)
-        gaps = base.directions[:, closed].T @ y0 + base.gaps[closed]
-        stretched = base.modes.omega * y0
-        initial = 0.5 * float(v0 @ v0 + stretched @ stretched + np.sum(base.stiffnesses[closed] * gaps**2))
         last = self.segments[-1]
         end = np.array([last.end])
         reached = last.level.configuration(last.modal(end)[:, 0])
         return Ledger(
-            initial=initial,
+            initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating),
             work_of_loads=float(self.load @ (reached - y0)),
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
@@ -270,10 +266,7 @@ class Trajectory:
 
 def _energy(segment: Segment, times: np.ndarray) -> np.ndarray:
     displacement, velocity = segment.modal(times), segment.modal(times, 1)
-    own = segment.level
-    bent = own.asymptotic.load - own.asymptotic.drive
-    strain = 0.5 * np.sum((own.level.omega[:, None] * displacement) ** 2, axis=0) + bent @ displacement
-    return np.asarray(0.5 * np.sum(velocity**2, axis=0) + strain + own.asymptotic.strain)
+    return np.asarray(0.5 * np.sum(velocity**2, axis=0) + segment.level.strain(displacement))
 
 
 def _force(segment: Segment, contact: int, times: np.ndarray) -> np.ndarray:

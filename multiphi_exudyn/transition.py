@@ -51,22 +51,20 @@ class LoadedLevel:
         """Whether a load drives zero-frequency modes."""
         return bool(np.any(self.asymptotic.drive))
 
-    def strain(self, displacement: np.ndarray) -> float:
-        """Strain energy [J] of the structure and of its closed compliant contacts.
+    def strain(self, displacement: np.ndarray) -> np.ndarray:
+        """Strain energy [J] of the structure and of its closed compliant contacts, for (r,) or every column of (r, k).
 
         1/2 |omega eta|^2 + eta . (Phi^T f - drive) + strain(x_inf)
         """
         bent = self.asymptotic.load - self.asymptotic.drive
-        return self._oscillation(displacement) + float(bent @ displacement) + self.asymptotic.strain
+        stretched = (self.level.omega * displacement.T).T
+        return np.asarray(0.5 * np.sum(stretched**2, axis=0) + bent @ displacement + self.asymptotic.strain)
 
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the static load [J]."""
-        potential = self._oscillation(displacement) + self.asymptotic.potential
-        return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
-
-    def _oscillation(self, displacement: np.ndarray) -> float:
         stretched = self.level.omega * displacement
-        return 0.5 * float(stretched.dot(stretched))
+        potential = 0.5 * float(stretched.dot(stretched)) + self.asymptotic.potential
+        return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
 
     def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """eta'' (r,) from eta, eta' (38.3)."""
