@@ -20,15 +20,15 @@ import numpy as np
 from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.study.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.environment import environment
-from multiphi_exudyn.study.findings import findings, percent, seconds, times
-from multiphi_exudyn.study.losses import loss_tables
-from multiphi_exudyn.study.mechanics import mechanics_of
-from multiphi_exudyn.study.mode_shapes import level_modes
-from multiphi_exudyn.study.report import render
-from multiphi_exudyn.study.scenes import load_scene, shipped_scenes
-from multiphi_exudyn.study.workbench import prepare
+from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.losses import loss_tables
+from multiphi_exudyn.study.comparison.mode_shapes import level_modes
+from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.running.environment import environment
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.study.scene.workbench import prepare
 
 __all__ = ["command", "main"]
 

@@ -16,10 +16,19 @@ FLOORS = (
     ("level", "transition", "model"),
     ("state", "event_rule", "trajectory", "simulate"),
     ("exudyn_plugin",),
-    ("study",),
+    ("study.scene",),
+    ("study.running",),
+    ("study.measures", "study.sweep"),
+    ("study.comparison",),
+    ("study.accuracy",),
     ("cli",),
 )
-HEAVY = {"exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"), "matplotlib": ("multiphi_exudyn/study",)}
+HEAVY = {
+    "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
+    "matplotlib": ("multiphi_exudyn/study",),
+    "numba": ("multiphi_exudyn/compiled",),
+    "distributed": ("multiphi_exudyn/study/sweep",),
+}
 
 
 def sources() -> list[Path]:
@@ -43,7 +52,8 @@ def floor(module: str) -> int | None:
         return floor("multiphi_exudyn.exudyn_plugin")
     if parts[0] != "multiphi_exudyn" or len(parts) == 1:
         return None
-    return next((level for level, rooms in enumerate(FLOORS) if parts[1] in rooms), None)
+    room = ".".join(parts[1 : 3 if parts[1] == "study" else 2])
+    return next((level for level, rooms in enumerate(FLOORS) if room in rooms), None)
 
 
 def module_name(path: Path) -> str:
@@ -79,8 +89,10 @@ def test_nothing_light_is_imported_inside_a_function(path):
 
 
 def test_the_floors_see_a_breach():
-    assert floor("multiphi_exudyn.study.report") > floor("multiphi_exudyn.model")
-    assert next(imported(ast.parse("from multiphi_exudyn.study import report").body[0])) == "multiphi_exudyn.study"
+    assert floor("multiphi_exudyn.study.comparison.report") > floor("multiphi_exudyn.model")
+    assert next(imported(ast.parse("from multiphi_exudyn.study.comparison import report").body[0])) == (
+        "multiphi_exudyn.study.comparison"
+    )
 
 
 def test_importing_the_package_loads_neither_exudyn_nor_matplotlib():

@@ -7,8 +7,8 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import cli
-from multiphi_exudyn.study import reduced_runner
-from multiphi_exudyn.study.scenes import shipped_scenes
+from multiphi_exudyn.study.running import reduced_runner
+from multiphi_exudyn.study.scene.scenes import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from small_scene import changed, write
 
-from multiphi_exudyn.study import plots
-from multiphi_exudyn.study.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.findings import engineering, findings, percent, seconds, times
-from multiphi_exudyn.study.losses import loss_tables
-from multiphi_exudyn.study.mechanics import mechanics_of
-from multiphi_exudyn.study.mode_shapes import level_modes
-from multiphi_exudyn.study.report import render
-from multiphi_exudyn.study.runs import ModelRun
-from multiphi_exudyn.study.scenes import load_scene
-from multiphi_exudyn.study.workbench import prepare
+from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.comparison.findings import engineering, findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.losses import loss_tables
+from multiphi_exudyn.study.comparison.mode_shapes import level_modes
+from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
 
 FULL = {"kind": "full", "elements": 3, "step": 1e-4}
 MODELS = [

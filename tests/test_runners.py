@@ -5,11 +5,11 @@ import pytest
 from small_scene import changed, write
 
 from multiphi_exudyn import ModalDamping, MultiPhiModel, NumericalFailure, RayleighDamping, planar_beam
-from multiphi_exudyn.study.mechanics import mechanics_of
-from multiphi_exudyn.study.metrics import nrmse
-from multiphi_exudyn.study.runners import run_model
-from multiphi_exudyn.study.scenes import load_scene
-from multiphi_exudyn.study.workbench import damping_matrix, prepare, start_configuration
+from multiphi_exudyn.study.measures.metrics import nrmse
+from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import damping_matrix, prepare, start_configuration
 from reference_models.rig import rig_beam
 
 MODELS = [

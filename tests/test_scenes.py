@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError, RayleighDamping
-from multiphi_exudyn.study.mechanics import mechanics_of
-from multiphi_exudyn.study.scene_file import FullModel
-from multiphi_exudyn.study.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scene_file import FullModel
+from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 from reference_models.rig import rig
 
 

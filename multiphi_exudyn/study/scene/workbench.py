@@ -20,9 +20,9 @@ from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.modes import complete_modes
 from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
-from multiphi_exudyn.study.mechanics import Mechanics
-from multiphi_exudyn.study.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scenes import Scene, refuse
+from multiphi_exudyn.study.scene.mechanics import Mechanics
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 

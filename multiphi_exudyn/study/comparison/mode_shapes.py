@@ -9,7 +9,7 @@ import numpy as np
 from multiphi_exudyn.beam import Beam, planar_beam
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import LinearStructure
-from multiphi_exudyn.study.workbench import ELEMENTS, Workbench
+from multiphi_exudyn.study.scene.workbench import ELEMENTS, Workbench
 from reference_models.rig import PublishedLevel, published_frequencies
 
 __all__ = ["LevelModes", "level_modes"]

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from pydantic import ValidationError
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.scene_file import FullModel, ReducedModel, SceneFile, UserObjectModel
+from multiphi_exudyn.study.scene.scene_file import FullModel, ReducedModel, SceneFile, UserObjectModel
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -76,7 +76,7 @@ def refuse(scene: Scene, field: str, given: object, needed: str) -> NoReturn:
 
 
 def _shipped_folder() -> Path:
-    return Path(str(resources.files("multiphi_exudyn.study"))) / "shipped"
+    return Path(str(resources.files("multiphi_exudyn.study.scene"))) / "shipped"
 
 
 def _find(source: str) -> Path:

@@ -10,10 +10,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.study.runs import ModelRun, interval_array
-from multiphi_exudyn.study.scene_file import UserObjectModel
-from multiphi_exudyn.study.timing import repeated, timed
-from multiphi_exudyn.study.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.timing import repeated, timed
+from multiphi_exudyn.study.scene.scene_file import UserObjectModel
+from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from reference_models.body_alone import solve_body_alone
 
 __all__ = ["run_user_object"]

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.study.runs import ModelRun, interval_array
-from multiphi_exudyn.study.scene_file import DisplacedStart, FullModel
-from multiphi_exudyn.study.timing import repeated
-from multiphi_exudyn.study.workbench import Workbench, damping_matrix, start_configuration
+from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.timing import repeated
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel
+from multiphi_exudyn.study.scene.workbench import Workbench, damping_matrix, start_configuration
 from reference_models.full_beam import FullRun
 
 __all__ = ["run_full"]

@@ -7,13 +7,13 @@ start. Online is the solver alone, from the start to the end of the run.
 from __future__ import annotations
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.study.body_runner import run_user_object
-from multiphi_exudyn.study.full_runner import run_full
-from multiphi_exudyn.study.reduced_runner import run_reduced
-from multiphi_exudyn.study.runs import ModelRun
-from multiphi_exudyn.study.scene_file import FullModel, UserObjectModel
-from multiphi_exudyn.study.scenes import ModelSpec
-from multiphi_exudyn.study.workbench import Workbench
+from multiphi_exudyn.study.running.body_runner import run_user_object
+from multiphi_exudyn.study.running.full_runner import run_full
+from multiphi_exudyn.study.running.reduced_runner import run_reduced
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.scene_file import FullModel, UserObjectModel
+from multiphi_exudyn.study.scene.scenes import ModelSpec
+from multiphi_exudyn.study.scene.workbench import Workbench
 
 __all__ = ["label_of", "run_model"]
 

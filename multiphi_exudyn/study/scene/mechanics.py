@@ -19,7 +19,7 @@ from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
-from multiphi_exudyn.study.scene_file import (
+from multiphi_exudyn.study.scene.scene_file import (
     BeamSpec,
     DampingSpec,
     DisplacedStart,
@@ -31,7 +31,7 @@ from multiphi_exudyn.study.scene_file import (
     SectionSpec,
     StructureSpec,
 )
-from multiphi_exudyn.study.scenes import Scene, refuse
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 
 __all__ = ["Mechanics", "mechanics_of"]

@@ -1,7 +1,7 @@
 """The format of a scene file: structure + contacts + start + damping + outputs + the models to run.
 
 SI units, angles in radians. Every field is typed and none may be unknown; what the names in a file
-refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scenes`).
+refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene.scenes`).
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.simulate import simulate
-from multiphi_exudyn.study import metrics
-from multiphi_exudyn.study.scene_file import DisplacedStart
-from multiphi_exudyn.study.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart
+from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 
 __all__ = ["LossTable", "loss_tables"]
 

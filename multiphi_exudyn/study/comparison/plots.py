@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from multiphi_exudyn.study.compare import Comparison
-from multiphi_exudyn.study.mode_shapes import LevelModes
-from multiphi_exudyn.study.runs import ModelRun
+from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
+from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figure", "mode_figure", "png"]
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from multiphi_exudyn.study import metrics, plots
-from multiphi_exudyn.study.compare import Comparison
-from multiphi_exudyn.study.findings import findings, percent, seconds, times
-from multiphi_exudyn.study.losses import LossTable
-from multiphi_exudyn.study.mode_shapes import LevelModes
+from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.losses import LossTable
+from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
+from multiphi_exudyn.study.measures import metrics
 from reference_models.rig import rig
 
 __all__ = ["render"]
@@ -36,7 +37,9 @@ class Picture:
 
 def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequence[LossTable]) -> str:
     """The page as HTML."""
-    environment = Environment(loader=PackageLoader("multiphi_exudyn.study"), autoescape=True, undefined=StrictUndefined)
+    environment = Environment(
+        loader=PackageLoader("multiphi_exudyn.study.comparison"), autoescape=True, undefined=StrictUndefined
+    )
     environment.filters |= {"percent": percent, "seconds": seconds, "times": times}
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from multiphi_exudyn.study import metrics
-from multiphi_exudyn.study.compare import Comparison
-from multiphi_exudyn.study.runs import ModelRun
-from multiphi_exudyn.study.scene_file import DisplacedStart
+from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 
 __all__ = ["Findings", "findings", "percent", "seconds", "times"]
 

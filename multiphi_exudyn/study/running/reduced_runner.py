@@ -12,10 +12,10 @@ import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.simulate import simulate
-from multiphi_exudyn.study.runs import ModelRun, interval_array
-from multiphi_exudyn.study.scene_file import ReducedModel
-from multiphi_exudyn.study.timing import repeated, timed
-from multiphi_exudyn.study.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.timing import repeated, timed
+from multiphi_exudyn.study.scene.scene_file import ReducedModel
+from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.trajectory import Trajectory
 
 __all__ = ["run_reduced"]

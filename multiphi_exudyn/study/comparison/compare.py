@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.study import metrics
-from multiphi_exudyn.study.runners import run_model
-from multiphi_exudyn.study.runs import ModelRun
-from multiphi_exudyn.study.scene_file import ReducedModel, UserObjectModel
-from multiphi_exudyn.study.workbench import Workbench
+from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.workbench import Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]
 

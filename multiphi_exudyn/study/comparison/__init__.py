@@ -1,0 +1,1 @@
+"""All models of one scene side by side: figures, findings, report."""

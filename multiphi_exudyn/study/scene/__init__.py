@@ -1,0 +1,1 @@
+"""A scene: its file, what it means as mechanics, and the bench on which its models are built."""
