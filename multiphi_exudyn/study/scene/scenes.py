@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any, NoReturn
 
-from pydantic import ValidationError
-
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.scene.scene_file import FullModel, ReducedModel, SceneFile, UserObjectModel
+from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-__all__ = ["ModelSpec", "Scene", "load_scene", "refuse", "shipped_scenes"]
+__all__ = ["ModelSpec", "Scene", "load_scene", "refuse", "scene_data", "scene_of", "shipped_scenes"]
 
 ModelSpec = ReducedModel | UserObjectModel | FullModel
 
@@ -59,13 +51,23 @@ def load_scene(source: str, *, t_end: float | None = None, modes: int | None = N
 
     Raises MultiPhiValueError, one line: file, field, what was given, what is needed.
     """
-    path = _find(source)
-    data = _with_base(path, _read(path))
+    path, data = scene_data(source)
     if modes is not None:
         data["modes"] = modes
     if t_end is not None and isinstance(data.get("outputs", {}), dict):
         data["outputs"] = data.get("outputs", {}) | {"t_end": t_end}
-    scene = Scene(path.stem, path, _validated(path, data))
+    return scene_of(path, data)
+
+
+def scene_data(source: str, folder: Path | None = None) -> tuple[Path, dict[str, Any]]:
+    """Path and raw content, with its base's, of a shipped scene or a TOML file (relative to ``folder``)."""
+    path = _find(source, folder or Path())
+    return path, _with_base(path, read_toml(path))
+
+
+def scene_of(path: Path, data: Mapping[str, Any]) -> Scene:
+    """The scene of raw content, validated; ``path``: the file that errors name."""
+    scene = Scene(path.stem, path, validated(SceneFile, path, data))
     _check(scene)
     return scene
 
@@ -79,20 +81,13 @@ def _shipped_folder() -> Path:
     return Path(str(resources.files("multiphi_exudyn.study.scene"))) / "shipped"
 
 
-def _find(source: str) -> Path:
+def _find(source: str, folder: Path) -> Path:
     shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
     if source in shipped:
         return _shipped_folder() / f"{source}.toml"
-    if Path(source).is_file():
-        return Path(source)
+    if (folder / source).is_file():
+        return folder / source
     raise MultiPhiValueError(f"SCENE: got {source!r}, need a TOML file or one of: {', '.join(shipped)}")
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise MultiPhiValueError(f"{path}: got {_one_line(error)}, need a readable TOML file") from error
 
 
 def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
@@ -103,59 +98,10 @@ def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
     if base not in shipped:
         raise MultiPhiValueError(f"{path}: base: got {base!r}, need one of: {', '.join(shipped)}")
-    content = _read(_shipped_folder() / f"{base}.toml")
+    content = read_toml(_shipped_folder() / f"{base}.toml")
     if "base" in content:
         raise MultiPhiValueError(f"{path}: base: got {base!r}, need a scene that has no base itself")
     return content | data
-
-
-def _validated(path: Path, data: Mapping[str, Any]) -> SceneFile:
-    try:
-        return SceneFile.model_validate_json(json.dumps(data, default=str))
-    except ValidationError as error:
-        raise MultiPhiValueError(f"{path}: {_complaint(error, data)}") from error
-
-
-def _complaint(error: ValidationError, data: Mapping[str, Any]) -> str:
-    """The first wrong field: what was given, what is needed, and how many more there are."""
-    found: dict[str, tuple[str, list[str]]] = {}
-    for item in error.errors(include_url=False):
-        missing = item["type"] == "missing"
-        field = _field(item["loc"], data, missing)
-        given = "nothing" if missing else _one_line(repr(item["input"]))
-        found.setdefault(field, (given, []))[1].append(_needed(item))
-    field, (given, needs) = next(iter(found.items()))
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return f"{field}: got {given}, need {' or '.join(dict.fromkeys(needs))}{more}"
-
-
-def _needed(item: Mapping[str, Any]) -> str:
-    kinds = {
-        "missing": "a value",
-        "extra_forbidden": "no field of this name",
-        "union_tag_invalid": f"a kind among {item.get('ctx', {}).get('expected_tags')}",
-        "union_tag_not_found": "a table with the field kind",
-    }
-    return kinds.get(item["type"], _one_line(item["msg"]).removeprefix("Input should be "))
-
-
-def _field(location: Sequence[int | str], data: Any, missing: bool) -> str:
-    """Dotted place in the file, without the labels the validator gives to the branches of a union."""
-    text = ""
-    for i, part in enumerate(location):
-        if isinstance(part, int) and isinstance(data, list):
-            text += f"[{part}]"
-            data = data[part]
-        elif isinstance(data, Mapping) and (part in data or (missing and i == len(location) - 1)):
-            text += f".{part}" if text else str(part)
-            data = data.get(part)
-    return text or "scene"
-
-
-def _one_line(text: object) -> str:
-    """At most 120 characters on one line."""
-    line = " ".join(str(text).split())
-    return line if len(line) <= 120 else line[:117] + "..."
 
 
 def _check(scene: Scene) -> None:

@@ -1,0 +1,68 @@
+"""The format of a study file: a scene, what is varied in it, the methods to judge, and how.
+
+A *field* is a place in a scene file, written with dots ("start.displacement"). A *setting* is one choice of a method's
+own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can be
+lucky (micro-bounces are sampled differently by every step) it is run at several *nearby* values, and the worst counts.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from multiphi_exudyn.study.scene.scene_file import Finite, Positive, Table
+
+__all__ = ["BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile"]
+
+Value = Annotated[int, Field(strict=True)] | Finite | str | bool
+Values = Annotated[tuple[Value, ...], Field(min_length=1)]
+Factors = Annotated[tuple[Positive, ...], Field(min_length=1)]
+
+
+class MethodSpec(Table):
+    """One method: a model as in a scene file (without a name), and the axes of its settings."""
+
+    name: Annotated[str, Field(min_length=1)]
+    model: dict[str, Any]
+    axes: dict[str, Values] = {}
+    nearby: dict[str, Factors] = {}  # field -> factors on its value; a setting is judged by the worst of them
+    quick: dict[str, Values] = {}  # axes of the short form, in place of those of the same name
+
+
+class BudgetSpec(Table):
+    """The ladder from the full model to the reduced one, one run a rung."""
+
+    modes: Annotated[int, Field(ge=1)] = 6
+
+
+class QuickSpec(Table):
+    """What the short form of a study changes."""
+
+    change: dict[str, Any] = {}
+    axes: dict[str, Values] = {}
+
+
+class StudyFile(Table):
+    """A whole study file.
+
+    scene: a shipped scene or a TOML file beside the study. change: field -> value, for all runs. axes: field -> values;
+    every method runs at every combination of them. window [s]: the errors that are ranked are those from 0 to here.
+    tolerances: for which the cheapest settings are looked up. time_limit_s: of one run, wall clock.
+    timing: whether settings are timed, alone on the machine. histories: keep those of every run.
+    maps: methods whose time-frequency maps are drawn, each at its most accurate setting, beside the reference's.
+    """
+
+    title: Annotated[str, Field(min_length=1)]
+    scene: str
+    change: dict[str, Any] = {}
+    axes: dict[str, Values] = {}
+    methods: tuple[MethodSpec, ...] = ()
+    budget: BudgetSpec | None = None
+    window: Positive | None = None
+    tolerances: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.1, 0.05, 0.02, 0.01)
+    time_limit_s: Positive = 300.0
+    timing: bool = True
+    histories: bool = False
+    maps: tuple[str, ...] = ()
+    quick: QuickSpec = QuickSpec()
