@@ -1,1 +1,1 @@
-"""Accuracy studies: many runs of one scene's models, and error against run time with the reason for every error."""
+"""How far answers can be trusted: parts of a difference, each with its cause and its own uncertainty."""
