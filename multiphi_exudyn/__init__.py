@@ -9,11 +9,12 @@ from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.level import Level, LevelOverride
 from multiphi_exudyn.loads import ConstantLoad
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event
 from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
 from multiphi_exudyn.trajectory import Ledger, Trajectory
+from multiphi_exudyn.truncation import truncation_indicator
 
 __all__ = [
     "Beam",
@@ -33,8 +34,11 @@ __all__ = [
     "PointMass",
     "RayleighDamping",
     "Section",
+    "Tolerance",
     "Trajectory",
     "UnilateralContact",
+    "UpTo",
     "planar_beam",
     "simulate",
+    "truncation_indicator",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,9 +13,38 @@ import scipy.optimize
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.structure import LinearStructure, is_real
 
-__all__ = ["MultiPhiModel"]
+__all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
+
+
+@dataclass(frozen=True)
+class UpTo:
+    """Every level with its modes up to a cut-off frequency [Hz], at least one and at most ``most``.
+
+    A closed contact raises frequencies, so no level has more modes than the open one.
+    """
+
+    frequency: float
+    most: int = 60
+
+    def __post_init__(self) -> None:
+        _check_limits(self, "frequency", self.frequency, self.most)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Wanted truncation error of a run, from which its cut-off frequency follows.
+
+    error: of ``truncation_indicator``, an estimate of the relative error of displacements; 0.01 is 1 %.
+    most: modes that a level is given at most.
+    """
+
+    error: float
+    most: int = 60
+
+    def __post_init__(self) -> None:
+        _check_limits(self, "error", self.error, self.most)
 
 
 @dataclass(frozen=True)
@@ -23,15 +53,15 @@ class MultiPhiModel:
 
     structure: M, C, K and points. contacts: rigid or compliant, any number; with c contacts there are 2^c levels,
     of which only those asked for are built.
-    modes: r of every level, or "all". Levels are truncated from one larger basis, so
-    ``dataclasses.replace(model, modes=12)`` builds nothing anew.
+    modes: r of every level, or "all"; or ``UpTo`` a frequency; or a ``Tolerance``, from which ``simulate`` finds that
+    frequency. Levels are truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
     rules: what simulations keep for later ones, by static load.
     """
 
     structure: LinearStructure
     contacts: Sequence[UnilateralContact] = ()
-    modes: int | str = 6
+    modes: int | str | UpTo | Tolerance = 6
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     rules: dict[bytes, Any] = field(init=False, default_factory=dict, repr=False, compare=False)
@@ -57,15 +87,22 @@ class MultiPhiModel:
     def base(self) -> Base:
         """Coordinates common to all levels, built on first use."""
         if "base" not in self._shared:
-            self._shared["base"] = build_base(self.structure, self.contacts, self.modes)
+            self._shared["base"] = build_base(self.structure, self.contacts, self.most_modes or "all")
         base: Base = self._shared["base"]
         most = base.modes.count - len(self.contacts)
-        if self.modes != "all" and int(self.modes) > most:
+        if self.most_modes is not None and self.most_modes > most:
             raise MultiPhiValueError(
-                f"modes: got {self.modes}, need at most {most} "
+                f"modes: got {self.most_modes}, need at most {most} "
                 f"({base.modes.count} modes less {len(self.contacts)} contacts), or 'all'"
             )
         return base
+
+    @property
+    def most_modes(self) -> int | None:
+        """The largest number of modes that a level can have; None where it has all of them."""
+        if isinstance(self.modes, (UpTo, Tolerance)):
+            return max(1, min(self.modes.most, self.structure.n - len(self.contacts)))
+        return None if isinstance(self.modes, str) else int(self.modes)
 
     @property
     def levels_built(self) -> int:
@@ -98,7 +135,7 @@ class MultiPhiModel:
             full = self._shared["levels"].get(indices)
             if full is None:
                 full = self._shared["levels"][indices] = build_level(base, indices)
-            level = full if self.modes == "all" else full.truncated(int(self.modes))
+            level = full.truncated(self._modes_of(full))
             override = self.overrides.get(level.closed)
             self._levels[indices] = level if override is None else level.overridden(override)
         return self._levels[indices]
@@ -137,18 +174,38 @@ class MultiPhiModel:
         base = self._shared.get("base")
         if base is None or base.complete:
             return base is not None
-        return self.modes != "all" and BASE_MARGIN * int(self.modes) <= base.modes.count
+        return self.most_modes is not None and BASE_MARGIN * self.most_modes <= base.modes.count
 
     def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self.contacts[i].name for i in indices)
 
+    def _modes_of(self, full: Level) -> int:
+        """Number of modes of a level that has been built with all it can have."""
+        most = min(self.most_modes or full.modes, full.modes)
+        if not isinstance(self.modes, UpTo):
+            return most
+        return min(max(1, int(np.searchsorted(full.frequencies, self.modes.frequency, side="right"))), most)
+
     def _check_modes(self) -> None:
-        if self.modes == "all":
+        if isinstance(self.modes, (UpTo, Tolerance)) or (isinstance(self.modes, str) and self.modes == "all"):
             return
-        if isinstance(self.modes, bool) or not isinstance(self.modes, (int, np.integer)):
-            raise MultiPhiTypeError(f"modes: got {self.modes!r}, need an integer >= 1 or 'all'")
-        if self.modes < 1:
-            raise MultiPhiValueError(f"modes: got {self.modes}, need an integer >= 1 or 'all'")
+        needed = "need an integer >= 1, 'all', UpTo or Tolerance"
+        if not _is_count(self.modes):
+            raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
+        if int(self.modes) < 1:
+            raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
+
+
+def _is_count(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -> None:
+    kind = type(given).__name__
+    if not is_real(value) or not _is_count(most):
+        raise MultiPhiTypeError(f"{kind}: got {value!r} and {most!r}, need a number and an integer")
+    if not (math.isfinite(value) and value > 0 and most >= 1):
+        raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {name} > 0 and most >= 1")
 
 
 def _complementary(matrix: np.ndarray, constant: np.ndarray) -> np.ndarray:

@@ -7,19 +7,22 @@ analytic segments. A failure on the way ends the trajectory early, with a status
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.loads import ConstantLoad
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.state import Change, Event, Loss, Phase, State
 from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
+from multiphi_exudyn.truncation import adapted
 
 __all__ = ["Motion", "simulate"]
 
@@ -38,13 +41,16 @@ def simulate(
     """Motion of ``model`` from 0 to t_end [s].
 
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: constant loads.
+    A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
+    if isinstance(model.modes, Tolerance):
+        return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads))
     end = _time("t_end", t_end)
     load = _static_load(model, loads)
     start = _start(model, displacement, velocity)
-    motion = Motion(model, _rule(model, load), start)
+    motion = _motion(model, _rule(model, load), start, compiled)
     motion.advance(end)
     return motion.trajectory(end, loads)
 
@@ -78,16 +84,17 @@ class Motion:
         """Carries the state to ``end``, or to the failure that stops it."""
         try:
             while not self.message and self.time < end:
-                self._one_segment(end)
+                self._continue(end)
         except MultiPhiError as failure:
             self.message = f"at t = {self.time:.9g} s: {failure}"
 
     def trajectory(self, end: float, loads: Sequence[ConstantLoad]) -> Trajectory:
         """What has been collected."""
+        segments, events = self._collected()
         return Trajectory(
             model=self.model,
-            segments=tuple(self.segments),
-            events=tuple(self.events),
+            segments=segments,
+            events=events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",
             message=self.message,
@@ -98,11 +105,28 @@ class Motion:
                 levels_built=self.model.levels_built,
                 levels_possible=2 ** len(self.model.contacts),
                 transitions=self.rule.transitions - self._transitions,
-                events=len(self.events),
-                segments=len(self.segments),
+                events=len(events),
+                segments=len(segments),
                 function_evaluations=self.model.evaluations - self._evaluated,
             ),
         )
+
+    def _continue(self, end: float) -> None:
+        """Some way towards ``end``."""
+        self._one_segment(end)
+
+    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
+        return tuple(self.segments), tuple(self.events)
+
+    def _keep(self, segment: Segment) -> None:
+        self.segments.append(segment)
+
+    def _keep_event(self, event: Event) -> None:
+        self.events.append(event)
+
+    def _recent(self) -> Sequence[Segment]:
+        """The last segments that the chatter check asks for, one more than CHATTER_WINDOW where there are."""
+        return self.segments[-CHATTER_WINDOW - 1 :]
 
     def _one_segment(self, end: float) -> None:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
@@ -126,7 +150,7 @@ class Motion:
                 armed, armed_at = {contact for contact, _ in fallen}, reached
                 phases = tuple(Phase.ARMED if i in armed else phase for i, phase in enumerate(phases))
         started, self.time = self.time, end if reached == horizon else self.time + reached
-        self.segments.append(Segment(started, self.time, state.level, coefficients, state.phases, armed_at))
+        self._keep(Segment(started, self.time, state.level, coefficients, state.phases, armed_at))
         self.state = State(state.level, *own.response.state(coefficients, reached), phases)
         if asking:
             self.state, loss, changes = self.rule.decide(self.state, asking)
@@ -136,13 +160,14 @@ class Motion:
     def _record(self, changes: list[Change], loss: Loss) -> None:
         for change in changes:
             name = self.model.contacts[change.contact].name
-            self.events.append(Event(self.time, name, change.kind, loss, change.impulse))
+            self._keep_event(Event(self.time, name, change.kind, loss, change.impulse))
             loss = Loss()
 
     def _check_chatter(self) -> None:
-        if len(self.segments) <= CHATTER_WINDOW:
+        recent = self._recent()
+        if len(recent) <= CHATTER_WINDOW:
             return
-        window = self.segments[-CHATTER_WINDOW:]
+        window = recent[1:]
         elapsed = self.time - window[0].start
         highest = max(segment.level.level.highest_frequency for segment in window)
         if elapsed == 0 or 0 < highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
@@ -150,6 +175,55 @@ class Motion:
                 f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {EVENTS_PER_PERIOD} "
                 f"in a period of the highest kept mode ({highest:g} Hz)"
             )
+
+
+@dataclass
+class _CompiledMotion(Motion):
+    """A run that the compiled loop carries; the NumPy loop takes the segments which that one leaves."""
+
+    loop: Any = None
+    record: Any = None
+
+    def __post_init__(self) -> None:
+        self.record = self.loop.record()
+        super().__post_init__()
+
+    def _continue(self, end: float) -> None:
+        given = self.state, self.time, end, self.record, CHATTER_WINDOW, EVENTS_PER_PERIOD
+        self.state, self.time, chatter = self.loop.advance(*given)
+        if chatter:
+            self._check_chatter()
+        if self.time < end:
+            self._one_segment(end)
+
+    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
+        return self.record.segments, self.record.events
+
+    def _keep(self, segment: Segment) -> None:
+        self.record.add(segment)
+
+    def _keep_event(self, event: Event) -> None:
+        self.record.add_event(event)
+
+    def _recent(self) -> Sequence[Segment]:
+        return self.record.segments[-CHATTER_WINDOW - 1 :]
+
+
+def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
+    """The run, in the loop that is wanted and can be had."""
+    if compiled is False or rule.compiled is None and (rule.compiled := _compiled_loop(rule, compiled)) is None:
+        return Motion(model, rule, start)
+    return _CompiledMotion(model, rule, start, loop=rule.compiled)
+
+
+def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
+    """The compiled loop, None without numba; that is an error where it is needed."""
+    try:
+        return importlib.import_module("multiphi_exudyn.compiled.loop").CompiledLoop(rule)
+    except ImportError as error:
+        if needed:
+            raise MultiPhiError("compiled: got True without numba, need it: pip install multiphi-exudyn[fast]") from error
+        return None
 
 
 def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:

@@ -1,5 +1,6 @@
 """The reduced model as an Exudyn object answers as ``simulate`` does, alone, in pairs and with forces on it."""
 
+import dataclasses
 import functools
 import math
 import runpy
@@ -105,6 +106,15 @@ def test_matched_to_a_coarse_step_is_native(stiffness, damped):
     assert len(native.events) > 40
     assert [(e.contact, e.kind) for e in body.events] == [(e.contact, e.kind) for e in native.events]
     assert difference(body, native, POINTS) < 1e-7
+
+
+def test_levels_with_numbers_of_modes_of_their_own():
+    model, start = rig(COMPLIANT)
+    model = dataclasses.replace(model, modes=mp.UpTo(240.0))
+    assert (model.level(()).modes, model.level(("support",)).modes) == (4, 3)
+    native = mp.simulate(model, 0.2, displacement=start)
+    body = run(model, 5e-4, 0.2, displacement=start, matchedStepSize=5e-4)
+    assert difference(body, native, POINTS) < 1e-8
 
 
 def test_matched_events_lie_inside_steps_at_native_times():
@@ -408,6 +418,8 @@ def test_bad_arguments_are_refused(refused):
     model, start = rig(COMPLIANT)
     container, mbs = new_system()
     refused(TypeError, "model:", CreateMultiPhiBody, mbs, "rig")
+    adaptive = dataclasses.replace(model, modes=mp.Tolerance(0.01))
+    refused(ValueError, "model: got modes = Tolerance", CreateMultiPhiBody, mbs, adaptive)
     refused(ValueError, "displacement:", CreateMultiPhiBody, mbs, model, displacement=start[:-1])
     refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=1e-2)
     refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=-1e-4)

@@ -15,7 +15,7 @@ from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.loads import ConstantLoad
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.simulate import Motion, simulate
 from multiphi_exudyn.structure import is_real
 
@@ -52,6 +52,8 @@ def CreateMultiPhiBody(
         raise MultiPhiValueError(f"name: got {name!r}, which this system has already, need another one")
     if not isinstance(model, MultiPhiModel):
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
+    if isinstance(model.modes, Tolerance):
+        raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
     body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), matchedStepSize)
     body.items.update(_add_items(mbs, body, show))
