@@ -1,0 +1,10 @@
+"""Sweeps that lose nothing: one function over many cases, each finished run a row of a file."""
+
+from __future__ import annotations
+
+from multiphi_exudyn.study.sweep.executors import open_executor
+from multiphi_exudyn.study.sweep.run import Outcome
+from multiphi_exudyn.study.sweep.store import Row, Store
+from multiphi_exudyn.study.sweep.sweep import grid, sweep
+
+__all__ = ["Outcome", "Row", "Store", "grid", "open_executor", "sweep"]

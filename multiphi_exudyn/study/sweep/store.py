@@ -1,0 +1,240 @@
+"""File of finished runs: each is one row, there as a whole or not at all.
+
+SQLite, one transaction per run. Journal: write-ahead log, so that a commit is one append to a second file, readers and
+a writer do not wait for each other, and a process killed at any moment leaves either the run or nothing. Synchronous
+NORMAL: a commit does not wait for the disk. What the system holds outlives a killed process; a power failure may take
+the last runs, never the file, and those are then computed again. The log needs memory that its users share: all who
+write into one file are on one machine (workers elsewhere are not concerned, they hand their rows back).
+
+A run's key is (name, sha256 of its parameters' canonical JSON): sorted, without blanks, 1 and 1.0 being different.
+A new file is made under a temporary name and linked to its own, so that nobody ever sees a part of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import math
+import os
+import sqlite3
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+
+__all__ = ["STATUSES", "Row", "Store", "checked", "key_of", "pack", "plain"]
+
+STATUSES = ("ok", "failed", "over budget")
+FORMAT = 1
+MARK = int.from_bytes(b"mPhi", "big")  # SQLite's application id, bytes 68 to 71 of the file
+WAIT_S = 60.0  # s, for another process that writes
+SCHEMA = f"""
+PRAGMA journal_mode = WAL;
+PRAGMA application_id = {MARK};
+BEGIN;
+CREATE TABLE format (version INTEGER NOT NULL);
+INSERT INTO format VALUES ({FORMAT});
+CREATE TABLE environments (number INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE);
+CREATE TABLE runs (
+    number INTEGER PRIMARY KEY, name TEXT NOT NULL, key TEXT NOT NULL, parameters TEXT NOT NULL, status TEXT NOT NULL,
+    message TEXT NOT NULL, content TEXT NOT NULL, elapsed_s REAL NOT NULL, environment INTEGER NOT NULL,
+    finished TEXT NOT NULL, histories BLOB, UNIQUE (name, key)
+);
+COMMIT;
+"""
+ROW = """SELECT runs.parameters, status, message, runs.content, elapsed_s, environments.content, finished
+FROM runs JOIN environments ON environments.number = environment WHERE name = ?"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """How the run with these parameters ended.
+
+    status: "ok", "failed" or "over budget"; message: the cause where it is not "ok". elapsed_s: s of wall clock.
+    environment: machine and versions. finished: ISO 8601, UTC.
+    """
+
+    parameters: Mapping[str, Any]
+    status: str
+    message: str
+    values: Mapping[str, Any]
+    elapsed_s: float
+    environment: Mapping[str, Any]
+    finished: str
+
+
+class Store:
+    """Runs under their names in the file ``path``, which is made where there is none."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.exists():
+            _create(self.path)
+        self._environments: dict[str, int] = {}
+        self._connection = _opened(self.path)
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def rows(self, name: str) -> tuple[Row, ...]:
+        """All runs of ``name``, in the order in which they were added."""
+        with self._sound():
+            return tuple(map(_row, self._connection.execute(f"{ROW} ORDER BY runs.number", (name,))))
+
+    def find(self, name: str, parameters: Mapping[str, Any]) -> Row | None:
+        """The run with these parameters; None where it is not there."""
+        with self._sound():
+            found = self._connection.execute(f"{ROW} AND key = ?", (name, key_of(parameters))).fetchone()
+            return None if found is None else _row(found)
+
+    def histories(self, name: str, parameters: Mapping[str, Any]) -> dict[str, np.ndarray] | None:
+        """The run's arrays; None where none were kept."""
+        question = "SELECT histories FROM runs WHERE name = ? AND key = ?"
+        with self._sound():
+            found = self._connection.execute(question, (name, key_of(parameters))).fetchone()
+        if found is None or found[0] is None:
+            return None
+        with np.load(io.BytesIO(found[0]), allow_pickle=False) as arrays:
+            return dict(arrays)
+
+    def add(self, name: str, parameters: Mapping[str, Any], row: Row, histories: bytes | None = None) -> bool:
+        """Keep a run; False, and the file as it was, where these parameters have a run already.
+
+        histories: as :func:`pack` gives them.
+        """
+        if row.status not in STATUSES:
+            raise MultiPhiValueError(f"row: status {row.status!r}; need one of {', '.join(STATUSES)}")
+        given, content = checked(parameters), plain(row.values, "values")
+        with self._sound():
+            fields = (name, key_of(given), json.dumps(given), row.status, row.message, json.dumps(content))
+            fields += (row.elapsed_s, self._environment(row.environment), row.finished, histories)
+            places = "name, key, parameters, status, message, content, elapsed_s, environment, finished, histories"
+            marks = ", ".join("?" * len(fields))
+            order = f"INSERT INTO runs ({places}) VALUES ({marks}) ON CONFLICT DO NOTHING"
+            return self._connection.execute(order, fields).rowcount == 1
+
+    def _environment(self, environment: Mapping[str, Any]) -> int:
+        """Number of the environment, which stands in the file once."""
+        content = json.dumps(plain(environment, "environment"), sort_keys=True)
+        if content not in self._environments:
+            self._connection.execute("INSERT INTO environments (content) VALUES (?) ON CONFLICT DO NOTHING", (content,))
+            found = self._connection.execute("SELECT number FROM environments WHERE content = ?", (content,))
+            self._environments[content] = found.fetchone()[0]
+        return self._environments[content]
+
+    @contextlib.contextmanager
+    def _sound(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            raise _unusable(self.path, str(error)) from error
+
+
+def key_of(parameters: Mapping[str, Any]) -> str:
+    """sha256 of the parameters' canonical JSON."""
+    canonical = json.dumps(checked(parameters), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def checked(parameters: Mapping[str, Any], place: str = "parameters") -> dict[str, Any]:
+    """The parameters as JSON has them, all numbers finite."""
+    if not isinstance(parameters, Mapping):
+        raise MultiPhiTypeError(f"{place}: {type(parameters).__name__}; need a mapping from names to values")
+    return plain(parameters, place, _refused)
+
+
+def plain(value: Any, place: str, not_finite: Callable[[float, str], Any] = lambda value, place: None) -> Any:
+    """``value`` as JSON has it: NumPy's numbers become Python's, tuples lists; ``not_finite`` answers for nan, inf."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else not_finite(value, place)
+    if isinstance(value, (list, tuple)):
+        return [plain(item, f"{place}[{index}]", not_finite) for index, item in enumerate(value)]
+    if isinstance(value, Mapping) and all(isinstance(name, str) for name in value):
+        return {str(name): plain(item, f"{place}[{name!r}]", not_finite) for name, item in value.items()}
+    kind = "a mapping with names that are no text" if isinstance(value, Mapping) else type(value).__name__
+    raise MultiPhiValueError(f"{place}: {kind}; need numbers, text, bool, None, lists and mappings of them")
+
+
+def pack(histories: Mapping[str, np.ndarray]) -> bytes:
+    """The arrays as a compressed npz file."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in histories.items():
+            with archive.open(f"{name}.npy", "w") as entry:
+                np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _refused(value: float, place: str) -> Any:
+    raise MultiPhiValueError(f"{place}: {value}; need a finite number")
+
+
+def _row(found: tuple[Any, ...]) -> Row:
+    parameters, status, message, values, elapsed_s, environment, finished = found
+    content = json.loads(parameters), json.loads(values), json.loads(environment)
+    return Row(content[0], status, message, content[1], elapsed_s, content[2], finished)
+
+
+def _unusable(path: Path, cause: str) -> MultiPhiValueError:
+    return MultiPhiValueError(f"path: {path}: {cause}; need a sound file of this library's sweeps, or a new name")
+
+
+def _create(path: Path) -> None:
+    """An empty store at ``path``; another process may be quicker."""
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+            new = Path(folder) / path.name
+            with contextlib.closing(sqlite3.connect(new)) as connection:
+                connection.executescript(SCHEMA)
+            with contextlib.suppress(FileExistsError):
+                os.link(new, path)
+    except OSError as error:
+        raise _unusable(path, f"cannot be made ({error.strerror})") from error
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """Connection to a store; the mark is read first, because SQLite may write into what it opens."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(72)
+    except OSError as error:
+        raise _unusable(path, f"cannot be read ({error.strerror})") from error
+    if head[68:] != MARK.to_bytes(4, "big"):
+        raise _unusable(path, "is no store of runs")
+    try:
+        connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
+        try:
+            connection.execute("PRAGMA synchronous = NORMAL")
+            found = connection.execute("SELECT version FROM format").fetchall()
+            if found != [(FORMAT,)]:
+                raise _unusable(path, f"has format {found}, this version has {FORMAT}")
+        except BaseException:
+            connection.close()
+            raise
+    except sqlite3.DatabaseError as error:
+        raise _unusable(path, str(error)) from error
+    return connection

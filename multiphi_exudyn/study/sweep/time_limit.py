@@ -1,0 +1,78 @@
+"""Wall-clock limit of one call, in whatever thread it runs.
+
+A timer thread raises :class:`TimeLimitExceeded` in the calling thread (``PyThreadState_SetAsyncExc``) when the time is
+over, and again every second in case a destructor or a bare ``except`` has swallowed it. The interpreter raises between
+two bytecodes, so a call that never returns to it cannot be stopped: a long sleep, or a solver of compiled code that
+calls no Python function. Such a call ends when it ends, and its caller sees by the clock that it was too long.
+
+After the call nothing late can arrive: ``over`` is set before any other bytecode, the timer looks at it under the lock,
+and what was raised but has not arrived is taken back under the same lock.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+__all__ = ["TimeLimitExceeded", "call_within"]
+
+T = TypeVar("T")
+
+AGAIN_S = 1.0  # s, from one attempt to stop the call to the next
+
+
+class TimeLimitExceeded(BaseException):
+    """The time of a call is over. Not an Exception, so that ``except Exception`` inside the call does not end it."""
+
+
+def call_within(seconds: float | None, call: Callable[[], T]) -> T:
+    """What ``call`` gives or raises; TimeLimitExceeded is raised inside it after ``seconds`` [s], None: never."""
+    if seconds is None:
+        return call()
+    watch = _Watch(seconds)
+    try:
+        try:
+            watch.start()
+            return call()
+        finally:
+            watch.over = True
+            watch.call_off()
+    except TimeLimitExceeded:
+        watch.call_off()  # the exception may have cut the first one short
+        raise
+
+
+class _Watch:
+    """Timer of the thread that makes it; ``over``: nothing is raised any more."""
+
+    def __init__(self, seconds: float) -> None:
+        self.over = False
+        self._deadline = time.perf_counter() + seconds
+        self._thread = ctypes.c_ulong(threading.get_ident())
+        self._left = threading.Event()
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        threading.Thread(target=self._watch, name="time limit", daemon=True).start()
+
+    def call_off(self) -> None:
+        """Wait for an attempt that is under way, and take back what has not arrived."""
+        self._left.set()
+        with self._lock:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(self._thread, None)
+
+    def _watch(self) -> None:
+        while not self.over:
+            while (rest := self._deadline - time.perf_counter()) > 0:
+                if self._left.wait(rest):
+                    return
+            self._raise()
+            self._deadline += AGAIN_S
+
+    def _raise(self) -> None:
+        with self._lock:
+            if not self.over:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(self._thread, ctypes.py_object(TimeLimitExceeded))
