@@ -28,7 +28,7 @@ __all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figu
 
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#8A6D00", "#7F3C8D")
 REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
-MARKERS = {"reduced": "o", "user-object": "D", "full": "s"}
+MARKERS = {"reduced": "o", "user-object": "D", "full": "s", "craig-bampton": "^", "solve-ivp": "v", "global-basis": "P"}
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
 SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture

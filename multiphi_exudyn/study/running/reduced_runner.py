@@ -1,4 +1,4 @@
-"""Runs a Multi-Phi model by itself.
+"""Runs a Multi-Phi model by itself, or one basis for all of its levels.
 
 A level is built when it is first visited, so the first run is longer than its repeats; both are kept.
 """
@@ -14,18 +14,37 @@ from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.scene_file import ReducedModel
+from multiphi_exudyn.study.scene.scene_file import GlobalBasisModel, ReducedModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.trajectory import Trajectory
+from reference_models.global_basis import global_basis
 
-__all__ = ["run_reduced"]
+__all__ = ["ENERGY_INTERVAL", "run_global_basis", "run_reduced"]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
 
 
 def run_reduced(bench: Workbench, spec: ReducedModel, label: str) -> ModelRun:
-    """Start, simulate, sample; steps are events, of which there are as many as the motion has."""
+    """The model of a scene's entry from the scene's start."""
     (model, start), building = timed(lambda: _reduced_start(bench, spec))
+    return _run(bench, spec, label, model, start, building)
+
+
+def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str) -> ModelRun:
+    """The structure projected on one basis, from its own static equilibrium; with all its modes exact in time."""
+    (model, start), building = timed(lambda: _global_start(bench, spec))
+    return _run(bench, spec, label, model, start, building)
+
+
+def _run(
+    bench: Workbench,
+    spec: ReducedModel | GlobalBasisModel,
+    label: str,
+    model: MultiPhiModel,
+    start: np.ndarray,
+    building: float,
+) -> ModelRun:
+    """Simulate and sample; steps are events, of which there are as many as the motion has."""
     trajectory, first, repeats = repeated(lambda: timed(lambda: simulate(model, bench.t_end, displacement=start)))
     run = ModelRun(
         name=spec.name,
@@ -45,6 +64,14 @@ def run_reduced(bench: Workbench, spec: ReducedModel, label: str) -> ModelRun:
 def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, np.ndarray]:
     model = bench.model(spec)
     return model, start_configuration(bench, model)
+
+
+def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiModel, np.ndarray]:
+    contacts = bench.contacts(spec.contact == "rigid")
+    assert spec.modes is not None, "filled in where the scene lists its models"
+    projected = global_basis(bench.structure, contacts, spec.modes)
+    model = MultiPhiModel(projected, contacts, modes="all")
+    return model, start_configuration(replace(bench, structure=projected), model)
 
 
 def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:

@@ -8,10 +8,18 @@ from __future__ import annotations
 
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.study.running.body_runner import run_user_object
+from multiphi_exudyn.study.running.craig_bampton_runner import run_craig_bampton
 from multiphi_exudyn.study.running.full_runner import run_full
-from multiphi_exudyn.study.running.reduced_runner import run_reduced
+from multiphi_exudyn.study.running.reduced_runner import run_global_basis, run_reduced
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_file import FullModel, UserObjectModel
+from multiphi_exudyn.study.running.stepwise_runner import run_stepwise
+from multiphi_exudyn.study.scene.scene_file import (
+    CraigBamptonModel,
+    FullModel,
+    GlobalBasisModel,
+    StepwiseModel,
+    UserObjectModel,
+)
 from multiphi_exudyn.study.scene.scenes import ModelSpec
 from multiphi_exudyn.study.scene.workbench import Workbench
 
@@ -27,6 +35,12 @@ def run_model(bench: Workbench, name: str, progress: bool = True) -> ModelRun:
             return run_full(bench, spec, label, progress)
         if isinstance(spec, UserObjectModel):
             return run_user_object(bench, spec, label)
+        if isinstance(spec, CraigBamptonModel):
+            return run_craig_bampton(bench, spec, label)
+        if isinstance(spec, StepwiseModel):
+            return run_stepwise(bench, spec, label)
+        if isinstance(spec, GlobalBasisModel):
+            return run_global_basis(bench, spec, label)
         return run_reduced(bench, spec, label)
     except (MultiPhiError, ArithmeticError, RuntimeError, ValueError) as error:
         cause = " ".join(str(error).split())
@@ -38,8 +52,16 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
     if isinstance(spec, FullModel):
         kind = "ANCF" if spec.beam == "ancf" else "geometrically exact"
         return f"full Exudyn beam, {kind}, {spec.elements} elements, step {spec.step * 1e6:g} µs"
+    if isinstance(spec, CraigBamptonModel):
+        start = "" if bench.scene.file.start.load_at in bench.interface else ", start projected"
+        reduced = f"{len(bench.interface)} interface points + {spec.modes} modes"
+        return f"Craig-Bampton in Exudyn, {reduced}, step {spec.step * 1e6:g} µs{start}"
+    if isinstance(spec, StepwiseModel):
+        return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
     rigid = all(contact.rigid for contact in bench.contacts(spec.contact == "rigid"))
     levels = f"{'rigid' if rigid else 'compliant'} levels, r = {spec.modes}"
+    if isinstance(spec, GlobalBasisModel):
+        return f"global basis, {levels} from each of two"
     levels += ", printed frequencies" if bench.overrides else ""
     if isinstance(spec, UserObjectModel):
         return f"Exudyn user object, {levels}, step {spec.step * 1e6:g} µs"

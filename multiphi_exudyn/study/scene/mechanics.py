@@ -21,17 +21,21 @@ from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.scene_file import (
     BeamSpec,
+    CraigBamptonModel,
     DampingSpec,
     DisplacedStart,
     FullModel,
     MatrixStructure,
     ModalDampingSpec,
     RectangleSection,
+    ReducedModel,
     RigStructure,
     SectionSpec,
+    StepwiseModel,
     StructureSpec,
+    UserObjectModel,
 )
-from multiphi_exudyn.study.scene.scenes import Scene, refuse
+from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 
 __all__ = ["Mechanics", "mechanics_of"]
@@ -171,12 +175,21 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
         if names.count(name) > 1:
             refuse(scene, "contacts", name, "a name of its own for every contact")
     _check_published(scene, mechanics)
-    full = [i for i, model in enumerate(scene.file.models) if isinstance(model, FullModel)]
-    if full and mechanics.beam is None:
-        refuse(scene, f"models[{full[0]}].kind", "full", "reduced or user-object: matrices have no full model")
-    rigid = [contact.name for contact in mechanics.contacts if contact.rigid]
-    if full and rigid:
-        refuse(scene, f"stiffness of contact {rigid[0]}", "inf", "a finite one: the full model is a penalty model")
+    for i, model in enumerate(scene.file.models):
+        if isinstance(model, FullModel) and mechanics.beam is None:
+            refuse(scene, f"models[{i}].kind", "full", "reduced or user-object: matrices have no full model")
+        for contact in mechanics.contacts:
+            _check_contact_of(scene, f"models[{i}].kind", model, contact)
+
+
+def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: UnilateralContact) -> None:
+    """Penalty models need a finite stiffness, penalty elements on one coordinate a single point."""
+    if contact.rigid and isinstance(model, (FullModel, CraigBamptonModel, StepwiseModel)):
+        refuse(scene, f"stiffness of contact {contact.name}", "inf", f"a finite one: {model.name} is a penalty model")
+    points = 1 if isinstance(contact.direction, str) else len(contact.direction)
+    if points > 1 and isinstance(model, (FullModel, CraigBamptonModel)):
+        needed = f"another kind: its contacts act on single points, {contact.name} on {points}"
+        refuse(scene, field_name, model.kind, needed)
 
 
 def _check_published(scene: Scene, mechanics: Mechanics) -> None:
@@ -184,7 +197,9 @@ def _check_published(scene: Scene, mechanics: Mechanics) -> None:
     if mechanics.parameter_set is None or not published_override(mechanics.parameter_set):
         return
     for i, model in enumerate(scene.file.models):
-        if not isinstance(model, FullModel) and model.contact != "rigid":
+        if isinstance(model, StepwiseModel):
+            refuse(scene, f"models[{i}].kind", model.kind, "reduced: the printed frequencies are of a rigid support")
+        if isinstance(model, (ReducedModel, UserObjectModel)) and model.contact != "rigid":
             refuse(
                 scene, f"models[{i}].contact", model.contact, "'rigid': the printed frequencies are of a rigid support"
             )

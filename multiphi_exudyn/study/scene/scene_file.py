@@ -16,14 +16,17 @@ __all__ = [
     "BeamSpec",
     "BeamStructure",
     "ContactSpec",
+    "CraigBamptonModel",
     "DisplacedStart",
     "FullModel",
+    "GlobalBasisModel",
     "MatrixStructure",
     "ModalDampingSpec",
     "RectangleSection",
     "ReducedModel",
     "RigStructure",
     "SceneFile",
+    "StepwiseModel",
     "UserObjectModel",
 ]
 
@@ -41,6 +44,7 @@ Stiffness = Annotated[float, Field(gt=0)]  # N/m or N m; infinite is ideally rig
 NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
 Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
 Modes = Annotated[int, Field(ge=1)] | Literal["all"]
+RelativeTolerance = Annotated[float, Field(ge=1e-13, lt=1)]  # below it lies round-off
 
 
 def _by_key(*keys: str) -> Discriminator:
@@ -235,7 +239,40 @@ class FullModel(Table):
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
 
-ModelSpec = Annotated[ReducedModel | UserObjectModel | FullModel, Field(discriminator="kind")]
+class CraigBamptonModel(Table):
+    """A Craig-Bampton component in Exudyn, contact elements on its interface coordinates."""
+
+    kind: Literal["craig-bampton"]
+    name: Name
+    modes: Annotated[int, Field(ge=0)]  # with the interface held
+    step: Positive  # s
+    newton_tolerance: Positive = 1e-6  # relative and absolute
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
+
+
+class StepwiseModel(Table):
+    """The reduced equations of a Multi-Phi model integrated by scipy's solve_ivp; compliant contacts only."""
+
+    kind: Literal["solve-ivp"]
+    name: Name
+    modes: Modes | None = None
+    method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
+    rtol: RelativeTolerance
+
+
+class GlobalBasisModel(Table):
+    """One basis for all levels, the modes of the open and of the closed one together, without time steps."""
+
+    kind: Literal["global-basis"]
+    name: Name
+    modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
+    contact: Literal["as-given", "rigid"] = "as-given"
+
+
+ModelSpec = Annotated[
+    ReducedModel | UserObjectModel | FullModel | CraigBamptonModel | StepwiseModel | GlobalBasisModel,
+    Field(discriminator="kind"),
+]
 
 
 class ComparisonSpec(Table):

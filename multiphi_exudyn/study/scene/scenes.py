@@ -9,12 +9,20 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.scene.scene_file import FullModel, ReducedModel, SceneFile, UserObjectModel
+from multiphi_exudyn.study.scene.scene_file import (
+    CraigBamptonModel,
+    FullModel,
+    GlobalBasisModel,
+    ReducedModel,
+    SceneFile,
+    StepwiseModel,
+    UserObjectModel,
+)
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 
 __all__ = ["ModelSpec", "Scene", "load_scene", "refuse", "scene_data", "scene_of", "shipped_scenes"]
 
-ModelSpec = ReducedModel | UserObjectModel | FullModel
+ModelSpec = ReducedModel | UserObjectModel | FullModel | CraigBamptonModel | StepwiseModel | GlobalBasisModel
 
 MOST_SAMPLES = 10_000_000  # of one history: beyond that a typing error is likelier than a wish
 

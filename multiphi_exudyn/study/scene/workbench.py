@@ -6,14 +6,16 @@ differ in nothing but the reduction, the geometric nonlinearity and the time int
 
 from __future__ import annotations
 
+import functools
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
 
-from multiphi_exudyn.beam import planar_beam
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.level import LevelOverride
@@ -21,8 +23,16 @@ from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.modes import complete_modes
 from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.mechanics import Mechanics
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.scene_file import (
+    CraigBamptonModel,
+    DisplacedStart,
+    FullModel,
+    ReducedModel,
+    StepwiseModel,
+    UserObjectModel,
+)
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
+from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
@@ -30,6 +40,7 @@ __all__ = ["Workbench", "damping_matrix", "prepare", "start_configuration"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
+KEPT_STRUCTURES = 32  # linearised beams kept for later scenes; each is two matrices of some 100 DoFs
 ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
 
 
@@ -75,10 +86,15 @@ class Workbench:
         published = {} if name is None else published_override(name)
         return {level: LevelOverride(given.frequencies, given.ratios) for level, given in published.items()}
 
-    def model(self, spec: ReducedModel | UserObjectModel) -> MultiPhiModel:
+    @property
+    def interface(self) -> tuple[str, ...]:
+        """Points a Craig-Bampton component keeps: of contacts and outputs, those independent of each other."""
+        return _interface(self.structure, self.mechanics, self.points)
+
+    def model(self, spec: ReducedModel | UserObjectModel | StepwiseModel) -> MultiPhiModel:
         """The reduced model of a scene's entry."""
-        contacts = self.contacts(spec.contact == "rigid")
-        return MultiPhiModel(self.structure, contacts, modes=spec.modes or "all", overrides=self.overrides)
+        rigid = not isinstance(spec, StepwiseModel) and spec.contact == "rigid"
+        return MultiPhiModel(self.structure, self.contacts(rigid), modes=spec.modes or "all", overrides=self.overrides)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
@@ -87,10 +103,9 @@ class Workbench:
 
 def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
     """Build what the scene's models share; raises MultiPhiValueError naming file and field."""
-    started = time.perf_counter()
-    structure = replace(_structure(scene, mechanics), damping=mechanics.damping)
-    elapsed = time.perf_counter() - started
-    _check_modes(scene, structure, len(mechanics.contacts))
+    structure, elapsed = _structure(scene, mechanics)
+    structure = replace(structure, damping=mechanics.damping)
+    _check_modes(scene, structure, mechanics)
     outputs = scene.file.outputs
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
     lowest = float(MultiPhiModel(structure, modes=1).level(()).frequencies[0])
@@ -131,15 +146,36 @@ def damping_matrix(structure: LinearStructure) -> np.ndarray | None:
     return given
 
 
-def _structure(scene: Scene, mechanics: Mechanics) -> LinearStructure:
+def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:
+    """M, K and points, and what it took to get them [s]; the same beam is linearised once for all scenes."""
     if mechanics.matrices is not None:
-        return mechanics.matrices
+        return mechanics.matrices, 0.0
     full = [model for model in scene.models.values() if isinstance(model, FullModel)]
     named = [model for model in full if model.name == scene.file.comparison.reference]
-    if named or full:
-        return _full_beam(scene, mechanics, (named or full)[0]).structure
-    assert mechanics.beam is not None, "a structure is a beam or matrices"
-    return planar_beam(mechanics.beam, ELEMENTS)
+    kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
+    beam = mechanics.beam
+    assert beam is not None, "a structure is a beam or matrices"
+    points = tuple(beam.points.items())
+    return _discretised(tuple(beam.sections), points, tuple(beam.masses), beam.clamp, kind, elements)
+
+
+@functools.lru_cache(maxsize=KEPT_STRUCTURES)
+def _discretised(
+    sections: tuple[Section, ...],
+    points: tuple[tuple[str, float], ...],
+    masses: tuple[PointMass, ...],
+    clamp: Clamp,
+    kind: str | None,
+    elements: int,
+) -> tuple[LinearStructure, float]:
+    """A beam as the linearised full beam of a kind, or without one as linear elements; seconds of the first time."""
+    started = time.perf_counter()
+    beam = Beam(sections, dict(points), masses, clamp)
+    if kind is None:
+        structure = planar_beam(beam, elements)
+    else:
+        structure = FullBeam(beam, (), FullBeamSettings(kind=kind, elements=elements)).structure
+    return structure, time.perf_counter() - started
 
 
 def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
@@ -156,11 +192,38 @@ def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
     return FullBeam(mechanics.beam, mechanics.contacts, settings)
 
 
-def _check_modes(scene: Scene, structure: LinearStructure, contacts: int) -> None:
-    most = structure.n - contacts
-    for model in scene.models.values():
-        modes = 0 if isinstance(model, FullModel) or model.modes in (None, "all") else int(model.modes)
-        if modes > most:
-            refuse(scene, f"modes of {model.name}", modes, f"at most {most} for this structure")
+def _interface(structure: LinearStructure, mechanics: Mechanics, outputs: Sequence[str]) -> tuple[str, ...]:
+    return independent_points(structure, dict.fromkeys([*_contact_points(mechanics), *outputs]))
+
+
+def _contact_points(mechanics: Mechanics) -> list[str]:
+    """Points the contacts act on, each once."""
+    directions = [contact.direction for contact in mechanics.contacts]
+    return list(dict.fromkeys(name for given in directions for name in ([given] if isinstance(given, str) else given)))
+
+
+def _check_modes(scene: Scene, structure: LinearStructure, mechanics: Mechanics) -> None:
+    """No model has more modes than there are."""
+    most = structure.n - len(mechanics.contacts)
     if most < 1:
-        raise MultiPhiValueError(f"{scene.path}: structure: got {structure.n} DoFs and {contacts} contacts")
+        raise MultiPhiValueError(
+            f"{scene.path}: structure: got {structure.n} DoFs and {len(mechanics.contacts)} contacts"
+        )
+    for model in scene.models.values():
+        if isinstance(model, CraigBamptonModel):
+            _check_component(scene, structure, mechanics, model)
+        elif not isinstance(model, FullModel) and model.modes not in (None, "all") and int(model.modes) > most:
+            refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
+
+
+def _check_component(scene: Scene, structure: LinearStructure, mechanics: Mechanics, model: CraigBamptonModel) -> None:
+    """Every contact on a coordinate of its own, and no more modes than are left."""
+    interface = _interface(structure, mechanics, scene.file.outputs.points or mechanics.points)
+    missing = [name for name in _contact_points(mechanics) if name not in interface]
+    if missing:
+        refuse(
+            scene, f"kind of {model.name}", model.kind, f"another: contact point {missing[0]} follows from the others"
+        )
+    most = structure.n - len(interface)
+    if model.modes > most:
+        refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} beside {len(interface)} interface points")

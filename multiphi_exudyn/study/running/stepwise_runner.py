@@ -1,0 +1,65 @@
+"""Runs the reduced equations of a Multi-Phi model through scipy's solve_ivp.
+
+A step size control that is asked for too little can feed energy to the highest modes; such a run has failed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.study.running.energy_gain import energy_gain
+from multiphi_exudyn.study.running.reduced_runner import ENERGY_INTERVAL
+from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.timing import repeated, timed
+from multiphi_exudyn.study.scene.scene_file import StepwiseModel
+from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
+from reference_models.stepwise import StepwiseRun, solve_stepwise
+
+__all__ = ["run_stepwise"]
+
+
+def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str) -> ModelRun:
+    """Start, integrate, sample."""
+    model = bench.model(spec)
+    start, building = timed(lambda: start_configuration(bench, model))
+
+    def solve() -> StepwiseRun:
+        return solve_stepwise(model, bench.t_end, start, method=spec.method, rtol=spec.rtol)
+
+    solved, first, repeats = repeated(lambda: timed(solve))
+    run = ModelRun(
+        name=spec.name,
+        kind=spec.kind,
+        label=label,
+        dofs=solved.segments[0].level.level.modes,
+        status="failed" if solved.message else "ok",
+        message=solved.message,
+        steps=solved.steps,
+        offline_s=bench.structure_s + building,
+        first_s=first,
+        repeats_s=repeats,
+    )
+    return _sampled(bench, solved, run) if run.ok else run
+
+
+def _sampled(bench: Workbench, solved: StepwiseRun, run: ModelRun) -> ModelRun:
+    """The run with its histories, or failed for an energy gain."""
+    histories, sampling = timed(lambda: solved.histories(bench.points, bench.time))
+    energy_time = np.linspace(0.0, bench.t_end, round(bench.t_end / ENERGY_INTERVAL) + 1)
+    energy = solved.histories((), energy_time).energy
+    gained = energy_gain(energy_time, energy)
+    if gained:
+        return replace(run, status="failed", message=gained)
+    forces = histories.contact_force
+    fields: dict[str, Any] = {
+        "time": bench.time,
+        "points": histories.points,
+        "gaps": histories.gaps,
+        "contact_force": forces,
+        "contact_intervals": {name: interval_array(solved.contact_intervals(name)) for name in forces},
+        "impulse": {name: float(np.trapezoid(force, bench.time)) for name, force in forces.items()},
+    }
+    return replace(run, energy_time=energy_time, energy=energy, sampling_s=sampling, **fields)
