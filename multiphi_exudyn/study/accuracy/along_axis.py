@@ -1,0 +1,157 @@
+"""A study's settings along one axis: convergence with observed orders, and tables along a scene's axis.
+
+With mesh size, step or tolerance h (h = 1 / value for modes and elements) the observed order is
+
+    p = log(e1 / e2) / log(h1 / h2)        between consecutive values
+
+and along a scene's axis, where h is the value itself, p says error ~ value**p.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from multiphi_exudyn.study.accuracy.analysis import (
+    REFERENCE,
+    Setting,
+    StudyResult,
+    is_number,
+    names_of,
+    references,
+    settings,
+)
+from multiphi_exudyn.study.sweep.store import key_of
+
+__all__ = ["FINEST", "Series", "Table", "numeric_axes", "series", "tables_along"]
+
+FINEST: Mapping[str, Callable[[Iterable[float]], float]] = {
+    "modes": max,
+    "elements": max,
+    "step": min,
+    "rtol": min,
+    "newton_tolerance": min,
+}
+
+
+@dataclass(frozen=True)
+class Series:
+    """A method's settings along one numeric axis, values ascending, all other fields fixed."""
+
+    method: str
+    axis: str
+    fixed: Mapping[str, Any]
+    settings: tuple[Setting, ...]
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Along the axis."""
+        return tuple(_fields(setting)[self.axis] for setting in self.settings)
+
+    @property
+    def errors(self) -> tuple[float | None, ...]:
+        """Worst of nearby, None in a gap."""
+        return tuple(setting.error for setting in self.settings)
+
+    @property
+    def orders(self) -> tuple[float | None, ...]:
+        """Observed orders between consecutive values; along a scene's axis p of error ~ value**p."""
+        sign = -1.0 if FINEST.get(self.axis) is max else 1.0
+        pairs = list(zip(self.values, self.errors, strict=True))
+        return tuple(_order(*one, *two, sign) for one, two in itertools.pairwise(pairs))
+
+
+@dataclass(frozen=True)
+class Table:
+    """One quantity along a scene's axis: method -> one cell for each value; contact "" where there is none to name."""
+
+    quantity: str
+    contact: str
+    axis: str
+    values: tuple[float, ...]
+    columns: Mapping[str, tuple[float | None, ...]]
+
+
+def series(settings: Sequence[Setting], method: str, axis: str) -> Series | None:
+    """The method along one axis, every other field at its finest value (those without one: at their first).
+
+    Fields that leave fewer than two errors are passed over where others have them. None without two numeric values.
+    """
+    groups: dict[str, list[Setting]] = {}
+    for setting in settings:
+        if setting.method == method and is_number(_fields(setting).get(axis)):
+            groups.setdefault(key_of(_others(setting, axis)), []).append(setting)
+    known = [sorted(group, key=lambda s: _fields(s)[axis]) for group in groups.values() if len(group) > 1]
+    if not known:
+        return None
+    best = max(known, key=lambda group: (sum(s.error is not None for s in group) > 1, _fineness(group[0], axis)))
+    return Series(method, axis, _others(best[0], axis), tuple(best))
+
+
+def numeric_axes(settings: Sequence[Setting], of_scene: bool) -> list[str]:
+    """Fields, of the scene or of the methods, that take two or more numeric values."""
+    found: dict[str, set[float]] = {}
+    for setting in settings:
+        for field, value in (setting.at if of_scene else setting.setting).items():
+            if is_number(value):
+                found.setdefault(field, set()).add(value)
+    return [field for field, values in found.items() if len(values) > 1]
+
+
+def tables_along(result: StudyResult, axis: str) -> list[Table]:
+    """Error, first contact, losses inside the first phase and impulse along a scene's axis, by method."""
+    everything = [*references(result), *settings(result)]
+    lines = [line for name in names_of(everything) if (line := series(everything, name, axis))]
+    values = tuple(sorted({value for line in lines for value in line.values}))
+    contacts = dict.fromkeys(c for line in lines for s in line.settings for c in s.values.get("first_contact", {}))
+    wanted = [("error", ""), *((q, c) for q in ("first_contact", "inner_losses", "impulse") for c in contacts)]
+    return [
+        Table(quantity, contact, axis, values, _columns(lines, values, quantity, contact))
+        for quantity, contact in wanted
+    ]
+
+
+def _fields(setting: Setting) -> dict[str, Any]:
+    return {**setting.at, **setting.setting}
+
+
+def _others(setting: Setting, axis: str) -> dict[str, Any]:
+    return {field: value for field, value in _fields(setting).items() if field != axis}
+
+
+def _fineness(setting: Setting, axis: str) -> tuple[float, ...]:
+    """Larger is finer, field by field; fields without a fine end do not count, so the first one stays."""
+    others = _others(setting, axis)
+    return tuple(_fine(FINEST[field], value) for field, value in others.items() if field in FINEST)
+
+
+def _fine(finest: Callable[..., float], value: Any) -> float:
+    if not is_number(value):
+        return math.inf  # "all" modes
+    return float(value) if finest is max else -float(value)
+
+
+def _order(h1: float, e1: float | None, h2: float, e2: float | None, sign: float) -> float | None:
+    if not e1 or not e2 or h1 * h2 <= 0 or h1 == h2:
+        return None
+    return sign * math.log(e1 / e2) / math.log(h1 / h2)
+
+
+def _columns(
+    lines: Sequence[Series], values: Sequence[float], quantity: str, contact: str
+) -> dict[str, tuple[float | None, ...]]:
+    found = {line.method: dict(zip(line.values, line.settings, strict=True)) for line in lines}
+    return {
+        name: tuple(_cell(of_value.get(value), quantity, contact) for value in values)
+        for name, of_value in found.items()
+        if not (quantity == "error" and name == REFERENCE)
+    }
+
+
+def _cell(setting: Setting | None, quantity: str, contact: str) -> float | None:
+    if setting is None:
+        return None
+    return setting.error if quantity == "error" else setting.values.get(quantity, {}).get(contact)

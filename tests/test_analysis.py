@@ -1,0 +1,229 @@
+"""Fronts, gaps, orders, correlation and tables on data whose answers are known."""
+
+import csv
+import io
+import math
+from dataclasses import replace
+
+import pytest
+from small_study import result_of, row, small_study, timing
+
+from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
+from multiphi_exudyn.study.accuracy.analysis import (
+    cheapest,
+    front,
+    full_methods,
+    points,
+    pointwise_until,
+    references,
+    settings,
+    times_faster,
+    uncertainty,
+    words,
+)
+from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
+from multiphi_exudyn.study.accuracy.study_csv import csv_text
+
+STEP = {"step": 1e-4}
+
+
+def timed(*pairs, method="a"):
+    """Settings 1, 2, ... of one method with given (time, error)."""
+    runs = [(i, online, error) for i, (online, error) in enumerate(pairs)]
+    rows = [row(method, error, setting={"modes": i + 1}) for i, _, error in runs]
+    timings = [timing(method, online, setting={"modes": i + 1}) for i, online, _ in runs if online is not None]
+    return settings(result_of(rows, timings))
+
+
+def modes_of(found):
+    return [setting.setting["modes"] for setting in found]
+
+
+def test_a_setting_is_as_wrong_as_the_worst_of_its_nearby_runs_and_of_the_judged_points():
+    rows = [
+        row("a", e, setting=STEP, nearby=near) for e, near in ((0.01, {}), (0.05, {"step": 0.9}), (0.02, {"step": 0.8}))
+    ]
+    (found,) = settings(result_of(rows, [timing("a", 2.0, setting=STEP)]))
+    assert (found.error, found.own_error, found.message) == (0.05, 0.01, "")
+    assert (found.online_s, found.spread, found.first_s, found.offline_s) == (2.0, (1.8, 2.6), 4.0, 0.3)
+    (only_node2,) = settings(result_of(rows, judged_points=("node2",)))
+    assert only_node2.error == 0.025
+
+
+@pytest.mark.parametrize("status", ["failed", "over budget"])
+def test_one_nearby_run_without_an_error_leaves_a_gap_with_its_cause(status):
+    rows = [row("a", 0.01, setting=STEP), row("a", setting=STEP, nearby={"step": 0.9}, status=status, message="why")]
+    (found,) = settings(result_of(rows, [timing("a", 2.0, setting=STEP)]))
+    assert found.error is None
+    assert found.own_error == 0.01
+    assert found.message == f"{status}: why (nearby: step × 0.9)"
+    assert front([found]) == []
+    assert cheapest([found], 1.0) == {"a": None}
+
+
+def test_no_error_is_told_apart_from_no_run_and_the_reference_needs_none():
+    rows = [row("reference"), row("a"), row("b", 0.1)]
+    broken = replace(timing("b", 1.0), status="failed", message="machine asleep", values={})
+    result = result_of(rows, [broken])
+    assert [s.message for s in settings(result)] == [
+        "no error: nothing to compare it with",
+        "timing failed: machine asleep",
+    ]
+    assert references(result)[0].message == ""
+    half = result_of([replace(row("a"), values={"nrmse": {"0.3": {"node2": 0.1, "node3": None}}})])
+    assert settings(half)[0].error is None
+
+
+def test_settings_at_other_points_of_the_scene_are_others():
+    rows = [row(m, e, {"load": x}) for x, e in ((1.0, 0.1), (2.0, 0.2)) for m in ("coarser", "a")]
+    result = result_of(rows, [timing("a", x, {"load": x}) for x in (1.0, 2.0)])
+    assert [(s.at["load"], s.error, s.online_s) for s in settings(result)] == [(1.0, 0.1, 1.0), (2.0, 0.2, 2.0)]
+    assert points(result) == [{"load": 1.0}, {"load": 2.0}]
+    assert uncertainty(result, {"load": 2.0}) == 0.2
+    assert uncertainty(result, {"load": 3.0}) is None
+
+
+@pytest.mark.parametrize(
+    ("pairs", "expected"),
+    [
+        ([(1, 0.5), (2, 0.2), (3, 0.3), (4, 0.1)], [1, 2, 4]),
+        ([(4, 0.1), (3, 0.3), (2, 0.2), (1, 0.5)], [4, 3, 1]),
+        ([(1, 0.5), (1, 0.4), (2, 0.4)], [2]),  # equal times, equal errors
+        ([(1, 0.5), (1, 0.5)], [1]),  # the same twice
+        ([(1, None), (None, 0.1), (3, 0.3)], [3]),  # a gap, and one without a time
+        ([(1, 0.0), (2, 0.0)], [1]),
+        ([], []),
+    ],
+)
+def test_the_front_holds_what_nothing_beats_in_time_and_error(pairs, expected):
+    assert modes_of(front(timed(*pairs))) == expected
+
+
+def test_the_cheapest_setting_is_the_fastest_that_holds_the_tolerance():
+    both = [*timed((1, 0.5), (2, 0.02), (3, 0.01), (4, 0.001)), *timed((9, 0.3), method="b")]
+    assert cheapest(both, 0.02) == {"a": both[1], "b": None}
+    assert cheapest(both, 0.0199)["a"] is both[2]
+    assert cheapest(both, 1e-6) == {"a": None, "b": None}
+
+
+def test_how_many_times_faster_counts_from_the_fastest_full_model_of_the_same_tolerance():
+    chosen = {"a": timed((2, 0.1))[0], "full": timed((10, 0.1))[0], "other full": timed((8, 0.1))[0], "none": None}
+    assert times_faster(chosen, ["full", "other full"]) == {"a": 4, "full": 0.8, "other full": 1, "none": None}
+    assert set(times_faster(chosen, ["none"]).values()) == {None}
+    assert full_methods(small_study()) == ["full ANCF"]
+
+
+@pytest.mark.parametrize(
+    ("axis", "values", "order"),
+    [("step", (1e-5, 2e-5, 8e-5), 1), ("step", (1e-5, 3e-5), 2), ("modes", (2, 3, 8), 4), ("elements", (4, 8), 2)],
+)
+def test_observed_orders_are_those_of_the_power_law(axis, values, order):
+    sign = 1 if axis == "step" else -1
+    rows = [row("a", 1e-3 * (v / values[0]) ** (sign * order), setting={axis: v}) for v in reversed(values)]
+    found = series(settings(result_of(rows)), "a", axis)
+    assert found.values == values
+    assert found.orders == pytest.approx((order,) * (len(values) - 1))
+
+
+def test_a_gap_or_a_zero_has_no_order():
+    rows = [row("a", 0.1, setting={"modes": 1}), row("a", 0.0, setting={"modes": 2}), row("a", setting={"modes": 3})]
+    assert series(settings(result_of(rows)), "a", "modes").orders == (None, None)
+
+
+def test_the_other_fields_stand_at_their_finest_that_has_errors():
+    found = settings(small_study())
+    assert series(found, "full ANCF", "step").fixed == {"elements": 16}
+    assert series(found, "full ANCF", "elements").fixed == {"step": 2e-5}
+    assert series(found, "Craig-Bampton", "step").fixed == {"modes": 8}
+    gone = [replace(s, error=None) if s.setting.get("elements") == 16 else s for s in found]
+    assert series(gone, "full ANCF", "step").fixed == {"elements": 8}
+    assert series(found, "Multi-Phi", "step") is None
+    rows = [row("a", r, setting={"modes": m, "step": s}) for m, r in ((2, 1), ("all", 2)) for s in (1, 2)]
+    assert series(settings(result_of(rows)), "a", "step").fixed == {"modes": "all"}
+
+
+def test_along_the_scene_methods_and_the_reference_stand_side_by_side():
+    result = small_study({"start.displacement": [-0.01, 0.02]})
+    assert numeric_axes(settings(result), of_scene=True) == ["start.displacement"]
+    assert numeric_axes(settings(result), of_scene=False) == ["modes", "step", "elements"]
+    tables = {(table.quantity, table.contact): table for table in tables_along(result, "start.displacement")}
+    assert set(tables) == {("error", ""), ("first_contact", "stop"), ("inner_losses", "stop"), ("impulse", "stop")}
+    error = tables["error", ""]
+    assert error.values == (-0.01, 0.02)
+    assert "reference" not in error.columns
+    assert error.columns["coarser"] == (0.001, 0.001)
+    assert error.columns["Multi-Phi"] == pytest.approx((1.4 * 1.2 * 16**-2.5, 1.8 * 1.2 * 16**-2.5))
+    losses = tables["inner_losses", "stop"].columns
+    assert losses["reference"] == (0, 0)
+    assert losses["Multi-Phi, rigid"] == tuple(round(40 * (0.06 + 12**-2) * grown) for grown in (1.4, 1.8))
+    slope = series(settings(result), "Multi-Phi", "start.displacement").orders
+    assert slope == (None,)  # a value that changes its sign
+
+
+def test_a_value_that_a_method_lacks_is_an_empty_cell():
+    rows = [
+        row("a", 0.1, {"load": 1.0}),
+        row("a", 0.2, {"load": 2.0}),
+        row("b", 0.3, {"load": 2.0}),
+        row("b", 0.4, {"load": 3.0}),
+    ]
+    (error,) = tables_along(result_of(rows), "load")
+    assert error.columns == {"a": (0.1, 0.2, None), "b": (None, 0.3, 0.4)}
+
+
+def test_the_rank_correlation_sees_order_only_and_says_what_it_left_out():
+    assert rank_correlation([1, 2, 3, 4], [1e-4, 1e-3, 1e-2, 0.5]).coefficient == pytest.approx(1)
+    assert rank_correlation([1, 2, 3, 4], [4, 3, 2, 1]).coefficient == pytest.approx(-1)
+    mixed = rank_correlation([None, 1, 2, 3, 4, 5], [1, None, 1e-10, 2, 1, 3])
+    assert mixed.coefficient == pytest.approx(0.5)  # ranks 1 2 3 against 2 1 3
+    assert mixed.runs == 3
+    assert mixed.left_out == {"no indicator": 1, "no error": 1, "error below 1e-9": 1}
+
+
+@pytest.mark.parametrize("pairs", [[], [(1, 1), (2, 2)], [(1, 1), (1, 2), (1, 3)]])
+def test_too_few_or_equal_values_have_no_correlation(pairs):
+    assert rank_correlation([a for a, _ in pairs], [b for _, b in pairs]).coefficient is None
+
+
+def test_every_run_with_an_indicator_counts():
+    found = indicators(small_study())
+    assert {name: len(pairs) for name, pairs in found.items()} == {"Multi-Phi": 6, "Multi-Phi, rigid": 5}
+    assert found["Multi-Phi"][0] == pytest.approx(((1.2 * 3**-2.5) ** 1.2, 1.2 * 3**-2.5))
+
+
+def test_pointwise_comparison_ends_where_the_coarser_copy_leaves():
+    assert pointwise_until(small_study(), {}, 0.01) == 0.25
+    assert pointwise_until(small_study(), {}, 0.02) is None
+
+
+def test_the_csv_gives_every_number_back():
+    result = small_study({"start.displacement": [-0.01, 0.02]})
+    read = list(csv.DictReader(io.StringIO(csv_text(result))))
+    assert len(read) == len(result.rows)
+    for line, given in zip(read, result.rows, strict=True):
+        assert line["method"] == given.parameters["method"]
+        assert float(line["at.start.displacement"]) == given.parameters["at"]["start.displacement"]
+        assert (line["status"], line["cause"]) == (given.status, given.message)
+        error = given.values.get("nrmse", {}).get("0.3", {}).get("node3")
+        assert line["nrmse.0.3.node3"] == ("" if error is None else str(error))
+    times = [float(line["timing.online_s"]) for line in read if line["timing.online_s"]]
+    assert times == [row.values["online_s"] for row in result.timings]
+    assert read[0]["date"] == "2026-01-02T03:04:05+00:00"
+    nearby = [line for line in read if line["nearby.step"]]
+    assert len(nearby) == 2 * 2 * (12 + 12)
+    assert all(line["timing.online_s"] == "" for line in nearby)
+
+
+def test_budgets_have_lines_of_their_own():
+    budget = replace(row("budget"), values={"rungs": [{"name": "full"}], "total": math.pi})
+    read = list(csv.DictReader(io.StringIO(csv_text(result_of([row("a", 0.1)], budgets=(budget,))))))
+    assert [line["budget.total"] for line in read] == ["", str(math.pi)]
+    assert read[1]["budget.rungs"] == '[{"name": "full"}]'
+
+
+def test_settings_are_said_in_words():
+    assert words({"modes": 8, "step": 7e-5, "elements": 20}) == "r = 8, step 70 µs, 20 elements"
+    assert words({"rtol": 1e-6, "contact": "rigid", "start.displacement": 0.02}) == (
+        "rtol = 1e-06, contact = rigid, start.displacement = 0.02"
+    )
+    assert words({}) == ""
