@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class EventRule:
         self.model = model
         self.load = load
         self.transitions = 0
+        self.compiled: Any = None  # what the compiled loop keeps for later runs
         self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
@@ -62,6 +64,10 @@ class EventRule:
         if key not in self._levels:
             self._levels[key] = LoadedLevel.of(self.model.level_at(key), self.load)
         return self._levels[key]
+
+    def has_transition(self, source: LoadedLevel, target: LoadedLevel) -> bool:
+        """Whether the map between two levels has been asked for."""
+        return (source.level.indices, target.level.indices) in self._maps
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
         """The map between two levels, computed once."""

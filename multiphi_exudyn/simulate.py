@@ -37,16 +37,18 @@ def simulate(
     displacement: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     loads: Sequence[ConstantLoad] = (),
+    compiled: bool | None = None,
 ) -> Trajectory:
     """Motion of ``model`` from 0 to t_end [s].
 
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: constant loads.
+    compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
     A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
     if isinstance(model.modes, Tolerance):
-        return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads))
+        return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads, compiled))
     end = _time("t_end", t_end)
     load = _static_load(model, loads)
     start = _start(model, displacement, velocity)
@@ -211,7 +213,9 @@ class _CompiledMotion(Motion):
 
 def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
     """The run, in the loop that is wanted and can be had."""
-    if compiled is False or rule.compiled is None and (rule.compiled := _compiled_loop(rule, compiled)) is None:
+    if compiled is not False and rule.compiled is None:
+        rule.compiled = _compiled_loop(rule, compiled)
+    if compiled is False or rule.compiled is None:
         return Motion(model, rule, start)
     return _CompiledMotion(model, rule, start, loop=rule.compiled)
 
@@ -222,7 +226,9 @@ def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
         return importlib.import_module("multiphi_exudyn.compiled.loop").CompiledLoop(rule)
     except ImportError as error:
         if needed:
-            raise MultiPhiError("compiled: got True without numba, need it: pip install multiphi-exudyn[fast]") from error
+            raise MultiPhiError(
+                "compiled: got True without numba, need it: pip install multiphi-exudyn[fast]"
+            ) from error
         return None
 
 

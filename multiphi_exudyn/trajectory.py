@@ -9,7 +9,7 @@ a closed-form integral of eta'^T D eta') and what loads did; its residual is the
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,8 +99,8 @@ class Trajectory:
     """
 
     model: MultiPhiModel
-    segments: tuple[Segment, ...]
-    events: tuple[Event, ...]
+    segments: Sequence[Segment]
+    events: Sequence[Event]
     t_end: float
     status: str
     message: str

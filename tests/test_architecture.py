@@ -14,7 +14,7 @@ FLOORS = (
     ("modes", "modal_response", "first_root"),
     ("structure", "beam", "contact", "loads"),
     ("level", "transition", "model"),
-    ("state", "event_rule", "trajectory", "truncation", "simulate"),
+    ("state", "event_rule", "trajectory", "truncation", "simulate", "compiled"),
     ("exudyn_plugin",),
     ("study.scene",),
     ("study.running",),

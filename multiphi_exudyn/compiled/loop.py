@@ -1,0 +1,71 @@
+"""The compiled loop of one event rule: enters the kernel with a state, and comes back with the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.compiled.kernel import CHATTER, FULL, run
+from multiphi_exudyn.compiled.pack import Pack
+from multiphi_exudyn.compiled.record import PHASES, Record
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.state import State
+
+__all__ = ["CompiledLoop"]
+
+
+class CompiledLoop:
+    """``rule`` packed for the kernel; it serves every run under that rule."""
+
+    def __init__(self, rule: EventRule) -> None:
+        self._pack = Pack(rule)
+
+    def record(self) -> Record:
+        """An empty record of a run."""
+        return Record(self._pack)
+
+    def advance(
+        self, state: State, time: float, end: float, record: Record, window: int, period: float
+    ) -> tuple[State, float, bool]:
+        """(state, time [s], whether it was chatter that stopped it) as far as the kernel comes from a state.
+
+        window, period: the chatter check of simulate.py.
+        """
+        position = self._pack.position(state.level)
+        if position is None:
+            return state, time, False
+        self._pack.connect(state.level)
+        levels = self._pack.levels
+        x, v = np.zeros((2, levels.squared.shape[1]))
+        r = len(state.displacement)
+        x[:r], v[:r] = state.displacement, state.velocity
+        phases = np.array([PHASES.index(phase) for phase in state.phases], np.int8)
+        first, status = record.count, FULL
+        while status == FULL:
+            record.make_room()
+            status, position, time, record.count, record.happened, samples, transitions = run(
+                levels,
+                position,
+                x,
+                v,
+                phases,
+                time,
+                end,
+                record.count,
+                record.happened,
+                record.spans,
+                record.levels,
+                record.coefficients,
+                record.standings,
+                record.amounts,
+                record.kinds,
+                window,
+                period,
+            )
+            state.level.level.finder.evaluations += samples
+            self._pack.rule.transitions += transitions
+        if record.count == first:
+            return state, time, False
+        level = self._pack.loaded[position]
+        r = level.level.modes
+        reached = State(level, x[:r], v[:r], tuple(PHASES[k] for k in phases.tolist()))
+        return reached, time, status == CHATTER

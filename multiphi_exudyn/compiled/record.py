@@ -1,0 +1,119 @@
+"""What the compiled loop has done, in arrays that grow; segments and events are made when somebody looks at them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar, overload
+
+import numpy as np
+
+from multiphi_exudyn.compiled.kernel import CLOSE
+from multiphi_exudyn.compiled.pack import Pack
+from multiphi_exudyn.state import Event, Loss, Phase
+from multiphi_exudyn.trajectory import Segment
+
+__all__ = ["PHASES", "Record"]
+
+ROWS = 256  # at first
+PHASES = tuple(Phase)
+
+T = TypeVar("T")
+
+
+class Made(Sequence[T], Generic[T]):
+    """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
+
+    def __init__(self, make: Callable[[int], T], count: int, known: dict[int, T]) -> None:
+        self._make, self._count, self._known = make, count, known
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[T, ...]: ...
+    def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
+        positions = range(self._count)[index]
+        return self._one(positions) if isinstance(positions, int) else tuple(map(self._one, positions))
+
+    def _one(self, i: int) -> T:
+        if i not in self._known:
+            self._known[i] = self._make(i)
+        return self._known[i]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+
+class Record:
+    """Segments and events of a run, in rows as kernel.run writes them; those of the NumPy loop stand among them."""
+
+    def __init__(self, pack: Pack) -> None:
+        self._pack = pack
+        contacts = pack.rule.model.contacts
+        self._names = [contact.name for contact in contacts]
+        self.count = self.happened = 0
+        self.spans = np.empty((ROWS, 4))
+        self.levels = np.empty(ROWS, np.int64)
+        self.coefficients = np.empty((ROWS, 2, pack.levels.rates.shape[2]))
+        self.standings = np.empty((ROWS, len(contacts)), np.int8)
+        self.amounts = np.empty((ROWS, 5))
+        self.kinds = np.empty((ROWS, 2), np.int64)
+        self._segments: dict[int, Segment] = {}
+        self._events: dict[int, Event] = {}
+
+    @property
+    def segments(self) -> Made[Segment]:
+        """All segments so far."""
+        return Made(self._segment, self.count, self._segments)
+
+    @property
+    def events(self) -> Made[Event]:
+        """All events so far."""
+        return Made(self._event, self.happened, self._events)
+
+    def add(self, segment: Segment) -> None:
+        """A segment of the NumPy loop."""
+        self.make_room()
+        self.spans[self.count] = segment.start, segment.end, segment.armed_at, segment.level.level.highest_frequency
+        self._segments[self.count] = segment
+        self.count += 1
+
+    def add_event(self, event: Event) -> None:
+        """An event of the NumPy loop."""
+        self._events[self.happened] = event
+        self.happened += 1
+
+    def make_room(self) -> None:
+        """For at least one more segment and two events, of the widest level."""
+        if self.count >= len(self.spans):
+            for name in ("spans", "levels", "coefficients", "standings"):
+                setattr(self, name, _doubled(getattr(self, name)))
+        while self.happened + 2 > len(self.amounts):
+            self.amounts, self.kinds = _doubled(self.amounts), _doubled(self.kinds)
+        missing = self._pack.levels.rates.shape[2] - self.coefficients.shape[2]
+        if missing:
+            self.coefficients = np.pad(self.coefficients, ((0, 0), (0, 0), (0, missing)))
+
+    def _segment(self, i: int) -> Segment:
+        start, end, armed_at, _ = self.spans[i].tolist()
+        level = self._pack.loaded[self.levels[i]]
+        re, im = self.coefficients[i, :, : len(level.level.response.basis.rates)]
+        return Segment(start, end, level, re + 1j * im, tuple(PHASES[k] for k in self.standings[i].tolist()), armed_at)
+
+    def _event(self, i: int) -> Event:
+        time, impact, kinetic, strain, impulse = self.amounts[i].tolist()
+        contact, kind = self.kinds[i].tolist()
+        loss = Loss(impact, kinetic, strain)
+        return Event(time, self._names[contact], "close" if kind == CLOSE else "open", loss, impulse)
+
+
+def _doubled(rows: np.ndarray) -> np.ndarray:
+    return np.concatenate([rows, np.empty_like(rows)])
