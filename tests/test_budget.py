@@ -1,0 +1,255 @@
+"""The error budget: parts that add up exactly, their causes, their uncertainties, and the picture of them."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_scene import changed, write
+
+from multiphi_exudyn import MultiPhiValueError
+from multiphi_exudyn.study.accuracy import budget as ladder
+from multiphi_exudyn.study.accuracy.budget import CAUSES, Rung, budget, decomposition
+from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
+
+STEPS, GEOMETRY, CONTACT, TRUNCATION, BODY = CAUSES
+FULL = [
+    {"kind": "full", "name": "fine", "elements": 4, "step": 1e-4},
+    {"kind": "full", "name": "coarse", "elements": 4, "step": 2e-4},
+]
+TIME = 0.01 * np.arange(101)
+
+
+def bench_of(folder, **fields):
+    data = changed(["damping"], {"modal_ratios": [0.05], "beyond": 0.05}) | {"models": FULL}
+    data |= {"comparison": {"reference": "fine", "coarser": "coarse"}}
+    data |= {"outputs": {"t_end": 0.05, "interval": 1e-4, "windows": [0.02]}} | fields
+    scene = load_scene(write(folder / "scene.toml", data))
+    return prepare(scene, mechanics_of(scene))
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return budget(bench_of(tmp_path_factory.mktemp("scene")), modes=3, progress=False)
+
+
+def run_of(values, ok=True):
+    """A run of two points, of which the second moves half as much."""
+    points = {"a": np.asarray(values), "b": 0.5 * np.asarray(values)}
+    return ModelRun("m", "full", "m", status="ok" if ok else "failed", message="" if ok else "diverged",
+                    time=TIME if ok else TIME[:0], points=points if ok else {})  # fmt: skip
+
+
+def rungs_of(*answers, uncertainty=1e-3):
+    """Rungs of given histories; copies are off by ``uncertainty`` in all samples, repeats by half of it."""
+    names = ("full-working-step", "full-converged", *(f"rung{i}" for i in range(2, len(answers))))
+    causes = (*CAUSES[: len(answers) - 1], "")
+    return [
+        Rung(name, name, cause, run_of(y), {"copy": (run_of(y + uncertainty),)}, run_of(y + 0.5 * uncertainty))
+        for name, cause, y in zip(names, causes, answers, strict=False)
+    ]
+
+
+def part(parts, cause):
+    return next(each for each in parts["parts"] if each["cause"] == cause)
+
+
+def random_answers(count=6):
+    generator = np.random.default_rng(3)
+    return [np.sin(7 * TIME) + 0.1 * generator.normal(size=len(TIME)) for _ in range(count)]
+
+
+@pytest.mark.parametrize("points", [("a",), ("b",), ("a", "b")])
+@pytest.mark.parametrize("until", [0.3, 1.0])
+def test_shares_add_up_to_one_and_the_total_lies_below_the_sum_of_sizes(points, until):
+    answers = random_answers()
+    found = decomposition(rungs_of(*answers), points, until)
+    inside = until * (1 + 1e-9) >= TIME
+    expected = np.linalg.norm((answers[0] - answers[-1])[inside]) / np.linalg.norm(answers[1][inside])
+    assert math.fsum(each["share"] for each in found["parts"]) == pytest.approx(1.0, abs=1e-14)
+    assert found["total"] == pytest.approx(expected, rel=1e-13)
+    assert found["total"] <= found["sum_of_sizes"]
+    assert [each["cause"] for each in found["parts"]] == list(CAUSES)
+
+
+def test_orthogonal_parts_have_the_squares_of_their_sizes_as_shares():
+    base = np.ones(len(TIME))
+    first, second = np.zeros((2, len(TIME)))
+    first[10], second[20] = 3.0, 4.0
+    found = decomposition(rungs_of(base + first + second, base + second, base), ("a",), 1.0)
+    assert [each["share"] for each in found["parts"]] == pytest.approx([9 / 25, 16 / 25], rel=1e-12)
+    assert found["total"] == pytest.approx(found["root_sum_of_squares"], rel=1e-12)
+
+
+def test_a_part_that_another_undoes_has_a_negative_share():
+    base = np.ones(len(TIME))
+    found = decomposition(rungs_of(base, 1.2 * base, 0.9 * base), ("a",), 1.0)
+    assert [each["share"] for each in found["parts"]] == pytest.approx([-2.0, 3.0])
+    assert found["sum_of_sizes"] > found["total"]
+
+
+def test_a_change_of_one_rung_is_seen_in_its_two_parts_only():
+    answers = random_answers()
+    before = decomposition(rungs_of(*answers), ("a",), 1.0)
+    answers[3] = 1.5 * answers[3]
+    after = decomposition(rungs_of(*answers), ("a",), 1.0)
+    differ = [one["size"] != other["size"] for one, other in zip(before["parts"], after["parts"], strict=True)]
+    assert differ == [False, False, True, True, False]
+    assert after["total"] == before["total"]
+
+
+def test_a_part_no_larger_than_its_uncertainty_is_not_significant():
+    base = np.ones(len(TIME))
+    found = decomposition(rungs_of(1.0015 * base, base, 0.9 * base), ("a",), 1.0)
+    assert [each["uncertainty"] for each in found["parts"]] == pytest.approx([2e-3, 2e-3])
+    assert [each["significant"] for each in found["parts"]] == [False, True]
+
+
+def test_repeats_beyond_the_stated_uncertainty_are_not_explained():
+    rungs = rungs_of(*random_answers(4))
+    found = decomposition(rungs, ("a",), 1.0)
+    assert found["explained"]
+    assert found["residual"] == pytest.approx(found["bound"] / 2)
+    rungs[2] = replace(rungs[2], repeat=run_of(rungs[2].run.points["a"] + 0.01))
+    assert not decomposition(rungs, ("a",), 1.0)["explained"]
+
+
+def test_a_missing_rung_joins_the_causes_on_both_its_sides():
+    rungs = rungs_of(*random_answers())
+    rungs[2] = replace(rungs[2], run=run_of(TIME, ok=False))
+    found = decomposition(rungs, ("a",), 1.0)
+    causes = [each["cause"] for each in found["parts"]]
+    assert causes == [STEPS, f"{GEOMETRY} and {CONTACT}", TRUNCATION, BODY]
+    assert math.fsum(each["share"] for each in found["parts"]) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_a_failed_copy_leaves_the_uncertainty_unknown():
+    rungs = rungs_of(*random_answers(3))
+    rungs[1] = replace(rungs[1], uncertainty_runs={"copy": (run_of(TIME, ok=False),)})
+    found = decomposition(rungs, ("a",), 1.0)
+    assert [each["uncertainty"] for each in found["parts"]] == [None, None]
+    assert [each["significant"] for each in found["parts"]] == [None, None]
+    assert found["uncertainty"] is not None
+    assert found["explained"] is None
+
+
+def test_one_rung_or_a_reference_at_rest_has_no_parts():
+    assert decomposition(rungs_of(TIME), ("a",), 1.0) is None
+    assert decomposition(rungs_of(TIME, 0 * TIME), ("a",), 1.0) is None
+    assert (
+        decomposition([replace(each, run=run_of(TIME, ok=False)) for each in rungs_of(TIME, TIME)], ("a",), 1.0) is None
+    )
+
+
+def test_every_rung_of_a_small_scene_runs_and_its_values_survive_json(small):
+    values = small.values()
+    assert {rung["message"] for rung in values["rungs"].values()} == {""}
+    assert json.loads(json.dumps(values, allow_nan=False)) == values
+    assert list(values["windows"]) == ["0.02", "0.05"]
+    assert list(values["windows"]["0.05"]["rigid"]) == ["all", "middle", "tip"]
+    for ladders in values["windows"].values():
+        assert [each["cause"] for each in ladders["rigid"]["all"]["parts"]] == list(CAUSES)
+        assert [each["cause"] for each in ladders["compliant"]["all"]["parts"]] == [STEPS, GEOMETRY, TRUNCATION, BODY]
+        assert ladders["compliant"]["all"]["explained"]
+
+
+def test_the_answers_below_the_full_beam_hardly_feel_a_disturbance(small):
+    parts = small.values()["windows"]["0.05"]["compliant"]["all"]
+    assert part(parts, TRUNCATION)["uncertainty"] < 1e-7 < 1e-4 < part(parts, TRUNCATION)["size"]
+    assert part(parts, BODY)["size"] < 1e-8
+
+
+def test_the_full_beams_working_step_is_the_coarser_copys_and_is_halved_at_least_twice(small):
+    rungs = small.values()["rungs"]
+    assert rungs["full-working-step"]["steps"] == 250
+    assert rungs["full-converged"]["steps"] >= 4 * 250
+    assert part(small.values()["windows"]["0.05"]["rigid"]["all"], STEPS)["significant"]
+
+
+def body_with_a_wrong_contact(original):
+    """Runners in which the rigid Multi-Phi rung meets its stop elsewhere: a quarter further away."""
+
+    def run(bench, name, progress):
+        if name == "multiphi-rigid":
+            moved = tuple(replace(each, gap=1.25 * each.gap) for each in bench.mechanics.contacts)
+            bench = replace(bench, mechanics=replace(bench.mechanics, contacts=moved))
+        return original(bench, name, progress)
+
+    return run
+
+
+def test_a_rung_made_wrong_shows_in_its_own_parts(small, monkeypatch):
+    monkeypatch.setattr(ladder, "run_model", body_with_a_wrong_contact(ladder.run_model))
+    wrong = budget(small.bench, modes=3, progress=False).values()["windows"]["0.05"]
+    right = small.values()["windows"]["0.05"]
+    for cause in (STEPS, GEOMETRY, CONTACT):
+        assert part(wrong["rigid"]["all"], cause)["size"] == part(right["rigid"]["all"], cause)["size"]
+    assert part(right["rigid"]["all"], BODY)["size"] < 1e-8
+    assert part(wrong["rigid"]["all"], BODY)["size"] > 1e-2
+    assert wrong["compliant"] == right["compliant"]
+
+
+def test_a_full_beam_that_fails_is_missing_with_its_cause(tmp_path, monkeypatch):
+    original = ladder.run_model
+
+    def run(bench, name, progress):
+        failed = ModelRun(name, "full", name, status="failed", message="Newton failed at 0.01 s")
+        return failed if bench.scene.models[name].kind == "full" else original(bench, name, progress)
+
+    monkeypatch.setattr(ladder, "run_model", run)
+    values = budget(bench_of(tmp_path), modes=3, progress=False).values()
+    assert values["rungs"]["full-converged"]["message"] == "Newton failed at 0.01 s"
+    parts = values["windows"]["0.05"]["rigid"]["all"]
+    assert parts["reference"] == "linear-compliant"
+    assert [each["cause"] for each in parts["parts"]] == [CONTACT, TRUNCATION, BODY]
+    drawn = [text.get_text() for axes in budget_figure(values).axes for text in axes.texts]
+    assert any("missing" in text and "Newton failed at 0.01 s" in text for text in drawn)
+
+
+def test_a_scene_without_a_full_beam_starts_at_the_linear_one(tmp_path):
+    only = {"models": [{"kind": "reduced", "name": "all", "modes": "all"}], "comparison": {"reference": "all"}}
+    bench = bench_of(tmp_path, **only, outputs={"t_end": 0.01, "interval": 1e-3})
+    values = budget(bench, modes=3, progress=False).values()
+    assert values["rungs"]["full-converged"]["message"] == "the scene has no full beam"
+    assert len(values["windows"]["0.01"]["compliant"]["all"]["parts"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "begins", "given"),
+    [
+        (TypeError, "modes", {"modes": "all"}),
+        (TypeError, "modes", {"modes": True}),
+        (ValueError, "modes", {"modes": 0}),
+        (ValueError, "modes", {"modes": 1000}),
+        (ValueError, "step", {"modes": 3, "step": 0.0}),
+        (ValueError, "step", {"modes": 3, "step": math.nan}),
+    ],
+)
+def test_bad_arguments_are_refused(small, refused, kind, begins, given):
+    refused(kind, begins, budget, small.bench, **given)
+
+
+def test_levels_with_printed_frequencies_have_no_budget(refused):
+    scene = load_scene("paper-rig-as-published", t_end=0.01)
+    refused(MultiPhiValueError, "scene", budget, prepare(scene, mechanics_of(scene)), 3)
+
+
+def test_the_picture_has_a_panel_for_each_budget_and_is_drawn_from_values(small):
+    values = small.values()
+    figure = budget_figure([values, small, values])
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(shown) == 3
+    bars = [container for axes in shown[:1] for container in axes.containers]
+    assert len(bars) == 2 * (5 + 4)
+    sizes = [100 * each["size"] for each in values["windows"]["0.05"]["rigid"]["all"]["parts"]]
+    assert [container.patches[0].get_height() for container in bars[9:14]] == pytest.approx(sizes)
+    figure.draw_without_rendering()
+
+
+def test_a_picture_of_nothing_is_refused(refused):
+    refused(ValueError, "budgets", budget_figure, [])
