@@ -36,6 +36,12 @@ def test_nrmse_without_a_reference_signal_is_not_a_number():
     assert math.isnan(metrics.nrmse(HISTORY, np.zeros_like(HISTORY), TIME, 1.0))
 
 
+def test_the_largest_difference_is_that_of_its_window():
+    spoiled = HISTORY - 2e-3 * (TIME > 0.305) + 1e-3 * (np.arange(101) == 7)
+    assert metrics.max_difference(spoiled, HISTORY, TIME, 0.3) == pytest.approx(1e-3)
+    assert metrics.max_difference(spoiled, HISTORY, TIME, 1.0) == pytest.approx(2e-3)
+
+
 @given(PAIR)
 def test_running_nrmse_is_the_nrmse_of_every_window(pair):
     values, reference = pair

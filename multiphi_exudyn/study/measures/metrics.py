@@ -19,6 +19,7 @@ __all__ = [
     "first_contact",
     "first_phase",
     "inner_losses",
+    "max_difference",
     "nrmse",
     "running_nrmse",
 ]
@@ -36,28 +37,67 @@ class Metric:
 
 
 METRICS = {
+    "dofs": Metric("degrees of freedom", "count", "coordinates that the model integrates in time."),
+    "steps": Metric("steps", "count", "time steps of the run; events where a model has no steps."),
     "nrmse": Metric(
         "difference (NRMSE)",
         "1",
         "||y - ref|| / ||ref|| over the samples from 0 to the window's end, y and ref being one point's "
         "displacements; 0.01 is 1 %. Not divided by a range or a standard deviation.",
     ),
-    "agreement_horizon": Metric(
+    "max_difference": Metric(
+        "largest difference",
+        "m",
+        "largest |y - ref| of one point's displacements over the samples from 0 to the window's end.",
+    ),
+    "spectral_difference": Metric(
+        "spectral difference",
+        "1",
+        "|| |Y| - |Yref| || / || |Yref| || of the Hann-windowed amplitude spectra of one point's displacements from 0 "
+        "to the window's end: a shift in phase counts nothing.",
+    ),
+    "horizon": Metric(
         "agreement horizon",
         "s",
         "the first time to which the NRMSE, taken from 0 to that time, of any judged point exceeds the "
         "tolerance; the end of the run where that never happens.",
     ),
+    "pointwise_until": Metric(
+        "pointwise until",
+        "s",
+        "the agreement horizon between the reference and its own coarser or minutely disturbed copy: from here on a "
+        "pointwise difference of the size of the tolerance says nothing about a model.",
+    ),
     "first_contact": Metric("first contact", "s", "start of the first contact interval after the release."),
+    "intervals": Metric(
+        "contact intervals",
+        "s",
+        "start and end of every time in contact; one that lasts to the end of the run ends there.",
+    ),
+    "contact_count": Metric("contacts made", "count", "number of contact intervals."),
+    "closed_time": Metric("time in contact", "s", "sum of the contact intervals' lengths."),
     "inner_losses": Metric(
         "losses of contact inside the first contact phase",
         "count",
         "the first contact phase begins with the first contact and ends with the first opening that lasts "
         "longer than a quarter of the open level's longest period; counted are the openings inside it.",
     ),
-    "closed_time": Metric("time in contact", "s", "sum of the contact intervals' lengths."),
     "impulse": Metric(
         "contact impulse", "N s", "time integral of the contact force from 0 to the end, impacts included."
+    ),
+    "energy_end": Metric(
+        "energy at the end", "J", "kinetic and strain energy at the end of the run, compliant contacts included."
+    ),
+    "ledger": Metric(
+        "energy ledger",
+        "J",
+        "where the initial energy went, row by row; the residual is what the rows leave unaccounted for.",
+    ),
+    "frequencies": Metric(
+        "frequencies from the response",
+        "Hz",
+        "undamped natural frequencies identified from the points' histories alone, in the longest interval that each "
+        "level holds; only those whose standard deviation is below a third of a percent.",
     ),
 }
 
@@ -67,6 +107,11 @@ def nrmse(values: np.ndarray, reference: np.ndarray, time: np.ndarray, until: fl
     window = time <= until * (1 + 1e-9)
     size = np.linalg.norm(reference[window])
     return float(np.linalg.norm((values - reference)[window]) / size) if size > 0 else math.nan
+
+
+def max_difference(values: np.ndarray, reference: np.ndarray, time: np.ndarray, until: float) -> float:
+    """Largest |values - reference| [m] over the samples with time <= until."""
+    return float(np.max(np.abs(values - reference)[time <= until * (1 + 1e-9)]))
 
 
 def running_nrmse(values: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
-__all__ = ["ModelRun", "interval_array"]
+__all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class ModelRun:
     steps: time steps, or events where a model has no steps.
     offline_s: building, linearising, static start. first_s: the solver alone, from the start to the end, the
     first time; repeats_s: the same again. sampling_s: the histories put on the common grid afterwards.
+    indicators: end of the window [s] -> the model's own estimate of its truncation error; none of other models.
     """
 
     name: str
@@ -44,6 +46,7 @@ class ModelRun:
     first_s: float = 0.0
     repeats_s: tuple[float, ...] = ()
     sampling_s: float = 0.0
+    indicators: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -59,3 +62,28 @@ class ModelRun:
 def interval_array(given: Sequence[tuple[float, float]]) -> np.ndarray:
     """Contact intervals as (m, 2), also where there are none."""
     return np.array(given, dtype=float).reshape(-1, 2)
+
+
+def to_arrays(run: ModelRun) -> dict[str, np.ndarray]:
+    """The whole run as arrays, "FIELD" or "FIELD/NAME", numbers and texts without dimension."""
+    arrays: dict[str, np.ndarray] = {}
+    for each in fields(run):
+        value = getattr(run, each.name)
+        if isinstance(value, Mapping):
+            arrays |= {f"{each.name}/{name}": np.asarray(item) for name, item in value.items()}
+        else:
+            arrays[each.name] = np.asarray(value)
+    return arrays
+
+
+def from_arrays(arrays: Mapping[str, np.ndarray]) -> ModelRun:
+    """The run that ``to_arrays`` was given."""
+    given: dict[str, Any] = {}
+    for key, array in arrays.items():
+        name, _, entry = key.partition("/")
+        value = array if array.ndim else array.item()
+        if entry:
+            given.setdefault(name, {})[entry] = value
+        else:
+            given[name] = value
+    return ModelRun(**given | {"repeats_s": tuple(given["repeats_s"].tolist())})

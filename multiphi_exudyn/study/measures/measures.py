@@ -1,0 +1,95 @@
+"""All measures of one run, as JSON can hold them; what each one is stands in ``metrics.METRICS``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.measures.response_frequencies import level_frequencies
+from multiphi_exudyn.study.measures.spectra import spectral_difference
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.workbench import Workbench
+
+__all__ = ["horizons", "measures", "windows"]
+
+ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
+Difference = Callable[[np.ndarray, np.ndarray, np.ndarray, float], float]  # values, reference, time, until
+DIFFERENCES: dict[str, Difference] = {
+    "nrmse": metrics.nrmse,
+    "max_difference": metrics.max_difference,
+    "spectral_difference": spectral_difference,
+}
+
+
+def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dict[str, Any]:
+    """Every measure of a run: differences to ``reference`` by window or tolerance, the others by contact or level.
+
+    A number that does not exist is None; a table without entries ({}) says that there was nothing to measure.
+    """
+    return {
+        "label": run.label,
+        "kind": run.kind,
+        "dofs": run.dofs,
+        "steps": run.steps,
+        **_differences(bench, run, reference),
+        **_contacts(bench, run),
+        "energy_end": _number(run.energy[-1]) if len(run.energy) else None,
+        "ledger": {row: _number(value) for row, value in run.ledger.items()},
+        "frequencies": level_frequencies(run, [contact.name for contact in bench.mechanics.contacts]) if run.ok else {},
+    }
+
+
+def windows(bench: Workbench) -> tuple[float, ...]:
+    """Ends [s] of the windows that differences are given for, ascending; the last is the end of the run."""
+    named = sorted(bench.scene.file.outputs.windows)
+    return (*(until for until in named if until < ROUND_OFF * bench.t_end), bench.t_end)
+
+
+def horizons(bench: Workbench, run: ModelRun, reference: ModelRun) -> dict[str, float]:
+    """Tolerance -> agreement horizon [s] of the judged points.
+
+    Between the reference and its own copy it is ``pointwise_until``.
+    """
+    pairs = [(run.points[point], reference.points[point]) for point in bench.judged_points]
+    tolerances = bench.scene.file.outputs.tolerances
+    return {f"{each:g}": metrics.agreement_horizon(pairs, run.time, each) for each in tolerances}
+
+
+def _differences(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dict[str, Any]:
+    if reference is None or not (run.ok and reference.ok):
+        return {name: {} for name in (*DIFFERENCES, "horizon")}
+    tables = {name: _by_window(bench, run, reference, measure) for name, measure in DIFFERENCES.items()}
+    return {**tables, "horizon": horizons(bench, run, reference)}
+
+
+def _by_window(
+    bench: Workbench, run: ModelRun, reference: ModelRun, measure: Difference
+) -> dict[str, dict[str, float | None]]:
+    return {
+        f"{until:g}": {
+            point: _number(measure(run.points[point], reference.points[point], run.time, until))
+            for point in bench.points
+        }
+        for until in windows(bench)
+    }
+
+
+def _contacts(bench: Workbench, run: ModelRun) -> dict[str, dict[str, Any]]:
+    given = run.contact_intervals
+    return {
+        "first_contact": {name: metrics.first_contact(times) for name, times in given.items()},
+        "contact_count": {name: len(times) for name, times in given.items()},
+        "closed_time": {name: metrics.closed_time(times) for name, times in given.items()},
+        "intervals": {name: times.tolist() for name, times in given.items()},
+        "impulse": {name: _number(value) for name, value in run.impulse.items()},
+        "inner_losses": {name: metrics.inner_losses(times, bench.longest_period) for name, times in given.items()},
+    }
+
+
+def _number(value: float) -> float | None:
+    """None where JSON has no number."""
+    return float(value) if math.isfinite(value) else None
