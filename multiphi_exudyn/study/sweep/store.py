@@ -124,10 +124,16 @@ class Store:
             raise MultiPhiValueError(f"row: status {row.status!r}; need one of {', '.join(STATUSES)}")
         given, content = checked(parameters), plain(row.values, "values")
         with self._sound():
-            fields = (name, key_of(given), json.dumps(given), row.status, row.message, json.dumps(content))
-            fields += (row.elapsed_s, self._environment(row.environment), row.finished, histories)
-            places = "name, key, parameters, status, message, content, elapsed_s, environment, finished, histories"
-            marks = ", ".join("?" * len(fields))
+            environment = self._environment(row.environment)
+            fields: dict[str, Any] = {
+                "name": name,
+                "key": key_of(given),
+                "parameters": json.dumps(given),
+                "status": row.status,
+            }
+            fields |= {"message": row.message, "content": json.dumps(content), "elapsed_s": row.elapsed_s}
+            fields |= {"environment": environment, "finished": row.finished, "histories": histories}
+            places, marks = ", ".join(fields), ", ".join(f":{field}" for field in fields)
             order = f"INSERT INTO runs ({places}) VALUES ({marks}) ON CONFLICT DO NOTHING"
             return self._connection.execute(order, fields).rowcount == 1
 
