@@ -1,8 +1,8 @@
 """The format of a study file: a scene, what is varied in it, the methods to judge, and how.
 
 A *field* is a place in a scene file, written with dots ("start.displacement"). A *setting* is one choice of a method's
-own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can be
-lucky (micro-bounces are sampled differently by every step) it is run at several *nearby* values, and the worst counts.
+own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
+be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class MethodSpec(Table):
 
     name: Annotated[str, Field(min_length=1)]
     model: dict[str, Any]
-    axes: dict[str, Values] = {}
-    nearby: dict[str, Factors] = {}  # field -> factors on its value; a setting is judged by the worst of them
-    quick: dict[str, Values] = {}  # axes of the short form, in place of those of the same name
+    axes: dict[str, Values] = Field(default_factory=dict)
+    nearby: dict[str, Factors] = Field(default_factory=dict)  # field -> factors on its value
+    quick: dict[str, Values] = Field(default_factory=dict)  # axes of the short form, in place of those of the same name
 
 
 class BudgetSpec(Table):
@@ -39,8 +39,8 @@ class BudgetSpec(Table):
 class QuickSpec(Table):
     """What the short form of a study changes."""
 
-    change: dict[str, Any] = {}
-    axes: dict[str, Values] = {}
+    change: dict[str, Any] = Field(default_factory=dict)
+    axes: dict[str, Values] = Field(default_factory=dict)
 
 
 class StudyFile(Table):
@@ -55,8 +55,8 @@ class StudyFile(Table):
 
     title: Annotated[str, Field(min_length=1)]
     scene: str
-    change: dict[str, Any] = {}
-    axes: dict[str, Values] = {}
+    change: dict[str, Any] = Field(default_factory=dict)
+    axes: dict[str, Values] = Field(default_factory=dict)
     methods: tuple[MethodSpec, ...] = ()
     budget: BudgetSpec | None = None
     window: Positive | None = None

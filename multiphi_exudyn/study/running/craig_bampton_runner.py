@@ -53,7 +53,7 @@ def run_craig_bampton(bench: Workbench, spec: CraigBamptonModel, label: str) -> 
         result = solve_craig_bampton(task.component, task.contacts, task.start, bench.t_end, settings)
         return result, result.wall_s
 
-    recorded, first, repeats = repeated(solve)
+    recorded, first, repeats = repeated(solve, bench.repeats)
     energy = _energy(task, recorded)
     message = recorded.cause or energy_gain(recorded.time, energy)
     run = ModelRun(

@@ -34,7 +34,7 @@ def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool) -> M
         )
         return result, result.online_s
 
-    result, first, repeats = repeated(solve)
+    result, first, repeats = repeated(solve, bench.repeats)
     run = ModelRun(
         name=spec.name,
         kind=spec.kind,

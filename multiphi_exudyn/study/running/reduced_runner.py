@@ -17,6 +17,7 @@ from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.scene_file import GlobalBasisModel, ReducedModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.truncation import truncation_indicator
 from reference_models.global_basis import global_basis
 
 __all__ = ["ENERGY_INTERVAL", "run_global_basis", "run_reduced"]
@@ -45,7 +46,9 @@ def _run(
     building: float,
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
-    trajectory, first, repeats = repeated(lambda: timed(lambda: simulate(model, bench.t_end, displacement=start)))
+    trajectory, first, repeats = repeated(
+        lambda: timed(lambda: simulate(model, bench.t_end, displacement=start)), bench.repeats
+    )
     run = ModelRun(
         name=spec.name,
         kind=spec.kind,
@@ -58,7 +61,15 @@ def _run(
         first_s=first,
         repeats_s=repeats,
     )
-    return replace(run, **_sampled(bench, trajectory)) if run.ok else run
+    if not run.ok:
+        return run
+    indicators = _indicators(bench, trajectory) if isinstance(spec, ReducedModel) else {}
+    return replace(run, **_sampled(bench, trajectory), indicators=indicators)
+
+
+def _indicators(bench: Workbench, trajectory: Trajectory) -> dict[str, float]:
+    ends = {until for until in bench.scene.file.outputs.windows if until < bench.t_end} | {bench.t_end}
+    return {f"{until:g}": truncation_indicator(trajectory, until) for until in ends}
 
 
 def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, np.ndarray]:

@@ -29,7 +29,7 @@ def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str) -> ModelRun:
     def solve() -> StepwiseRun:
         return solve_stepwise(model, bench.t_end, start, method=spec.method, rtol=spec.rtol)
 
-    solved, first, repeats = repeated(lambda: timed(solve))
+    solved, first, repeats = repeated(lambda: timed(solve), bench.repeats)
     run = ModelRun(
         name=spec.name,
         kind=spec.kind,

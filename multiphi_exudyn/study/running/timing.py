@@ -10,7 +10,6 @@ __all__ = ["repeated", "timed"]
 
 T = TypeVar("T")
 
-REPEATS = 7  # of a model's online part, as far as they fit
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
 
 
@@ -21,10 +20,13 @@ def timed(run: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - started
 
 
-def repeated(run: Callable[[], tuple[T, float]]) -> tuple[T, float, tuple[float, ...]]:
-    """Of a run that gives (result, seconds): the first result, its time, and the times of the repeats."""
+def repeated(run: Callable[[], tuple[T, float]], most: int) -> tuple[T, float, tuple[float, ...]]:
+    """Of a run that gives (result, seconds): the first result, its time, and the times of the repeats.
+
+    There are ``most`` of them, as far as they fit into REPEAT_BUDGET_S.
+    """
     result, first = run()
     repeats: list[float] = []
-    while len(repeats) < REPEATS and first + sum(repeats) < REPEAT_BUDGET_S:
+    while len(repeats) < most and first + sum(repeats) < REPEAT_BUDGET_S:
         repeats.append(run()[1])
     return result, first, tuple(repeats)

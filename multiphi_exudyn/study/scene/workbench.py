@@ -40,6 +40,7 @@ __all__ = ["Workbench", "damping_matrix", "prepare", "start_configuration"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
+REPEATS = 7
 KEPT_STRUCTURES = 32  # linearised beams kept for later scenes; each is two matrices of some 100 DoFs
 ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
 
@@ -50,6 +51,7 @@ class Workbench:
 
     structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
     longest_period: of the open level [s]; infinite where it has a rigid-body mode.
+    repeats: of a model's online part, for its time.
     """
 
     scene: Scene
@@ -58,6 +60,7 @@ class Workbench:
     structure_s: float
     time: np.ndarray
     longest_period: float
+    repeats: int = REPEATS
 
     @property
     def points(self) -> tuple[str, ...]:

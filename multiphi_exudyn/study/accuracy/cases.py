@@ -1,0 +1,216 @@
+"""Cases of a study: every run that its file asks for, as one dict of parameters, and the scene each is run in.
+
+    {"scene": name, "content": hash, "at": {field: value}, "method": name, "setting": {field: value},
+     "nearby": {field: factor}}
+
+content stands for the scene file with the study's changes, the reference, and the method's model: a run is found again
+only where everything that could alter it is the same. The method "reference" is the base scene's reference at that
+point of the axes, "coarser" the reference's coarser copy.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE
+from multiphi_exudyn.study.accuracy.study_file import MethodSpec, StudyFile
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
+from multiphi_exudyn.study.scene.toml_file import read_toml, validated
+from multiphi_exudyn.study.sweep.sweep import grid
+
+__all__ = ["BUDGET", "CASE", "Parameters", "Study", "load_study", "shipped_studies"]
+
+CASE = "case"  # name of the model that a case runs
+BUDGET = "budget"  # method of the error budgets' cases
+MOST_RUNS = 1_000_000  # of a study: beyond that a typing error is likelier than a wish
+
+Parameters = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A validated study: name, path and content of its file; path and raw content of its scene, changes made.
+
+    quick: whether it is the short form.
+    """
+
+    name: str
+    path: Path
+    file: StudyFile
+    scene_path: Path
+    scene: Mapping[str, Any]
+    quick: bool = False
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """Every combination of the values on the scene's axes."""
+        return grid(self.file.axes | (self.file.quick.axes if self.quick else {}))
+
+    def reference(self, at: Mapping[str, Any]) -> Parameters:
+        """The reference at one point of the axes."""
+        return self._case(at, REFERENCE, {}, {})
+
+    def runs(self, at: Mapping[str, Any]) -> list[Parameters]:
+        """The reference's coarser copy, then every method's settings with those nearby, at one point of the axes."""
+        coarser = [COARSER] if self.scene["comparison"].get("coarser") is not None else []
+        return [self._case(at, name, {}, {}) for name in coarser] + [
+            self._case(at, method.name, setting, nearby)
+            for method in self.file.methods
+            for setting in self._settings(method)
+            for nearby in _nearby(method)
+        ]
+
+    def budgets(self) -> list[Parameters]:
+        """One case for each point of the axes, if the study has a budget."""
+        wanted = self.file.budget
+        return [] if wanted is None else [self._case(at, BUDGET, wanted.model_dump(), {}) for at in self.points]
+
+    def scene_for(self, parameters: Mapping[str, Any]) -> Scene:
+        """The scene of a case: its full models that play a part, and the case's own model under the name CASE."""
+        data = copy.deepcopy(dict(self.scene))
+        for field, value in parameters["at"].items():
+            _put(data, field, value)
+        parts = data["comparison"]
+        named = {parts["reference"], parts.get("coarser"), *parts.get("cheapest", ())}
+        models = [model for model in data["models"] if model.get("name") in named]
+        if parameters["method"] not in (REFERENCE, COARSER, BUDGET):
+            models.append(self._model(parameters) | {"name": CASE})
+        return scene_of(self.scene_path, data | {"models": models})
+
+    def model_name(self, parameters: Mapping[str, Any]) -> str:
+        """Name of the model, in its scene, that a case runs."""
+        parts = self.scene["comparison"]
+        return {REFERENCE: parts["reference"], COARSER: parts.get("coarser")}.get(parameters["method"], CASE)
+
+    def _model(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        method = next(method for method in self.file.methods if method.name == parameters["method"])
+        model = method.model | parameters["setting"]
+        return model | {field: factor * model[field] for field, factor in parameters["nearby"].items()}
+
+    def _settings(self, method: MethodSpec) -> list[dict[str, Any]]:
+        return grid(method.axes | (method.quick if self.quick else {}))
+
+    def _case(
+        self, at: Mapping[str, Any], method: str, setting: Mapping[str, Any], nearby: Mapping[str, float]
+    ) -> Parameters:
+        model = next((given.model for given in self.file.methods if given.name == method), {})
+        return {
+            "scene": self.file.scene,
+            "content": _hash([self.scene, model]),
+            "at": dict(at),
+            "method": method,
+            "setting": dict(setting),
+            "nearby": dict(nearby),
+        }
+
+
+def shipped_studies() -> dict[str, str]:
+    """name -> title of the studies that come with the package."""
+    return {path.stem: load_study(path.stem).file.title for path in sorted(_shipped_folder().glob("*.toml"))}
+
+
+def load_study(source: str, *, quick: bool = False) -> Study:
+    """The study of a shipped name or a TOML file; all its scenes are checked before anything runs.
+
+    Raises MultiPhiValueError, one line: file, field, what was given, what is needed.
+    """
+    path = _find(source)
+    file = validated(StudyFile, path, read_toml(path))
+    scene_path, data = scene_data(file.scene, path.parent)
+    for field, value in (file.change | (file.quick.change if quick else {})).items():
+        _put(data, field, value)
+    _put(data, "outputs.tolerances", list(file.tolerances))
+    if file.window is not None:
+        _put(data, "outputs.windows", [file.window])
+    study = Study(path.stem, path, file, scene_path, data, quick)
+    _check(study)
+    return study
+
+
+def _check(study: Study) -> None:
+    """Names, sizes, and every scene of the study."""
+    names = [method.name for method in study.file.methods]
+    for name in names:
+        if names.count(name) > 1 or name in (REFERENCE, COARSER, BUDGET):
+            _refuse(study, "methods", name, "a name of its own for every method")
+    for name in study.file.maps:
+        if name not in names:
+            _refuse(study, "maps", name, f"one of the methods: {', '.join(names)}")
+    if not names and study.file.budget is None:
+        _refuse(study, "methods", "none", "a method or a budget")
+    for method in study.file.methods:
+        for field in method.nearby:
+            if not isinstance((method.model | {k: v[0] for k, v in method.axes.items()}).get(field), (int, float)):
+                _refuse(study, f"nearby of {method.name}", field, "a field of the model or its axes that is a number")
+    per_point = len(study.runs(study.points[0]))
+    if per_point * len(study.points) > MOST_RUNS:
+        _refuse(study, "axes", f"{per_point * len(study.points)} runs", f"at most {MOST_RUNS}")
+    for case in _samples(study):
+        try:
+            mechanics_of(study.scene_for(case))
+        except MultiPhiValueError as error:
+            told = str(error).removeprefix(f"{study.scene_path}: ")
+            raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
+
+
+def _samples(study: Study) -> Iterator[Parameters]:
+    """Every point of the axes, and at the first of them every setting."""
+    yield from map(study.reference, study.points)
+    yield from study.runs(study.points[0])
+
+
+def _place(case: Mapping[str, Any]) -> str:
+    """Which run of the study, in words."""
+    chosen = {**case["at"], **case["setting"]}
+    return " ".join([case["method"], *(f"{field}={value}" for field, value in chosen.items())])
+
+
+def _nearby(method: MethodSpec) -> list[dict[str, float]]:
+    """The setting itself, and its neighbours: all their factors move together."""
+    count = max((len(factors) for factors in method.nearby.values()), default=0)
+    return [{}] + [
+        {field: factors[i] for field, factors in method.nearby.items() if i < len(factors)} for i in range(count)
+    ]
+
+
+def _put(data: dict[str, Any], field: str, value: Any) -> None:
+    """Set a field "a.b.c" of nested tables; a table on the way is made where there is none."""
+    *outer, last = field.split(".")
+    table = data
+    for name in outer:
+        inner = table.setdefault(name, {})
+        if not isinstance(inner, dict):
+            raise MultiPhiValueError(f"{field}: got a place inside {name}, which is no table; need a scene's field")
+        table[name] = table = dict(inner)
+    table[last] = value
+
+
+def _hash(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _shipped_folder() -> Path:
+    return Path(str(resources.files("multiphi_exudyn.study.accuracy"))) / "shipped"
+
+
+def _find(source: str) -> Path:
+    shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
+    if source in shipped:
+        return _shipped_folder() / f"{source}.toml"
+    if Path(source).is_file():
+        return Path(source)
+    raise MultiPhiValueError(f"STUDY: got {source!r}, need a TOML file or one of: {', '.join(shipped)}")
+
+
+def _refuse(study: Study, field: str, given: object, needed: str) -> None:
+    raise MultiPhiValueError(f"{study.path}: {field}: got {given!r}, need {needed}")

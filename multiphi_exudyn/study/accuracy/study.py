@@ -1,0 +1,184 @@
+"""A study from beginning to end: references, error pass, error budgets, timing pass, maps.
+
+The error pass runs wherever the executor has workers. The timing pass is another one: each setting again, one at a
+time, in this process, with nothing else of the study running, a first run and its repeats. All of it is kept in the
+store as it ends, so a study that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import Any
+
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.study.accuracy.analysis import MapPair, Setting, StudyResult, settings
+from multiphi_exudyn.study.accuracy.budget import budget
+from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
+from multiphi_exudyn.study.measures.measures import measures
+from multiphi_exudyn.study.measures.spectra import FREQUENCIES, wavelet_map
+from multiphi_exudyn.study.running.environment import environment
+from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.workbench import Workbench, prepare
+from multiphi_exudyn.study.sweep.run import Function, Outcome
+from multiphi_exudyn.study.sweep.store import Row, Store
+from multiphi_exudyn.study.sweep.sweep import sweep
+
+__all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "run_study"]
+
+ERRORS, TIMING, BUDGETS = "error", "timing", "budget"  # names of the passes in the store
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """A case of the error pass: one run, measured against the reference at its point of the axes."""
+
+    study: Study
+    reference: ModelRun | None
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
+        """The run's measures, and the run itself as arrays."""
+        bench = replace(_bench(self.study, parameters), repeats=0)
+        run = run_model(bench, self.study.model_name(parameters), progress=False)
+        indicator = run.indicators.get(f"{_window(self.study, bench):g}")
+        values = measures(bench, run, self.reference) | {"indicator": indicator}
+        return Outcome(values, to_arrays(run), run.status, run.message)
+
+
+@dataclass(frozen=True)
+class TimedRun:
+    """A case of the timing pass: a first run and its repeats."""
+
+    study: Study
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
+        """Times [s], and the machine's load average of the last minute when they were taken."""
+        bench = _bench(self.study, parameters)
+        run = run_model(bench, self.study.model_name(parameters), progress=False)
+        values = {
+            "first_s": run.first_s,
+            "repeats_s": list(run.repeats_s),
+            "online_s": run.online_s,
+            "offline_s": run.offline_s,
+            "sampling_s": run.sampling_s,
+            "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        }
+        return Outcome(values, {}, run.status, run.message)
+
+
+@dataclass(frozen=True)
+class BudgetRun:
+    """A case of the error budgets."""
+
+    study: Study
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
+        """The budget's values."""
+        bench = _bench(self.study, parameters)
+        return Outcome(budget(bench, parameters["setting"]["modes"], progress=False).values())
+
+
+def run_study(study: Study, store: Store, executor: Executor | None = None, progress: bool = True) -> StudyResult:
+    """Run what the store does not have yet, and give all of it."""
+
+    def passed(function: Function, cases: Sequence[Parameters], name: str, **how: Any) -> tuple[Row, ...]:
+        return sweep(function, cases, store, name, budget_s=study.file.time_limit_s, progress=progress, **how)
+
+    references = [study.reference(at) for at in study.points]
+    rows = list(passed(MeasuredRun(study, None), references, ERRORS, executor=executor, keep_histories=True))
+    for case in references:
+        measured = MeasuredRun(study, _stored(store, case))
+        kept = study.file.histories
+        rows += passed(measured, study.runs(case["at"]), ERRORS, executor=executor, keep_histories=kept)
+    budgets = sweep(BudgetRun(study), study.budgets(), store, BUDGETS, executor=executor, progress=progress)
+    timings = passed(TimedRun(study), _timed(study, rows), TIMING) if study.file.timing else ()
+    return _result(study, tuple(rows), timings, budgets, store)
+
+
+def _stored(store: Store, case: Parameters) -> ModelRun | None:
+    """A run that is ok, from its arrays."""
+    row, arrays = store.find(ERRORS, case), store.histories(ERRORS, case)
+    return from_arrays(arrays) if row is not None and row.status == "ok" and arrays is not None else None
+
+
+def _bench(study: Study, parameters: Mapping[str, Any]) -> Workbench:
+    scene = study.scene_for(parameters)
+    return prepare(scene, mechanics_of(scene))
+
+
+def _window(study: Study, bench: Workbench) -> float:
+    """End [s] of the window whose errors are ranked."""
+    return min(study.file.window or bench.t_end, bench.t_end)
+
+
+def _timed(study: Study, rows: Sequence[Row]) -> list[Parameters]:
+    """Cases worth a time: the settings themselves that ran, not their neighbours."""
+    return [dict(row.parameters) for row in rows if row.status == "ok" and not row.parameters["nearby"]]
+
+
+def _result(
+    study: Study, rows: tuple[Row, ...], timings: tuple[Row, ...], budgets: tuple[Row, ...], store: Store
+) -> StudyResult:
+    first = study.reference(study.points[0])
+    bench = _bench(study, first)
+    result = StudyResult(
+        study=study.file,
+        name=study.name,
+        judged_points=bench.judged_points,
+        window=_window(study, bench),
+        rows=rows,
+        timings=timings,
+        budgets=budgets,
+        maps=(),
+        environment=environment(),
+        assumptions=bench.mechanics.assumptions,
+        quick=study.quick,
+    )
+    reference = _stored(store, first)
+    return result if reference is None else replace(result, maps=tuple(_maps(study, result, reference)))
+
+
+def _maps(study: Study, result: StudyResult, full: ModelRun) -> Iterator[MapPair]:
+    """Of the methods asked for, at the first point of the axes: the most accurate setting beside the reference."""
+    known = [s for s in settings(result) if s.error is not None and s.at == study.points[0]]
+    for name in study.file.maps:
+        best = min((s for s in known if s.method == name), key=lambda s: s.error or 0.0, default=None)
+        if best is not None:
+            yield from _pairs(study, best, full)
+
+
+def _pairs(study: Study, setting: Setting, full: ModelRun) -> Iterator[MapPair]:
+    case = next(c for c in study.runs(setting.at) if (c["method"], c["setting"]) == (setting.method, setting.setting))
+    bench = replace(_bench(study, case), repeats=0)
+    run = run_model(bench, CASE, progress=False)
+    if not run.ok:
+        return
+    for point in bench.points:
+        yield MapPair(
+            point=point,
+            label=run.label,
+            full=wavelet_map(full.points[point], full.time),
+            reduced=wavelet_map(run.points[point], run.time),
+            full_contacts=_in_contact(full),
+            reduced_contacts=_in_contact(run),
+            frequencies=_level_frequencies(bench),
+        )
+
+
+def _in_contact(run: ModelRun) -> list[list[float]]:
+    return sorted(interval for given in run.contact_intervals.values() for interval in given.tolist())
+
+
+def _level_frequencies(bench: Workbench) -> dict[str, list[float]]:
+    """Natural frequencies [Hz], within the map, of the open level and of each contact closed alone."""
+    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False), modes="all", overrides=bench.overrides)
+    levels = {"open": (), **{f"{contact.name} closed": (contact.name,) for contact in model.contacts}}
+    lowest, highest = FREQUENCIES[0], FREQUENCIES[-1]
+    return {
+        name: [float(f) for f in model.level(closed).frequencies if lowest <= f <= highest]
+        for name, closed in levels.items()
+    }
