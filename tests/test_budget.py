@@ -12,7 +12,6 @@ from multiphi_exudyn import MultiPhiValueError
 from multiphi_exudyn.study.accuracy import budget as ladder
 from multiphi_exudyn.study.accuracy.budget import CAUSES, Rung, budget, decomposition
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-from multiphi_exudyn.study.running import timing
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -32,14 +31,6 @@ def bench_of(folder, **fields):
     data |= {"outputs": {"t_end": 0.05, "interval": 1e-4, "windows": [0.02]}} | fields
     scene = load_scene(write(folder / "scene.toml", data))
     return prepare(scene, mechanics_of(scene))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def runs_once():
-    """No run is repeated for its time."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timing, "REPEAT_BUDGET_S", 0.0)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +149,7 @@ def test_one_rung_or_a_reference_at_rest_has_no_parts():
 def test_every_rung_of_a_small_scene_runs_and_its_values_survive_json(small):
     values = small.values()
     assert {rung["message"] for rung in values["rungs"].values()} == {""}
+    assert all(rung.run.repeats_s == () for rung in small.ladders["rigid"])
     assert json.loads(json.dumps(values, allow_nan=False)) == values
     assert list(values["windows"]) == ["0.02", "0.05"]
     assert list(values["windows"]["0.05"]["rigid"]) == ["all", "middle", "tip"]

@@ -216,12 +216,12 @@ def _check(bench: Workbench, modes: int, step: float | None) -> None:
 
 
 def _run(bench: Workbench, spec: ModelSpec, disturbance: float = 0.0, progress: bool = False) -> ModelRun:
-    """One model on the bench's scene, its start scaled by 1 + ``disturbance``."""
+    """One model, once, on the bench's scene, its start scaled by 1 + ``disturbance``."""
     start = bench.scene.file.start
     size = "displacement" if isinstance(start, DisplacedStart) else "force"
     scaled = start.model_copy(update={size: getattr(start, size) * (1 + disturbance)})
     file = bench.scene.file.model_copy(update={"start": scaled, "models": (spec,)})
-    return run_model(replace(bench, scene=replace(bench.scene, file=file)), spec.name, progress)
+    return run_model(replace(bench, scene=replace(bench.scene, file=file), repeats=0), spec.name, progress)
 
 
 def _disturbed(bench: Workbench, spec: ModelSpec) -> dict[str, tuple[ModelRun, ...]]:

@@ -30,7 +30,7 @@ __all__ = ["budget_figure"]
 PANEL_HEIGHT = 3.0  # inches
 COLUMNS = 2  # of panels, where there are several
 PALE = 0.35  # opacity of a bar no larger than its uncertainty
-FLOOR = 1e-12  # of ||y_ref||: round-off; smaller bars lie below the picture
+FLOOR = 1e-13  # of ||y_ref||: round-off; smaller bars lie below the picture
 HIGHEST = 50.0  # of ||y_ref||: room for shares and causes above the largest differences
 LINE_LENGTH = 110  # characters of a missing rung's cause
 COLOUR_OF = dict(zip(CAUSES, COLOURS, strict=False))
