@@ -4,8 +4,8 @@
 
 What the levels are, how a state passes from one to the next (38.6) and which level follows is that of the reduced
 model; what differs is the integration: an error tolerance instead of closed forms, and events that are seen only
-where a signal's sign differs at the two ends of a step. Compliant contacts only. Directed events keep an event from
-being found again at the instant of the restart: a contact that has just closed waits for its gap to rise.
+where a signal's sign differs at the two ends of a step. Compliant contacts only. An event is not found again at the
+instant of the restart: it has a direction, and there its sign is known while its value is round-off.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["StepwiseHistories", "StepwiseRun", "solve_stepwise"]
 
+INSTANT = 64 * np.finfo(float).eps  # of time, and s: solve_ivp locates events to 4 of these epsilons
 CHATTER = 200  # events in a row, in less than
 CHATTER_PERIODS = 10  # periods of the highest kept mode, are chatter
 
@@ -145,7 +146,7 @@ class _Integration:
                 reached = found.y[:, -1]
                 arrived = replace(state, displacement=reached[:modes], velocity=reached[modes:])
                 try:
-                    state = self.rule.decide(arrived, asking)[0]
+                    state = self.rule.decide(arrived, self._together(arrived, asking, time))[0]
                 except NumericalFailure as failure:
                     message = f"at t = {time:.9g} s: {failure}"
         return StepwiseRun(self.rule.model, tuple(segments), message, evaluations)
@@ -154,7 +155,7 @@ class _Integration:
         """solve_ivp's result in one level, and the contacts that ask to change at its end."""
         modes = state.level.level.modes
         motion, matrix = _right_hand_side(state.level)
-        watched = _watched(self.rule, state)
+        watched = _watched(self.rule, state, time)
         implicit: dict[str, Any] = {"jac": (lambda _, __: matrix) if self.method == "LSODA" else matrix}
         found = solve_ivp(
             motion,
@@ -170,6 +171,16 @@ class _Integration:
         times = found.t_events if found.status == 1 else [()] * len(watched)
         return found, {contact for (contact, _), at in zip(watched, times, strict=True) if len(at)}
 
+    def _together(self, state: State, asking: set[int], time: float) -> set[int]:
+        """With those that reach zero at the same instant, as far as roots are resolved: solve_ivp leaves them out."""
+        found = set(asking)
+        for contact, phase in enumerate(state.phases):
+            own = self.rule.function(state.level, contact)
+            value, rate = own(state.displacement, state.velocity), float(own.position @ state.velocity)
+            if phase is Phase.ARMED and rate < 0 and abs(value) <= -rate * INSTANT * (1 + time):
+                found.add(contact)
+        return found
+
 
 def _right_hand_side(level: LoadedLevel) -> tuple[Function, np.ndarray]:
     """z'(t, z) and its constant matrix (2 r, 2 r)."""
@@ -181,36 +192,41 @@ def _right_hand_side(level: LoadedLevel) -> tuple[Function, np.ndarray]:
     return lambda _, z: matrix.dot(z) + constant, matrix
 
 
-def _watched(rule: EventRule, state: State) -> list[tuple[int, Function]]:
+def _watched(rule: EventRule, state: State, time: float) -> list[tuple[int, Function]]:
     """(contact, event) of all that may ask to change: s falls through zero, s being as in the event rule.
 
     A contact whose s is negative asks also where s turns down or, refused before, where s in the level it would
-    enter has risen to zero.
+    enter has risen to zero. ``time``: of the restart.
     """
     watched = []
     for contact, phase in enumerate(state.phases):
         own = rule.function(state.level, contact)
-        watched.append((contact, _falling(own)))
+        watched.append((contact, _falling(own, time, positive=phase is Phase.ARMED)))
         if phase is Phase.RECOVERING:
-            watched.append((contact, _falling(Row(np.zeros_like(own.position), own.position, 0.0), while_negative=own)))
+            rate = Row(np.zeros_like(own.position), own.position, 0.0)
+            watched.append((contact, _falling(rate, time, while_negative=own)))
         elif phase is Phase.REFUSED:
-            watched.append((contact, _falling(-rule.entered_function(state.level, contact), while_negative=own)))
+            entered = rule.entered_function(state.level, contact)
+            watched.append((contact, _falling(-entered, time, while_negative=own)))
     return watched
 
 
-def _falling(row: Row, while_negative: Row | None = None) -> Function:
-    """Terminal event: ``row`` falls through zero, looked for only while another row is negative."""
-    vector, constant = np.concatenate([row.position, row.rate]), row.constant
+def _falling(row: Row, time: float, *, positive: bool = True, while_negative: Row | None = None) -> Function:
+    """Terminal event: ``row`` falls through zero, looked for only while another row is negative.
+
+    positive: its sign at the restart, where the value itself is round-off.
+    """
+    vector, constant, first = np.concatenate([row.position, row.rate]), row.constant, 1.0 if positive else -1.0
     if while_negative is None:
 
-        def event(_: float, z: np.ndarray) -> float:
-            return vector.dot(z) + constant
+        def event(t: float, z: np.ndarray) -> float:
+            return vector.dot(z) + constant if t > time else first
 
     else:
         other, shift = np.concatenate([while_negative.position, while_negative.rate]), while_negative.constant
 
-        def event(_: float, z: np.ndarray) -> float:
-            return vector.dot(z) + constant if other.dot(z) + shift < 0 else 1.0
+        def event(t: float, z: np.ndarray) -> float:
+            return vector.dot(z) + constant if t > time and other.dot(z) + shift < 0 else first
 
     event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
     return event

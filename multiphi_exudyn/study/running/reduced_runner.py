@@ -46,8 +46,9 @@ def _run(
     building: float,
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
+    compiled = spec.loop == "compiled"
     trajectory, first, repeats = repeated(
-        lambda: timed(lambda: simulate(model, bench.t_end, displacement=start)), bench.repeats
+        lambda: timed(lambda: simulate(model, bench.t_end, displacement=start, compiled=compiled)), bench.repeats
     )
     run = ModelRun(
         name=spec.name,

@@ -60,9 +60,10 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
         return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
     rigid = all(contact.rigid for contact in bench.contacts(spec.contact == "rigid"))
     levels = f"{'rigid' if rigid else 'compliant'} levels, r = {spec.modes}"
-    if isinstance(spec, GlobalBasisModel):
-        return f"global basis, {levels} from each of two"
-    levels += ", printed frequencies" if bench.overrides else ""
     if isinstance(spec, UserObjectModel):
-        return f"Exudyn user object, {levels}, step {spec.step * 1e6:g} µs"
-    return f"Multi-Phi, {levels}"
+        printed = ", printed frequencies" if bench.overrides else ""
+        return f"Exudyn user object, {levels}{printed}, step {spec.step * 1e6:g} µs"
+    loop = ", compiled" if spec.loop == "compiled" else ""
+    if isinstance(spec, GlobalBasisModel):
+        return f"global basis, {levels} from each of two{loop}"
+    return f"Multi-Phi, {levels}{', printed frequencies' if bench.overrides else ''}{loop}"

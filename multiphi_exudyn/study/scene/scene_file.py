@@ -214,6 +214,7 @@ class ReducedModel(Table):
     name: Name  # "{modes}" stands for the number of modes
     modes: Modes | None = None  # none given: the scene's
     contact: Literal["as-given", "rigid"] = "as-given"
+    loop: Literal["numpy", "compiled"] = "numpy"  # what carries the run from event to event; the answer is the same
 
 
 class UserObjectModel(Table):
@@ -267,6 +268,7 @@ class GlobalBasisModel(Table):
     name: Name
     modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
     contact: Literal["as-given", "rigid"] = "as-given"
+    loop: Literal["numpy", "compiled"] = "numpy"
 
 
 ModelSpec = Annotated[
