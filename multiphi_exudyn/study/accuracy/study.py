@@ -18,7 +18,7 @@ from multiphi_exudyn.study.accuracy.analysis import MapPair, Setting, StudyResul
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
 from multiphi_exudyn.study.measures.measures import measures
-from multiphi_exudyn.study.measures.spectra import FREQUENCIES, wavelet_map
+from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
@@ -157,12 +157,13 @@ def _pairs(study: Study, setting: Setting, full: ModelRun) -> Iterator[MapPair]:
     run = run_model(bench, CASE, progress=False)
     if not run.ok:
         return
+    frequencies = FREQUENCIES[FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1]
     for point in bench.points:
         yield MapPair(
             point=point,
             label=run.label,
-            full=wavelet_map(full.points[point], full.time),
-            reduced=wavelet_map(run.points[point], run.time),
+            full=wavelet_map(full.points[point], full.time, frequencies),
+            reduced=wavelet_map(run.points[point], run.time, frequencies),
             full_contacts=_in_contact(full),
             reduced_contacts=_in_contact(run),
             frequencies=_level_frequencies(bench),

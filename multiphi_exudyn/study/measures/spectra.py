@@ -25,7 +25,7 @@ import scipy.signal
 
 from multiphi_exudyn.errors import MultiPhiValueError
 
-__all__ = ["FREQUENCIES", "Map", "spectral_difference", "wavelet_map"]
+__all__ = ["FEWEST", "FREQUENCIES", "Map", "spectral_difference", "wavelet_map"]
 
 FREQUENCIES = np.geomspace(2.0, 500.0, 160)  # Hz
 FREQUENCIES.flags.writeable = False

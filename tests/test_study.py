@@ -1,0 +1,197 @@
+"""A study from its file to its rows: what is run, where, once, and against which reference."""
+
+import json
+
+import numpy as np
+import pytest
+from small_scene import BEAM, changed, write
+
+from multiphi_exudyn import MultiPhiValueError
+from multiphi_exudyn.study.accuracy.analysis import points, settings, uncertainty
+from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studies
+from multiphi_exudyn.study.accuracy.study import run_study
+from multiphi_exudyn.study.sweep.executors import open_executor
+from multiphi_exudyn.study.sweep.store import Store
+
+STUDY = {
+    "title": "a small study",
+    "scene": "small.toml",
+    "window": 0.08,
+    "axes": {"start.displacement": [0.01, 0.005]},
+    "methods": [
+        {"name": "levels", "model": {"kind": "reduced"}, "axes": {"modes": [2, 4, 8]}, "quick": {"modes": [3]}},
+        {
+            "name": "stepwise",
+            "model": {"kind": "solve-ivp", "method": "DOP853", "modes": 2},
+            "axes": {"rtol": [1e-5]},
+            "nearby": {"rtol": [0.5]},
+        },
+    ],
+    "quick": {"change": {"outputs.t_end": 0.05}, "axes": {"start.displacement": [0.01]}},
+}
+SCENE = BEAM | {
+    "models": [{"kind": "reduced", "name": "all", "modes": "all"}, {"kind": "reduced", "name": "r12", "modes": 12}],
+    "comparison": {"reference": "all", "coarser": "r12"},
+}
+
+
+@pytest.fixture
+def study_file(tmp_path):
+    write(tmp_path / "small.toml", SCENE)
+    return lambda data=STUDY: write(tmp_path / "study.toml", data)
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store(tmp_path / "runs.sqlite") as opened:
+        yield opened
+
+
+class TestCases:
+    def test_every_setting_with_its_neighbours_at_every_point(self, study_file):
+        study = load_study(study_file())
+        assert study.points == [{"start.displacement": 0.01}, {"start.displacement": 0.005}]
+        cases = study.runs(study.points[0])
+        assert [case["method"] for case in cases] == ["coarser"] + 3 * ["levels"] + 2 * ["stepwise"]
+        assert [case["setting"] for case in cases[1:4]] == [{"modes": 2}, {"modes": 4}, {"modes": 8}]
+        assert [case["nearby"] for case in cases[4:]] == [{}, {"rtol": 0.5}]
+        assert {json.dumps(case) for case in cases} != {json.dumps(case) for case in study.runs(study.points[1])}
+
+    def test_a_case_has_its_scene(self, study_file):
+        study = load_study(study_file())
+        case = study.runs(study.points[1])[-1]
+        scene = study.scene_for(case)
+        assert scene.file.start.displacement == 0.005
+        assert list(scene.models) == ["all", "r12", CASE]
+        assert scene.models[CASE].rtol == pytest.approx(0.5e-5)
+        assert study.model_name(case) == CASE
+        assert study.model_name(study.reference(study.points[0])) == "all"
+        assert study.model_name(study.runs(study.points[0])[0]) == "r12"
+
+    def test_the_short_form(self, study_file):
+        study = load_study(study_file(), quick=True)
+        assert study.points == [{"start.displacement": 0.01}]
+        assert study.scene_for(study.reference(study.points[0])).file.outputs.t_end == 0.05
+        assert [c["setting"] for c in study.runs(study.points[0]) if c["method"] == "levels"] == [{"modes": 3}]
+
+    def test_what_could_alter_a_run_alters_its_parameters(self, study_file):
+        first = load_study(study_file())
+        for change in (
+            STUDY | {"change": {"outputs.t_end": 0.09}},
+            changed(["methods", 0, "model"], {"kind": "reduced", "contact": "rigid"}, STUDY),
+        ):
+            other = load_study(study_file(change))
+            assert first.runs(first.points[0])[1] != other.runs(other.points[0])[1]
+
+    def test_another_title_or_another_method_beside_it_alters_nothing(self, study_file):
+        first = load_study(study_file())
+        other = load_study(study_file(STUDY | {"title": "another", "methods": STUDY["methods"][:1]}))
+        assert first.runs(first.points[0])[:4] == other.runs(other.points[0])[:4]
+
+    @pytest.mark.parametrize(
+        ("place", "value", "said"),
+        [
+            (["title"], "", "title: got ''"),
+            (["scene"], "nowhere.toml", "need a TOML file or one of"),
+            (["methods", 0, "model"], {"kind": "wrong"}, "kind"),
+            (["methods", 0, "axes"], {"modes": [0]}, "levels start.displacement=0.01 modes=0: models[2].modes: got 0"),
+            (["methods", 0, "axes"], {"nodes": [1]}, "models[2].nodes: got 1, need no field of this name"),
+            (["methods", 0, "axes"], {"modes": []}, "methods[0].axes.modes"),
+            (["axes"], {"start.displacment": [0.01]}, "need no field of this name"),
+            (["axes"], {"title.words": [1]}, "title, which is no table"),
+            (["methods", 1, "nearby"], {"method": [0.9]}, "nearby of stepwise: got 'method'"),
+            (["methods", 1, "name"], "levels", "methods: got 'levels', need a name of its own"),
+            (["methods", 1, "name"], "reference", "methods: got 'reference', need a name of its own"),
+            (["methods"], [], "methods: got 'none', need a method or a budget"),
+            (["maps"], ["nothing"], "maps: got 'nothing', need one of the methods"),
+            (["time_limit_s"], 0, "time_limit_s: got 0"),
+            (["tolerances"], [], "tolerances"),
+            (["surprise"], 1, "surprise: got 1, need no field of this name"),
+        ],
+    )
+    def test_a_wrong_file_is_one_line_that_names_it(self, study_file, place, value, said):
+        with pytest.raises(MultiPhiValueError) as error:
+            load_study(study_file(changed(place, value, STUDY) if place[0] in STUDY else STUDY | {place[0]: value}))
+        assert said in str(error.value)
+        assert "\n" not in str(error.value)
+
+    def test_an_unknown_study_is_told_the_known_ones(self):
+        with pytest.raises(MultiPhiValueError, match="pareto"):
+            load_study("paretto")
+
+    @pytest.mark.parametrize("quick", [False, True])
+    @pytest.mark.parametrize("name", list(shipped_studies()))
+    def test_the_shipped_studies_are_sound(self, name, quick):
+        study = load_study(name, quick=quick)
+        assert study.runs(study.points[0]) or study.budgets()
+
+
+class TestRunning:
+    def test_rows_fronts_times_and_uncertainty(self, study_file, store):
+        result = run_study(load_study(study_file()), store, progress=False)
+        assert len(result.rows) == 2 * (1 + 1 + 3 + 2)
+        assert [row.message for row in result.rows if row.status != "ok"] == []
+        found = settings(result)
+        assert len(found) == 2 * 4
+        for at in points(result):
+            levels = [s for s in found if s.method == "levels" and s.at == at]
+            assert levels[0].error > levels[1].error > levels[2].error > 0
+            assert uncertainty(result, at) < levels[2].error
+            assert all(s.online_s > 0 and len(s.timing["repeats_s"]) >= 3 for s in levels)
+        assert all(s.indicator > 0 for s in found if s.method == "levels")
+        stepwise = [row for row in result.rows if row.parameters["method"] == "stepwise"]
+        assert all(row.parameters["nearby"] == {} for row in result.timings)
+        assert max(r.values["nrmse"]["0.08"]["tip"] for r in stepwise[:2]) == next(
+            s.error for s in found if s.method == "stepwise"
+        )
+
+    def test_what_has_run_is_not_run_again(self, study_file, store, monkeypatch):
+        study = load_study(study_file())
+        first = run_study(study, store, progress=False)
+        module = "multiphi_exudyn.study.accuracy.study.run_model"
+        monkeypatch.setattr(module, lambda *given, **named: pytest.fail("run again"))
+        again = run_study(study, store, progress=False)
+        assert again.rows == first.rows
+        assert again.timings == first.timings
+
+    def test_in_processes_as_in_this_one(self, study_file, tmp_path, store):
+        study = load_study(study_file(STUDY | {"timing": False}))
+        here = run_study(study, store, progress=False)
+        with Store(tmp_path / "other.sqlite") as other, open_executor("processes", 2) as executor:
+            there = run_study(study, other, executor, progress=False)
+        assert [(r.parameters, r.status, r.values) for r in here.rows] == [
+            (r.parameters, r.status, r.values) for r in there.rows
+        ]
+        assert here.timings == there.timings == ()
+
+    def test_a_method_that_fails_is_a_gap_with_its_cause(self, study_file, store):
+        data = changed(["methods", 1, "model"], {"kind": "craig-bampton", "modes": 2, "newton_tolerance": 1e-30}, STUDY)
+        data = changed(["methods", 1, "axes"], {"step": [1e-4]}, data)
+        data = changed(["methods", 1, "nearby"], {"step": [0.9]}, data)
+        result = run_study(load_study(study_file(data)), store, progress=False)
+        failed = [s for s in settings(result) if s.method == "stepwise"]
+        assert all(s.error is None and s.message.startswith("failed: ") for s in failed)
+        assert all(s.error is not None for s in settings(result) if s.method == "levels")
+
+    def test_histories_are_kept_on_request(self, study_file, store):
+        for keep in (False, True):
+            data = STUDY | {"methods": STUDY["methods"][:1], "axes": {}, "histories": keep, "timing": False}
+            data |= {"change": {"outputs.t_end": 0.08 if keep else 0.09}}
+            study = load_study(study_file(data))
+            run_study(study, store, progress=False)
+            case = study.runs(study.points[0])[1]
+            arrays = store.histories("error", case)
+            assert (arrays is not None) == keep
+        assert np.all(np.isfinite(arrays["points/tip"]))
+
+    def test_maps_stand_beside_the_reference(self, study_file, store):
+        data = STUDY | {"methods": STUDY["methods"][:1], "maps": ["levels"], "change": {"outputs.t_end": 1.0}}
+        data |= {"axes": {}, "timing": False}
+        result = run_study(load_study(study_file(data)), store, progress=False)
+        (pair,) = result.maps
+        assert pair.point == "tip"
+        assert pair.full.amplitude.shape == pair.reduced.amplitude.shape
+        assert np.allclose(pair.full.amplitude, pair.reduced.amplitude, atol=0.02 * np.max(pair.full.amplitude))
+        assert set(pair.frequencies) == {"open", "stop closed"}
+        lowest = result.rows[0].values["frequencies"]["open"][0]
+        assert min(pair.frequencies["open"]) == pytest.approx(lowest, rel=1e-3)
