@@ -2,8 +2,8 @@
 
 Each is a :class:`concurrent.futures.Executor` with the number of its ``workers``. A worker process has one BLAS thread,
 leaves Ctrl-C to its parent, and ends with its parent however that ends: it holds the reading end of a pipe whose
-writing end only the parent has, so that the kernel tells it (by a thread that waits, and where there is SIGIO also by
-that signal, which ends a worker even inside compiled code that keeps the interpreter's lock).
+writing end only the parent has. When that is closed, a thread that waits for it ends the worker, and on Linux the
+signal SIGIO does, also inside compiled code that keeps the interpreter's lock, as Exudyn's solvers do.
 
 Worker processes are spawned: a script that opens them needs ``if __name__ == "__main__":``.
 """
@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 
-if sys.platform != "win32":
+if sys.platform == "linux":
     import fcntl
 
 __all__ = ["InProcess", "WorkerPool", "open_executor", "worker_died", "workers_of"]
@@ -129,10 +129,11 @@ def _start_worker(end: Connection) -> None:
     os.environ.update(dict.fromkeys(BLAS_THREADS, "1"))
     threadpool_limits(1)
     threading.Thread(target=_end_with, args=(end,), name="parent", daemon=True).start()
-    if sys.platform != "win32":
+    if sys.platform == "linux":
+        own = os.open(f"/proc/self/fd/{end.fileno()}", os.O_RDONLY)  # opened anew: its owner and flags are not shared
         signal.signal(signal.SIGIO, signal.SIG_DFL)
-        fcntl.fcntl(end.fileno(), fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(end.fileno(), fcntl.F_SETFL, fcntl.fcntl(end.fileno(), fcntl.F_GETFL) | os.O_ASYNC)
+        fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(own, fcntl.F_SETFL, os.O_ASYNC)
 
 
 def _end_with(end: Connection) -> None:

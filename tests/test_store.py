@@ -1,0 +1,158 @@
+"""The file of finished runs: whole rows only, each once, and no other file touched."""
+
+import contextlib
+import json
+import math
+import sqlite3
+import threading
+
+import numpy as np
+import pytest
+
+from multiphi_exudyn.study.sweep import Row, Store
+from multiphi_exudyn.study.sweep.store import pack
+
+
+def row(parameters, **fields):
+    given = {"status": "ok", "message": "", "values": {"y": 1.5}, "elapsed_s": 0.25, "environment": {"host": "here"}}
+    return Row(parameters=parameters, finished="2020-01-01T00:00:00.000+00:00", **given | fields)
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store(tmp_path / "runs.db") as opened:
+        yield opened
+
+
+def test_what_is_added_is_found_after_reopening(store):
+    rows = [row({"b": 1, "a": [1.5, None, {"c": "ü"}]}), row({"b": 2}, status="failed", message="cause", values={})]
+    rows += [row({}, status="over budget", message="long", environment={"host": "there"})]
+    assert all(store.add("pass", given.parameters, given) for given in rows)
+    with Store(store.path) as again:
+        assert again.rows("pass") == tuple(rows)
+        assert [again.find("pass", given.parameters) for given in rows] == rows
+        assert list(again.rows("pass")[0].parameters) == ["b", "a"]
+
+
+def test_names_keep_rows_apart_and_a_key_is_there_once(store):
+    given = {"x": 1, "y": 2.0}
+    assert store.add("one", given, row(given))
+    assert not store.add("one", {"y": 2.0, "x": 1}, row(given, values={"y": 7.0}))
+    assert store.add("two", given, row(given, values={}))
+    assert [found.values for found in store.rows("one")] == [{"y": 1.5}]
+    assert store.find("two", given).values == {}
+    assert store.find("three", given) is None
+    assert store.rows("three") == ()
+
+
+def test_the_key_sees_kinds_and_not_what_numpy_adds(store):
+    store.add("pass", {"x": 1}, row({"x": 1}))
+    assert store.find("pass", {"x": np.int64(1)})
+    assert store.find("pass", {"x": 1.0}) is None
+    assert store.find("pass", {"x": True}) is None
+    assert store.find("pass", {"x": "1"}) is None
+    store.add("pass", {"x": np.float64(0.1), "y": (1, 2)}, row({}))
+    assert store.find("pass", {"y": [1, 2], "x": 0.1}).parameters == {"x": 0.1, "y": [1, 2]}
+
+
+def test_what_is_not_finite_is_none_among_the_values(store):
+    store.add("pass", {}, row({}, values={"y": math.nan, "z": [math.inf, np.float32(0.5)], "n": np.int64(3)}))
+    assert store.find("pass", {}).values == {"y": None, "z": [None, 0.5], "n": 3}
+
+
+def test_histories_come_back_bit_by_bit(store):
+    arrays = {"u/tip": np.random.default_rng(1).normal(size=(50, 2)), "file": np.arange(3), "empty": np.zeros((0, 2))}
+    arrays |= {"open": np.array([True, False])}
+    store.add("pass", {"x": 1}, row({"x": 1}), pack(arrays))
+    store.add("pass", {"x": 2}, row({"x": 2}))
+    found = store.histories("pass", {"x": 1})
+    assert list(found) == list(arrays)
+    assert all(found[name].dtype == arrays[name].dtype for name in arrays)
+    assert all(np.array_equal(found[name], arrays[name]) for name in arrays)
+    assert store.histories("pass", {"x": 2}) is None
+    assert store.histories("pass", {"x": 3}) is None
+
+
+@pytest.mark.parametrize(
+    ("parameters", "begins"),
+    [
+        ({"x": math.nan}, "parameters['x']: nan"),
+        ({"x": [1.0, -math.inf]}, "parameters['x'][1]: -inf"),
+        ({"x": {"y": {1, 2}}}, "parameters['x']['y']: set"),
+        ({"x": np.zeros(2)}, "parameters['x']: ndarray"),
+        ({"x": 1j}, "parameters['x']: complex"),
+        ({"x": {1: 2}}, "parameters['x']: a mapping with names that are no text"),
+    ],
+)
+def test_parameters_that_json_does_not_have_are_refused(store, refused, parameters, begins):
+    refused(ValueError, begins, store.find, "pass", parameters)
+    refused(ValueError, begins, store.add, "pass", parameters, row({}))
+    assert store.rows("pass") == ()
+
+
+def test_an_unknown_status_and_parameters_that_are_no_mapping_are_refused(store, refused):
+    refused(ValueError, "row: status 'good'", store.add, "pass", {}, row({}, status="good"))
+    refused(TypeError, "parameters: list", store.find, "pass", [1])
+
+
+def database(path, *orders):
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.executescript("; ".join(orders))
+
+
+def foreign_files(folder):
+    """name -> file that is no store: empty, text, another program's database, damaged, of another version."""
+    (folder / "empty").write_bytes(b"")
+    (folder / "text").write_text("no database at all\n" * 100)
+    database(folder / "database", "CREATE TABLE format (version)", "INSERT INTO format VALUES (1)")
+    for name in ("short", "damaged", "version"):
+        with Store(folder / name) as store:
+            store.add("pass", {}, row({}))
+    whole = (folder / "short").read_bytes()
+    (folder / "short").write_bytes(whole[:5000])
+    (folder / "damaged").write_bytes(whole[:200] + b"\xff" * (len(whole) - 200))
+    database(folder / "version", "UPDATE format SET version = 99")
+    return sorted(path for path in folder.iterdir() if path.is_file())
+
+
+def test_a_file_that_is_no_store_is_refused_and_left_as_it_is(tmp_path, refused):
+    paths = foreign_files(tmp_path)
+    assert len(paths) == 6
+    before = {path: path.read_bytes() for path in paths}
+    for path in paths:
+        refused(ValueError, f"path: {path}: ", Store, path)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_folder_or_a_path_without_one_is_refused(tmp_path, refused):
+    refused(ValueError, f"path: {tmp_path}: cannot be read", Store, tmp_path)
+    refused(ValueError, f"path: {tmp_path / 'no' / 'runs.db'}: cannot be made", Store, tmp_path / "no" / "runs.db")
+
+
+def test_many_open_a_new_file_at_once_and_write_into_it(tmp_path):
+    path, together = tmp_path / "runs.db", threading.Barrier(8)
+    added = []
+
+    def work(number):
+        together.wait()
+        with Store(path) as store:
+            added.extend(
+                store.add("pass", {"x": x}, row({"x": x}, environment={"host": str(number)})) for x in range(20)
+            )
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    with Store(path) as store:
+        assert sorted(found.parameters["x"] for found in store.rows("pass")) == list(range(20))
+    assert (len(added), sum(added)) == (160, 20)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_commit_is_whole_in_the_file_while_its_writer_lives(store):
+    store.add("pass", {"x": 1}, row({"x": 1}))
+    with contextlib.closing(sqlite3.connect(store.path)) as reader:
+        assert reader.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert [json.loads(text) for (text,) in reader.execute("SELECT parameters FROM runs")] == [{"x": 1}]
