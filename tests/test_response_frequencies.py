@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from multiphi_exudyn import MultiPhiModel, UnilateralContact, planar_beam, simulate
+from multiphi_exudyn.study.measures import response_frequencies as module
 from multiphi_exudyn.study.measures.response_frequencies import level_frequencies, level_name, response_frequencies
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from reference_models.rig import rig_beam, rig_contact, rig_damping
@@ -61,6 +62,25 @@ def test_the_error_is_in_proportion_to_the_noise():
     assert errors[1] / errors[0] == pytest.approx(100, rel=0.01)
 
 
+def test_noise_ten_times_below_the_weakest_mode_hides_none():
+    found = identified(times(0.2), response(times(0.2), noise=1e-3))
+    np.testing.assert_allclose(found.frequencies, FREQUENCIES, rtol=5e-3)
+
+
+def test_thinning_averages_noise_out():
+    found = identified(times(1.0), response(times(1.0), [5.0, 12.0], [0.01, 0.02], np.ones(2), noise=1e-2))
+    np.testing.assert_allclose(found.frequencies, [5.0, 12.0], rtol=2e-5)
+
+
+def test_a_pole_that_the_response_does_not_carry_is_left_out():
+    t = times(0.2)
+    omega = 2 * math.pi * np.append(FREQUENCIES, 2000.0)
+    ratios = np.append(RATIOS, 0.0)
+    poles = omega * (-ratios + 1j * np.sqrt(1 - ratios**2))
+    found = module._told(t, response(t, noise=1e-4), np.concatenate([poles, poles.conj()]), 12)
+    np.testing.assert_allclose(found.frequencies, FREQUENCIES, rtol=1e-12)
+
+
 def test_two_frequencies_nearer_than_the_spectrums_resolution_are_two():
     t = times(0.3)  # 3.3 Hz
     found = identified(t, response(t, [50.0, 51.0], [1e-3, 1e-3], np.ones(2), noise=1e-6))
@@ -97,6 +117,12 @@ def test_a_frequency_above_the_thinned_sampling_leaves_no_alias():
     np.testing.assert_allclose(found.frequencies, [5.0], rtol=1e-3)
 
 
+def test_a_frequency_at_half_the_thinned_sampling_is_not_told_from_its_mirror():
+    t = times(0.11)  # thinned to 5000 samples per second
+    found = identified(t, response(t, [60.0, 2503.0], [0.01, 1e-4], np.array([1.0, 1e-3])))
+    np.testing.assert_allclose(found.frequencies, [60.0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_noise_alone_has_no_frequencies(seed):
     noise = np.random.default_rng(seed).normal(size=(3, 2000))
@@ -124,8 +150,8 @@ def test_nothing_is_told_of_rest_or_of_a_few_samples():
 def test_only_the_interval_counts_and_its_ends_do_not():
     t = times(0.2)
     spoiled = response(t)
-    spoiled[:, (t <= t[500]) | (t >= t[1500])] = 7.0
-    found = response_frequencies(t, spoiled, (t[500], t[1500]), 12)
+    spoiled[:, (t <= t[500]) | (t >= t[900])] = 7.0
+    found = response_frequencies(t, spoiled, (t[500], t[900]), 12)
     np.testing.assert_allclose(found.frequencies, FREQUENCIES, rtol=1e-6)
 
 

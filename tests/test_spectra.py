@@ -52,6 +52,18 @@ def test_the_spectral_difference_without_a_reference_signal_is_not_a_number():
     assert math.isnan(spectral_difference(np.ones(11), np.zeros(11), np.linspace(0, 1, 11), 1.0))
 
 
+def test_the_mean_does_not_show():
+    t = times(0.5)
+    history = sine(t, 40)
+    np.testing.assert_allclose(wavelet_map(history + 5.0, t).amplitude, wavelet_map(history, t).amplitude, atol=1e-12)
+
+
+def test_a_high_frequency_leaves_no_alias_where_the_sampling_is_low():
+    """Rows of 2 Hz are transformed at 39 samples per second, of which 392.6 Hz are ten times as many and two."""
+    t = times(5.0)
+    assert np.max(wavelet_map(sine(t, 392.625), t, np.array([2.0])).amplitude) < 2e-3
+
+
 @pytest.mark.parametrize("frequency", [7.0, 19.2, 39.0, 79.3, 156.0, 157.0, 312.0, 313.0, 500.0])
 def test_a_sine_shows_its_amplitude_on_its_ridge(frequency):
     t = times(1.5)
