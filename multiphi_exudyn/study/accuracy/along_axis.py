@@ -47,6 +47,11 @@ class Series:
     settings: tuple[Setting, ...]
 
     @property
+    def fixed_setting(self) -> dict[str, Any]:
+        """The method's own fixed fields, without those of the scene."""
+        return {field: value for field, value in self.fixed.items() if field in self.settings[0].setting}
+
+    @property
     def values(self) -> tuple[float, ...]:
         """Along the axis."""
         return tuple(_fields(setting)[self.axis] for setting in self.settings)

@@ -35,6 +35,7 @@ __all__ = [
     "pointwise_until",
     "references",
     "settings",
+    "settings_at",
     "times_faster",
     "uncertainty",
     "words",
@@ -142,6 +143,11 @@ def settings(result: StudyResult) -> list[Setting]:
     return [setting for setting in result.judged if setting.method not in (REFERENCE, COARSER)]
 
 
+def settings_at(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
+    """The methods' settings at one point of the scene's axes."""
+    return [setting for setting in settings(result) if setting.at == at]
+
+
 def references(result: StudyResult) -> list[Setting]:
     """The reference and its coarser copy, at every point of the scene's axes."""
     return [setting for setting in result.judged if setting.method in (REFERENCE, COARSER)]
@@ -199,7 +205,8 @@ def error_of(result: StudyResult, row: Row) -> float | None:
     """Largest NRMSE of the judged points in the window; None where one of them has none."""
     of_points = row.values.get("nrmse", {}).get(f"{result.window:g}", {}) if row.status == "ok" else {}
     errors = [of_points.get(point) for point in result.judged_points]
-    return None if not errors or None in errors else max(errors)
+    known = [error for error in errors if error is not None]
+    return max(known) if known and len(known) == len(errors) else None
 
 
 def names_of(settings: Sequence[Setting]) -> list[str]:
@@ -246,7 +253,7 @@ def _near(row: Row) -> str:
 
 
 def _coarser(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
-    return [s for s in references(result) if s.method == COARSER and key_of(s.at) == key_of(at)]
+    return [s for s in references(result) if s.method == COARSER and s.at == at]
 
 
 def _fastest(settings: Sequence[Setting], tolerance: float) -> Setting | None:
