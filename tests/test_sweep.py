@@ -18,7 +18,7 @@ from sweep_functions import Unloadable, logged, many, odd_fails, square, sweep_l
 from multiphi_exudyn.study.sweep import Outcome, Row, Store, grid, open_executor, sweep
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
-KILLS = 20
+KILLS = [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
 
 
 @pytest.fixture
@@ -234,12 +234,12 @@ def finished(path):
         return {str(row.parameters["x"]) for row in store.rows("kill")}
 
 
-def kill_at_a_random_moment(child, chance, log):
+def kill_at_a_random_moment(child, more, chance, log):
     """SIGKILL while the sweep starts, or a little after some more cases have begun."""
-    more, known, until = chance.choice([0, 0, 0, 1, 3]), len(lines(log)), time.perf_counter() + 5.0
+    known, until = len(lines(log)), time.perf_counter() + 20.0
     while len(lines(log)) < known + more and time.perf_counter() < until:
         time.sleep(0.001)
-    time.sleep(chance.uniform(0.0, 0.015 if more else 0.1))
+    time.sleep(chance.uniform(0.0, 0.015 if more else 0.03))
     os.kill(child, signal.SIGKILL)
 
 
@@ -247,10 +247,10 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     path, log, chance = tmp_path / "runs.db", tmp_path / "log", random.Random(1)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with program("f.nursery(*json.loads(sys.argv[1]))", str(path), str(log), **pipes) as nursery:
-        for _ in range(KILLS):
+        for more in chance.sample(KILLS, len(KILLS)):
             before, known = len(lines(log)), finished(path)
             print(chance.choice([1, 1, 2]), file=nursery.stdin, flush=True)
-            kill_at_a_random_moment(int(nursery.stdout.readline()), chance, log)
+            kill_at_a_random_moment(int(nursery.stdout.readline()), more, chance, log)
             assert nursery.stdout.readline() == "-1\n"
             assert not known & set(lines(log)[before:]), "a finished case has been run again"
             assert known <= finished(path), "a finished case has been lost"
