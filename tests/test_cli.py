@@ -7,7 +7,9 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import cli
+from multiphi_exudyn.cli import compare_command
 from multiphi_exudyn.study.running import reduced_runner
+from multiphi_exudyn.study.running.files import write_whole
 from multiphi_exudyn.study.scene.scenes import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}
@@ -17,7 +19,7 @@ FILES = {"report.html", "histories.npz", "summary.json"}
 def scene(tmp_path, monkeypatch):
     """A small scene's file, in an empty working directory, without the seconds that environment() takes."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "environment", lambda: {"python": "3"})
+    monkeypatch.setattr(compare_command, "environment", lambda: {"python": "3"})
     return write(tmp_path / "small.toml", BEAM)
 
 
@@ -60,10 +62,10 @@ def test_end_time_and_folder_are_taken_from_the_command_line(scene, tmp_path):
 def test_a_failed_model_is_exit_code_1_and_still_a_report(scene, tmp_path, monkeypatch, capsys):
     simulate = reduced_runner.simulate
 
-    def failing(model, t_end, displacement):
+    def failing(model, t_end, displacement, compiled):
         if model.modes == 6:
             raise RuntimeError("did not converge\nat 0.02 s")
-        return simulate(model, t_end, displacement=displacement)
+        return simulate(model, t_end, displacement=displacement, compiled=compiled)
 
     monkeypatch.setattr(reduced_runner, "simulate", failing)
     assert cli.main(["compare", scene]) == 1
@@ -75,7 +77,7 @@ def test_an_interrupted_write_leaves_the_old_file_and_no_rest(tmp_path, monkeypa
     target = tmp_path / "summary.json"
     target.write_text("old", "utf-8")
     with pytest.raises(TypeError):
-        cli._replace(target, "not bytes")
+        write_whole(target, "not bytes")
     assert target.read_text("utf-8") == "old"
     assert list(tmp_path.iterdir()) == [target]
 
@@ -84,7 +86,7 @@ def test_an_interrupted_comparison_leaves_no_file(scene, tmp_path, monkeypatch):
     def broken(comparison):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "summary", broken)
+    monkeypatch.setattr(compare_command, "summary", broken)
     assert cli.main(["compare", scene]) == 130
     assert list((tmp_path / "multiphi-small").iterdir()) == []
 
@@ -124,3 +126,57 @@ def test_a_wrong_field_is_one_line_with_file_and_field(scene, tmp_path, capsys):
 
 def test_a_folder_that_is_a_file_is_refused_before_anything_runs(scene, capsys):
     assert "--out: got " in refused(capsys, "compare", scene, "--out", scene)
+
+
+STUDY = {
+    "title": "a small study",
+    "scene": "small.toml",
+    "methods": [{"name": "levels", "model": {"kind": "reduced"}, "axes": {"modes": [2, 4]}, "quick": {"modes": [2]}}],
+}
+
+
+def test_a_study_leaves_runs_table_and_report_and_goes_on_where_it_was(scene, tmp_path, capsys):
+    path = write(tmp_path / "small-study.toml", STUDY)
+    folder = tmp_path / "multiphi-small-study"
+    assert cli.main(["study", path, "--quick", "--on", "serial"]) == 0
+    assert {file.name for file in folder.iterdir()} == {"report.html", "runs.csv", "runs.sqlite"}
+    assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 2
+    capsys.readouterr()
+    assert cli.main(["study", path, "--on", "serial"]) == 0
+    assert "cheapest within 1.00 %" in capsys.readouterr().out
+    assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 3
+
+
+def test_a_study_none_of_whose_settings_ran_has_exit_code_1(scene, tmp_path, capsys):
+    study = changed(["methods", 0, "model"], {"kind": "craig-bampton", "modes": 1, "newton_tolerance": 1e-30}, STUDY)
+    study = changed(["methods", 0, "axes"], {"step": [1e-4]}, study)
+    path = write(tmp_path / "failing.toml", changed(["methods", 0, "quick"], {}, study))
+    assert cli.main(["study", path, "--on", "serial"]) == 1
+    assert "2 runs, 1 without an answer" in capsys.readouterr().out
+
+
+def test_a_wrong_study_is_refused_before_anything_is_written(scene, tmp_path, capsys):
+    assert "need a TOML file or one of" in refused(capsys, "study", "nothing")
+    path = write(tmp_path / "wrong.toml", STUDY | {"scene": "none.toml"})
+    assert "SCENE: got 'none.toml'" in refused(capsys, "study", path)
+    good = write(tmp_path / "good.toml", STUDY)
+    assert "where: 'cloud'" in refused(capsys, "study", good, "--on", "cloud")
+    assert "--workers" in refused(capsys, "study", good, "--workers", "0")
+
+
+def test_the_budget_of_a_scene(scene, tmp_path, capsys):
+    full = [{"kind": "full", "name": name, "elements": 4, "step": h} for name, h in (("fine", 1e-4), ("coarse", 2e-4))]
+    data = changed(["outputs"], {"t_end": 0.03, "windows": [0.02]}) | {"models": full, "modes": 3}
+    path = write(tmp_path / "full.toml", data | {"comparison": {"reference": "fine", "coarser": "coarse"}})
+    assert cli.main(["budget", path, "--out", "out"]) == 0
+    told = capsys.readouterr().out
+    assert "rigid ladder, to 0.02 s" in told
+    assert "contact law" in told
+    values = json.loads((tmp_path / "out" / "budget.json").read_text("utf-8"))
+    assert values["modes"] == 3
+    assert (tmp_path / "out" / "budget.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_studies_are_listed(capsys):
+    assert cli.main(["studies"]) == 0
+    assert "pareto" in capsys.readouterr().out

@@ -80,7 +80,7 @@ def _motion(
     loads: Sequence[ConstantLoad],
 ) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
-    start = simulate(model, SHORTEST, displacement, velocity, loads)
+    start = simulate(model, SHORTEST, displacement, velocity, loads, compiled=False)
     motion = Motion(model, model.rules[start.load.tobytes()], start.start)
     if motion.message:
         raise NumericalFailure(motion.message)

@@ -71,7 +71,7 @@ def _counts(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> tuple[
     end = min(bench.t_end, bench.longest_period)
     counts: list[int | None] = []
     for factor in FACTORS:
-        trajectory = simulate(model, end, displacement=factor * start)
+        trajectory = simulate(model, end, displacement=factor * start, compiled=False)
         intervals = np.array(trajectory.contact_intervals(model.contacts[0].name)).reshape(-1, 2)
         ok = trajectory.status == "ok"
         counts.append(metrics.inner_losses(intervals, bench.longest_period) if ok else None)

@@ -1,0 +1,46 @@
+"""``multiphi-exudyn budget``: where the difference between a scene's reduced and full model comes from."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from multiphi_exudyn.study.accuracy.budget import budget
+from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
+from multiphi_exudyn.study.comparison.findings import percent
+from multiphi_exudyn.study.comparison.plots import png
+from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
+
+__all__ = ["run_budget"]
+
+
+def run_budget(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
+    """Run every rung of a scene's ladders and write budget.json and budget.png; True if no rung failed."""
+    scene = load_scene(source, t_end=t_end, modes=modes)
+    bench = prepare(scene, mechanics_of(scene))
+    folder = results_folder(out or Path(f"multiphi-{scene.name}"))
+    values = budget(bench, scene.file.modes, progress=sys.stderr.isatty()).values()
+    write_whole(folder / "budget.json", json.dumps(values, indent=1).encode())
+    write_whole(folder / "budget.png", png(budget_figure([values])))
+    _tell(values)
+    print(f"\n{folder / 'budget.png'}")
+    return all(rung["status"] == "ok" for rung in values["rungs"].values())
+
+
+def _tell(values: dict[str, Any]) -> None:
+    for window, ladders in values["windows"].items():
+        for ladder, groups in ladders.items():
+            found = groups["all"]
+            print(f"\n{ladder} ladder, to {window} s, judged points together")
+            if found is None:
+                print("  fewer than two of its models ran")
+                continue
+            for part in found["parts"]:
+                uncertainty = "unknown" if part["uncertainty"] is None else percent(part["uncertainty"])
+                print(f"  {part['cause']:40}  {percent(part['size']):>9}  uncertainty {uncertainty}")
+            print(f"  {'total':40}  {percent(found['total']):>9}")

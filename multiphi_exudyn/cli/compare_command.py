@@ -1,0 +1,67 @@
+"""``multiphi-exudyn compare``: all models of a scene side by side, as a report."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.losses import loss_tables
+from multiphi_exudyn.study.comparison.mode_shapes import level_modes
+from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.running.environment import environment
+from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
+
+__all__ = ["run_compare"]
+
+
+def run_compare(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
+    """Run every model of a scene and write report.html, summary.json and histories.npz; True if all of them ran."""
+    scene = load_scene(source, t_end=t_end, modes=modes)
+    bench = prepare(scene, mechanics_of(scene))
+    folder = results_folder(out or Path(f"multiphi-{scene.name}"))
+    with tqdm(total=len(scene.models) + 1, disable=None, unit="model") as bar:
+
+        def started(name: str) -> None:
+            bar.set_description(name)
+            bar.update(int(name != next(iter(scene.models))))
+
+        comparison = compare(bench, environment(), progress=sys.stderr.isatty(), started=started)
+        bar.update()
+        bar.set_description("report")
+        _write(comparison, folder)
+        bar.update()
+    _tell(comparison, folder)
+    return all(run.ok for run in comparison.runs.values())
+
+
+def _write(comparison: Comparison, folder: Path) -> None:
+    """Results first, the report last; each file appears whole or not at all."""
+    arrays = io.BytesIO()
+    np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
+    content = json.dumps(summary(comparison), indent=1, allow_nan=False)
+    page = render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+    write_whole(folder / "histories.npz", arrays.getvalue())
+    write_whole(folder / "summary.json", content.encode())
+    write_whole(folder / "report.html", page.encode())
+
+
+def _tell(comparison: Comparison, folder: Path) -> None:
+    until = comparison.headline_window
+    width = max(map(len, comparison.runs))
+    print(f"{'model':{width}}  {'status':6}  {'online':>9}  {'faster':>10}  NRMSE to {until:g} s")
+    for name, run in comparison.runs.items():
+        error = percent(comparison.worst_error(run, until)) if name in comparison.measured else "the reference"
+        line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
+        print(f"{name:{width}}  {run.status:6}  {line}")
+    print(f"\n{findings(comparison).outcome}\n{folder / 'report.html'}")

@@ -1,0 +1,130 @@
+"""Command line: ``multiphi-exudyn compare | budget | study | scenes | studies``.
+
+Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
+every reference and at least one setting of every method ran; settings that fail are rows with their cause.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from multiphi_exudyn.cli.budget_command import run_budget
+from multiphi_exudyn.cli.compare_command import run_compare
+from multiphi_exudyn.cli.study_command import run_study_file
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
+from multiphi_exudyn.study.accuracy.cases import shipped_studies
+from multiphi_exudyn.study.scene.scenes import shipped_scenes
+
+__all__ = ["command", "main"]
+
+THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def command() -> NoReturn:
+    """Entry of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
+
+    More threads cost the small matrices of a modal model more than they give. numpy reads the number when it is
+    loaded, hence the restart.
+    """
+    if os.name == "posix" and not any(name in os.environ for name in THREAD_SETTINGS):
+        os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+    sys.exit(main())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    try:
+        return OK if _run(_parser().parse_args(arguments)) else FAILED
+    except MultiPhiError as error:
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(given: argparse.Namespace) -> bool:
+    if given.command == "compare":
+        return run_compare(given.scene, given.t_end, given.modes, given.out)
+    if given.command == "budget":
+        return run_budget(given.scene, given.t_end, given.modes, given.out)
+    if given.command == "study":
+        return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
+    return _listed(shipped_scenes() if given.command == "scenes" else shipped_studies())
+
+
+class _OneLineParser(argparse.ArgumentParser):
+    """A parser whose error is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with the one line."""
+        raise MultiPhiValueError(f"{self.prog}: {' '.join(message.split())}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="{compare,budget,study,scenes,studies}")
+    compare = commands.add_parser("compare", help="run all models of a scene and write a report")
+    _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
+    budget = commands.add_parser("budget", help="tell where the difference of a scene's reduced and full model is from")
+    _scene_options(budget, "the truncated models instead of the scene's")
+    _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
+    commands.add_parser("scenes", help="list the shipped scenes")
+    commands.add_parser("studies", help="list the shipped studies")
+    return parser
+
+
+def _scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="a shipped scene (see: scenes) or a TOML file")
+    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] instead of the scene's")
+    parser.add_argument("--modes", type=_count, metavar="R", help=f"number of modes of {whose}")
+    _folder_option(parser, "SCENE")
+
+
+def _study_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", metavar="STUDY", help="a shipped study (see: studies) or a TOML file")
+    parser.add_argument("--quick", action="store_true", help="the short form of the study")
+    parser.add_argument(
+        "--on",
+        metavar="WHERE",
+        default="processes",
+        help="where the error pass runs: processes (default), serial, or a Dask scheduler's address tcp://host:port",
+    )
+    parser.add_argument("--workers", type=_count, metavar="N", help="number of processes (default: one per core)")
+    _folder_option(parser, "STUDY")
+
+
+def _folder_option(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder of the results (default: multiphi-{default})")
+
+
+def _time(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"got {text!r}, need a time > 0 in s")
+    return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"got {text!r}, need a whole number >= 1")
+    return int(text)
+
+
+def _listed(titles: Mapping[str, str]) -> bool:
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        print(f"{name:{width}}  {title}")
+    return True

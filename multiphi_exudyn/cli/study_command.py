@@ -1,0 +1,60 @@
+"""``multiphi-exudyn study``: runs a study file, or goes on with it, and writes report, table and pictures."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from multiphi_exudyn.study.accuracy.analysis import StudyResult, cheapest, points, settings, times_faster, words
+from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
+from multiphi_exudyn.study.accuracy.cases import load_study
+from multiphi_exudyn.study.accuracy.study import run_study
+from multiphi_exudyn.study.accuracy.study_csv import csv_text
+from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.comparison.findings import percent, seconds, times
+from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.sweep.executors import open_executor
+from multiphi_exudyn.study.sweep.store import Store
+
+__all__ = ["run_study_file"]
+
+STORE = "runs.sqlite"
+
+
+def run_study_file(source: str, out: Path | None, quick: bool, where: str, workers: int | None) -> bool:
+    """Run a study into its folder; True if every reference and at least one setting of every method ran."""
+    study = load_study(source, quick=quick)
+    folder = results_folder(out or Path(f"multiphi-{study.name}"))
+    with Store(folder / STORE) as store, open_executor(where, workers) as executor:
+        result = run_study(study, store, executor, progress=sys.stderr.isatty())
+    write_whole(folder / "runs.csv", csv_text(result).encode())
+    write_whole(folder / "report.html", render_study(result).encode())
+    _tell(result, folder)
+    return _complete(result)
+
+
+def _complete(result: StudyResult) -> bool:
+    ran = {row.parameters["method"] for row in result.rows if row.status == "ok"}
+    references = all(row.status == "ok" for row in result.rows if row.parameters["method"] == "reference")
+    return references and {method.name for method in result.study.methods} <= ran
+
+
+def _tell(result: StudyResult, folder: Path) -> None:
+    """The cheapest setting of every method for every tolerance, at the first point of the axes."""
+    at = points(result)[0]
+    known = [setting for setting in settings(result) if setting.at == at]
+    full = full_methods_of(result)
+    for tolerance in result.study.tolerances:
+        chosen = cheapest(known, tolerance)
+        faster = times_faster(chosen, full)
+        print(f"\ncheapest within {percent(tolerance)} to {result.window:g} s{', ' + words(at) if at else ''}")
+        for name, setting in chosen.items():
+            if setting is None:
+                print(f"  {name:32}  none")
+                continue
+            line = (
+                f"{seconds(setting.online_s or 0.0):>9}  {times(faster[name]):>12}  {percent(setting.error or 0.0):>8}"
+            )
+            print(f"  {name:32}  {line}  {words(setting.setting)}")
+    failed = sum(row.status != "ok" for row in result.rows)
+    print(f"\n{len(result.rows)} runs, {failed} without an answer\n{folder / 'report.html'}")
