@@ -65,9 +65,10 @@ class EventRule:
             self._levels[key] = LoadedLevel.of(self.model.level_at(key), self.load)
         return self._levels[key]
 
-    def has_transition(self, source: LoadedLevel, target: LoadedLevel) -> bool:
-        """Whether the map between two levels has been asked for."""
-        return (source.level.indices, target.level.indices) in self._maps
+    @property
+    def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+        """From and to which closed contacts maps between levels have been asked for, in that order."""
+        return list(self._maps)
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
         """The map between two levels, computed once."""
@@ -153,7 +154,11 @@ class EventRule:
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
-        return self.model.base.strain(displacement, penetrating) - float(self.load @ displacement)
+        base = self.model.base
+        if penetrating:
+            return base.strain(displacement, penetrating) - float(self.load @ displacement)
+        stretched = base.modes.omega * displacement
+        return 0.5 * float(stretched.dot(stretched)) - float(self.load @ displacement)
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""

@@ -126,9 +126,12 @@ class Motion:
     def _keep_event(self, event: Event) -> None:
         self.events.append(event)
 
-    def _recent(self) -> Sequence[Segment]:
-        """The last segments that the chatter check asks for, one more than CHATTER_WINDOW where there are."""
-        return self.segments[-CHATTER_WINDOW - 1 :]
+    def _count(self) -> int:
+        return len(self.segments)
+
+    def _recent(self) -> list[tuple[float, float]]:
+        """Start [s] and highest frequency [Hz] of the segments that the chatter check is about."""
+        return [(segment.start, segment.level.level.highest_frequency) for segment in self.segments[-CHATTER_WINDOW:]]
 
     def _one_segment(self, end: float) -> None:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
@@ -166,12 +169,10 @@ class Motion:
             loss = Loss()
 
     def _check_chatter(self) -> None:
-        recent = self._recent()
-        if len(recent) <= CHATTER_WINDOW:
+        if self._count() <= CHATTER_WINDOW:
             return
-        window = recent[1:]
-        elapsed = self.time - window[0].start
-        highest = max(segment.level.level.highest_frequency for segment in window)
+        starts, frequencies = zip(*self._recent(), strict=True)
+        elapsed, highest = self.time - starts[0], max(frequencies)
         if elapsed == 0 or 0 < highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
             raise NumericalFailure(
                 f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {EVENTS_PER_PERIOD} "
@@ -207,8 +208,11 @@ class _CompiledMotion(Motion):
     def _keep_event(self, event: Event) -> None:
         self.record.add_event(event)
 
-    def _recent(self) -> Sequence[Segment]:
-        return self.record.segments[-CHATTER_WINDOW - 1 :]
+    def _count(self) -> int:
+        return self.record.count
+
+    def _recent(self) -> list[tuple[float, float]]:
+        return self.record.recent(CHATTER_WINDOW)
 
 
 def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
@@ -243,21 +247,21 @@ def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
 
 def _start(model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None) -> Start:
     base = model.base
-    x, v = (
-        _state_vector(name, given, model) for name, given in (("displacement", displacement), ("velocity", velocity))
-    )
-    y = base.weights @ x
-    gaps = base.directions.T @ y + base.gaps
-    scale = TOUCHING * (np.abs(base.gaps) + np.abs(base.directions.T) @ np.abs(y))
-    rigid = np.isinf(base.stiffnesses)
-    for i in np.flatnonzero(rigid & (gaps < -scale)).tolist():
-        raise MultiPhiValueError(
-            f"displacement: lies {-gaps[i]:g} m inside the rigid contact {model.contacts[i].name!r}, need a gap >= 0 "
-            "(static_equilibrium gives an admissible start)"
-        )
-    penetrating = np.flatnonzero(~rigid & (gaps < -scale))
-    touching = np.flatnonzero(rigid & (gaps <= scale))
-    return Start(y, base.weights @ v, tuple(map(int, penetrating)), tuple(map(int, touching)))
+    y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
+    gaps = (y @ base.directions + base.gaps).tolist()
+    scales = (TOUCHING * (np.abs(base.gaps) + np.abs(y) @ np.abs(base.directions))).tolist()
+    penetrating, touching = list[int](), list[int]()
+    for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
+        if contact.rigid and gap < -scale:
+            raise MultiPhiValueError(
+                f"displacement: lies {-gap:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
+                "(static_equilibrium gives an admissible start)"
+            )
+        if contact.rigid and gap <= scale:
+            touching.append(i)
+        elif gap < -scale:
+            penetrating.append(i)
+    return Start(y, v, tuple(penetrating), tuple(touching))
 
 
 def _static_load(model: MultiPhiModel, loads: Sequence[ConstantLoad]) -> np.ndarray:
@@ -269,8 +273,11 @@ def _static_load(model: MultiPhiModel, loads: Sequence[ConstantLoad]) -> np.ndar
     return total
 
 
-def _state_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:
-    return np.zeros(model.structure.n) if given is None else model.structure.vector(name, given)
+def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:
+    """A given vector (n,) in base coordinates."""
+    if given is None:
+        return np.zeros(model.base.modes.count)
+    return model.base.weights @ model.structure.vector(name, given)
 
 
 def _time(name: str, value: float) -> float:

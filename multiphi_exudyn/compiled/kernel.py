@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 
 from multiphi_exudyn.compiled.pack import Levels
@@ -153,16 +154,17 @@ def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, skipped: int) -> 
 
 
 @jit
-def standing(
-    k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, acceleration: np.ndarray, c: np.ndarray
-) -> int:
+def standing(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, c: np.ndarray, work: np.ndarray) -> int:
     """The phase in which a contact stands; c: coefficients of the motion from here."""
-    r = k.sizes[a, 0]
-    row = k.own[a, contact]
+    r, row = k.sizes[a, 0], k.own[a, contact]
     value = row_sign(row, k.own_constant[a, contact], x, v, r)
     if value > 0:
         return ARMED
-    rate = row_sign(row, 0.0, v, acceleration, r)
+    if k.rated[a]:
+        accelerate(k, a, x, v, work)
+        rate = row_sign(row, 0.0, v, work, r)
+    else:
+        rate = row_sign(row, 0.0, v, v, r)  # its second part is zero
     if value == 0 or rate == 0:
         value = first_sign(k, a, contact, c, 0)
         rate = first_sign(k, a, contact, c, 1)
@@ -176,9 +178,8 @@ def standing(
 def stand(k: Levels, a: int, x: np.ndarray, v: np.ndarray, c: np.ndarray, work: np.ndarray, phases: np.ndarray) -> None:
     """The phases of all contacts, and the coefficients of the motion from here."""
     expand(k, a, x, v, c)
-    accelerate(k, a, x, v, work)
     for contact in range(len(phases)):
-        phases[contact] = standing(k, a, contact, x, v, work, c)
+        phases[contact] = standing(k, a, contact, x, v, c, work)
 
 
 @jit
@@ -245,7 +246,7 @@ def strike(
         return NOT_PLAIN, 0.0
     if pressing > 0:
         expand(k, a, x, v, c)
-        return (NOT_PLAIN if standing(k, a, contact, x, v, work, c) == REFUSED else REBOUND), impulse
+        return (NOT_PLAIN if standing(k, a, contact, x, v, c, work) == REFUSED else REBOUND), impulse
     if k.target[a, contact] < 0:
         return NOT_PLAIN, 0.0
     sign = reaction_sign(k.entered[a, contact], k.entered_constant[a, contact], x, v, r)
@@ -264,8 +265,7 @@ def switch(
     move(k, a, contact, v, after[1], False)
     if not k.rigid[contact]:
         expand(k, b, after[0], after[1], c)
-        accelerate(k, b, after[0], after[1], work)
-        return DENIED if standing(k, b, contact, after[0], after[1], work, c) == REFUSED else PLAIN
+        return DENIED if standing(k, b, contact, after[0], after[1], c, work) == REFUSED else PLAIN
     return PLAIN
 
 
@@ -339,7 +339,7 @@ def crowded(spans: np.ndarray, n: int, time: float, window: int, period: float) 
     return elapsed == 0 or 0 < highest * elapsed < window / period
 
 
-@jit
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def run(
     k: Levels,
     a: int,
@@ -381,6 +381,7 @@ def run(
         reached = armed_at = 0.0
         asking = -1
         follow[:] = phases
+        phi[2, 0], phi[2, 1] = 1.0, 0.0
         while asking < 0:
             count = watch(k, a, c, follow, signals, constants, waits)
             if count < 0:
@@ -411,7 +412,6 @@ def run(
                 exponentials(k.rates[a], reached, p, phi[2])
                 break
             reached = found
-            exponentials(k.rates[a], reached, p, phi[2])
             if c_count > 1 and meets_another(signal, signals, slopes, constants, count, phi[2], p):
                 return LEFT, a, time, n, m, samples, transitions
             if waits[signal, 1] == 1:

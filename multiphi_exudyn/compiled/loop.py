@@ -6,7 +6,7 @@ import numpy as np
 
 from multiphi_exudyn.compiled.kernel import CHATTER, FULL, run
 from multiphi_exudyn.compiled.pack import Pack
-from multiphi_exudyn.compiled.record import PHASES, Record
+from multiphi_exudyn.compiled.record import NUMBERS, PHASES, Record
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.state import State
 
@@ -33,12 +33,12 @@ class CompiledLoop:
         position = self._pack.position(state.level)
         if position is None:
             return state, time, False
-        self._pack.connect(state.level)
+        self._pack.connect()
         levels = self._pack.levels
         x, v = np.zeros((2, levels.squared.shape[1]))
         r = len(state.displacement)
         x[:r], v[:r] = state.displacement, state.velocity
-        phases = np.array([PHASES.index(phase) for phase in state.phases], np.int8)
+        phases = np.array([NUMBERS[phase] for phase in state.phases], np.int8)
         first, status = record.count, FULL
         while status == FULL:
             record.make_room()

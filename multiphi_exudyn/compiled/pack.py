@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multiphi_exudyn.compiled.search import BOUNDS
+from multiphi_exudyn.compiled.search import BOUNDS, SHORTEST
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.state import Row
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Levels", "Pack"]
 
-SHORTEST = 24  # halvings of the reciprocal of a level's largest rate: the shortest interval
 LENGTHS = 56  # interval lengths, each twice the one before
 
 
@@ -29,9 +28,10 @@ class Levels(NamedTuple):
     potential at rest [J]. rates (n, 2, p). magnitudes (n, p, BOUNDS): |lambda|^k. factors (n, LENGTHS, 2, p).
     from_state (n, 2r, 2, p), to_state (n, p, 2, 2r): between eta, eta' and coefficients.
     squared (n, r): omega^2. damping (n, r, r). closed (n, c). rigid (c,).
-    own, entered (n, c, 2, r): s of a contact, and s after its change, from eta and eta'; their constants (n, c) and
-    signals (n, c, 2, p). target (n, c): the level after a contact's change, -1 if not packed.
-    matrix (n, c, r, r), offset (n, c, r): the transition there, transposed.
+    rated (n,): whether the s of a contact feels eta'. own, entered (n, c, 2, r): s of a contact, and s after its
+    change, from eta and eta'; their constants (n, c) and signals (n, c, 2, p).
+    target (n, c): the level after a contact's change, -1 if the way is not packed. matrix (n, c, r, r), transposed,
+    offset (n, c, r): the transition there.
     """
 
     sizes: np.ndarray
@@ -45,6 +45,7 @@ class Levels(NamedTuple):
     damping: np.ndarray
     closed: np.ndarray
     rigid: np.ndarray
+    rated: np.ndarray
     own: np.ndarray
     own_constant: np.ndarray
     own_signal: np.ndarray
@@ -71,6 +72,7 @@ class Levels(NamedTuple):
             damping=np.zeros((n, r, r)),
             closed=np.zeros((n, c), np.bool_),
             rigid=rigid,
+            rated=np.zeros(n, np.bool_),
             own=np.zeros((n, c, 2, r)),
             own_constant=np.zeros((n, c)),
             own_signal=np.zeros((n, c, 2, p)),
@@ -89,34 +91,37 @@ class Pack:
     def __init__(self, rule: EventRule) -> None:
         self.rule = rule
         self.loaded: list[LoadedLevel] = []
-        self._positions: dict[tuple[int, ...], int] = {}
+        self._positions: dict[tuple[int, ...], int | None] = {}
         self._rigid = np.isinf(rule.model.base.stiffnesses)
+        self._seen = 0, 0
         self.levels = Levels.empty(0, 0, 0, self._rigid)
 
     def position(self, level: LoadedLevel) -> int | None:
         """Where a level stands, None where the compiled loop cannot run: powers, a drive, no motion."""
-        response = level.level.response
-        if not response.basis.pure or level.driven or not np.any(response.basis.rates):
-            return None
-        if level.level.indices not in self._positions:
-            self._add(level)
-        return self._positions[level.level.indices]
+        indices = level.level.indices
+        if indices not in self._positions:
+            basis = level.level.response.basis
+            runs = basis.pure and not level.driven and np.any(basis.rates)
+            self._positions[indices] = self._add(level) if runs else None
+        return self._positions[indices]
 
-    def connect(self, level: LoadedLevel) -> None:
-        """Pack the ways from and to a level that the rule has computed since."""
-        here = self._positions[level.level.indices]
-        for contact in range(len(self._rigid)):
-            there = self._positions.get(tuple(sorted({*level.level.indices} ^ {contact})))
-            if there is not None:
-                for source, target in ((here, there), (there, here)):
-                    known = self.rule.has_transition(self.loaded[source], self.loaded[target])
-                    if known and self.levels.target[source, contact] < 0:
-                        self._connect(source, target, contact)
+    def connect(self) -> None:
+        """Pack the ways between packed levels that the rule has computed since."""
+        ways = self.rule.ways
+        if (len(ways), len(self.loaded)) == self._seen:
+            return
+        self._seen = len(ways), len(self.loaded)
+        for source, target in ways:
+            changed, here, there = {*source} ^ {*target}, self._positions.get(source), self._positions.get(target)
+            if len(changed) == 1 and here is not None and there is not None:
+                (contact,) = changed
+                if self.levels.target[here, contact] < 0:
+                    self._connect(here, there, contact)
 
-    def _add(self, level: LoadedLevel) -> None:
+    def _add(self, level: LoadedLevel) -> int:
         own, response = level.level, level.level.response
         self._reserve(len(self.loaded) + 1, own.modes, len(response.basis.rates))
-        k = self._positions[own.indices] = len(self.loaded)
+        k = len(self.loaded)
         self.loaded.append(level)
         r, p, rates, a = own.modes, len(response.basis.rates), response.basis.rates, self.levels
         size = np.abs(rates)
@@ -134,9 +139,11 @@ class Pack:
         _split(both.conj(), a.to_state[k, :p])
         a.squared[k, :r], a.damping[k, :r, :r] = own.omega**2, own.damping
         a.closed[k, list(own.indices)] = True
+        a.rated[k] = np.any(own.force_rate_rows)
         for contact in range(len(self._rigid)):
             row = self.rule.function(level, contact)
             a.own_constant[k, contact] = _put(row, level, a.own[k, contact], a.own_signal[k, contact])
+        return k
 
     def _connect(self, source: int, target: int, contact: int) -> None:
         level, a = self.loaded[source], self.levels

@@ -12,10 +12,11 @@ from multiphi_exudyn.compiled.pack import Pack
 from multiphi_exudyn.state import Event, Loss, Phase
 from multiphi_exudyn.trajectory import Segment
 
-__all__ = ["PHASES", "Record"]
+__all__ = ["NUMBERS", "PHASES", "Record"]
 
 ROWS = 256  # at first
 PHASES = tuple(Phase)
+NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 T = TypeVar("T")
 
@@ -90,6 +91,11 @@ class Record:
         """An event of the NumPy loop."""
         self._events[self.happened] = event
         self.happened += 1
+
+    def recent(self, count: int) -> list[tuple[float, float]]:
+        """Start [s] and highest frequency [Hz] of the last ``count`` segments."""
+        spans = self.spans[max(0, self.count - count) : self.count]
+        return list(zip(spans[:, 0].tolist(), spans[:, 3].tolist(), strict=True))
 
     def make_room(self) -> None:
         """For at least one more segment and two events, of the widest level."""

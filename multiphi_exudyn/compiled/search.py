@@ -17,12 +17,15 @@ import numpy as np
 
 from multiphi_exudyn.first_root import HERMITE, LIFTED, RESOLUTION, SIMULTANEOUS, TIME_ROUND_OFF, ZERO
 
-__all__ = ["BOUNDS", "FOUND", "NONE", "UNDECIDED", "exponentials", "first_descent", "jit", "meets_another"]
+__all__ = ["BOUNDS", "FOUND", "NONE", "SHORTEST", "UNDECIDED", "exponentials", "first_descent", "jit", "meets_another"]
 
 NONE, FOUND, UNDECIDED = 0, 1, 2
+SHORTEST = 24  # halvings of the reciprocal of a level's largest rate: the shortest interval
+SERIES = SHORTEST - 12  # doublings of it: an interval in which exp is its series to the fourth power
+THIRD = 1 / 3
 BOUNDS = 6  # derivatives that are bounded: g to its fifth
 
-jit = numba.njit(cache=True, nogil=True, error_model="numpy")
+jit = numba.njit(error_model="numpy", forceinline=True)
 
 
 @jit
@@ -32,6 +35,43 @@ def exponentials(rates: np.ndarray, t: float, p: int, phi: np.ndarray) -> None:
         size = math.exp(rates[0, j] * t)
         phi[0, j] = size * math.cos(rates[1, j] * t)
         phi[1, j] = size * math.sin(rates[1, j] * t)
+
+
+@jit
+def multiply(a: np.ndarray, b: np.ndarray, p: int, result: np.ndarray) -> None:
+    """Products of p complex numbers."""
+    for j in range(p):
+        re = a[0, j] * b[0, j] - a[1, j] * b[1, j]
+        result[1, j] = a[0, j] * b[1, j] + a[1, j] * b[0, j]
+        result[0, j] = re
+
+
+@jit
+def shift(
+    rates: np.ndarray,
+    factors: np.ndarray,
+    shortest: float,
+    top: int,
+    u: float,
+    p: int,
+    given: np.ndarray,
+    phi: np.ndarray,
+) -> None:
+    """phi (2, p) a time u <= shortest 2^top after the ``given`` ones: tabulated factors, and exp by its series."""
+    phi[:] = given
+    h = math.ldexp(shortest, top)
+    for k in range(top, SERIES - 1, -1):
+        if u >= h:
+            u -= h
+            multiply(phi, factors[k], p, phi)
+        h *= 0.5
+    for j in range(p):
+        x, y = rates[0, j] * u, rates[1, j] * u
+        re, im = 1 + x * 0.25, y * 0.25
+        re, im = 1 + (re * x - im * y) * THIRD, (re * y + im * x) * THIRD
+        re, im = 1 + (re * x - im * y) * 0.5, (re * y + im * x) * 0.5
+        re, im = 1 + re * x - im * y, re * y + im * x
+        phi[0, j], phi[1, j] = phi[0, j] * re - phi[1, j] * im, phi[0, j] * im + phi[1, j] * re
 
 
 @jit
@@ -134,42 +174,53 @@ def falls(
 
 @jit
 def root(
-    a: float,
-    b: float,
+    start: float,
+    h: float,
+    top: int,
     left: np.ndarray,
     right: np.ndarray,
     bound: float,
     constant: float,
     signal: np.ndarray,
     rates: np.ndarray,
+    factors: np.ndarray,
+    shortest: float,
     p: int,
+    given: np.ndarray,
     phi: np.ndarray,
 ) -> tuple[float, int]:
-    """The root of g in [a, b], in which g falls, and the samples it took; the method is that of first_root.py."""
-    rise, width = right[0] - left[0], b - a
+    """The root of g in [start, start + h], in which g falls, and the samples it took, by the method of first_root.py.
+
+    given: the exponentials at the start; phi: those at the root.
+    """
+    rise = right[0] - left[0]
     s = -left[0] / rise
-    toward_left, toward_right = rise / (left[1] * width), rise / (right[1] * width)
+    toward_left, toward_right = rise / (left[1] * h), rise / (right[1] * h)
     s = s * s * (3 - 2 * s) + s * (1 - s) * ((1 - s) * toward_left - s * toward_right)
-    t = a + width * min(max(s, 0.01), 0.99)
-    tolerance = TIME_ROUND_OFF * b
-    for taken in range(1, 101):
-        exponentials(rates, t, p, phi)
+    a, b, u = 0.0, h, h * min(max(s, 0.01), 0.99)
+    tolerance = TIME_ROUND_OFF * (start + h)
+    taken = 0
+    while taken < 100:
+        taken += 1
+        shift(rates, factors, shortest, top, u, p, given, phi)
         value, slope, curvature, third = derivatives(signal, constant, rates, phi, p)
         if value >= 0:
-            a = t
+            a = u
         else:
-            b = t
+            b = u
         following = (a + b) / 2
         if slope != 0:
             newton, c2, c3 = value / slope, curvature / (2 * slope), third / (6 * slope)
-            better = t - newton - c2 * newton**2 - (2 * c2**2 - c3) * newton**3
+            better = u - newton - c2 * newton**2 - (2 * c2**2 - c3) * newton**3
             left_out = 5 * abs(c2) * (c2**2 + abs(c3)) + bound / (24 * abs(slope))
             if left_out * newton**4 <= tolerance or abs(newton) <= tolerance:
-                return min(max(better, a), b), taken
+                u = min(max(better, a), b)
+                break
             if a < better < b:
                 following = better
-        t = following
-    return t, taken
+        u = following
+    shift(rates, factors, shortest, top, u, p, given, phi)
+    return start + u, taken
 
 
 @jit
@@ -225,8 +276,8 @@ def first_descent(
     """(NONE | FOUND | UNDECIDED, its time, the signal that falls, samples taken) in (start, horizon].
 
     signals (s, 2, p), of which ``count`` count; slopes as they, bounds (s, BOUNDS), values (2, s, 2), phi (3, 2, p):
-    room to work in. factors (k, 2, p): exp(lambda h) for h = shortest 2^k. magnitudes (p, BOUNDS): |lambda|^k.
-    growth: the largest Re lambda above zero.
+    room to work in, phi[2] the exponentials at the start, then at the descent. magnitudes (p, BOUNDS): |lambda|^k.
+    factors (k, 2, p): exp(lambda h) for h = shortest 2^k. growth: the largest Re lambda above zero.
     """
     eternal, swell = True, math.exp(growth * (2 * horizon + shortest))
     for s in range(count):
@@ -238,16 +289,14 @@ def first_descent(
     if eternal:
         return NONE, horizon, 0, 0
     top = widest(constants, bounds, count, shortest, horizon, refine, len(factors) - 1)
-    exponentials(rates, start, p, phi[0])
+    phi[0] = phi[2]
     for s in range(count):
         sample(signals[s], slopes[s], constants[s], phi[0], p, values[0, s])
     k, t, here, samples = top, start, 0, 1
     while t < horizon:
         there = 1 - here
         h = math.ldexp(shortest, k)
-        for j in range(p):
-            phi[there, 0, j] = phi[here, 0, j] * factors[k, 0, j] - phi[here, 1, j] * factors[k, 1, j]
-            phi[there, 1, j] = phi[here, 0, j] * factors[k, 1, j] + phi[here, 1, j] * factors[k, 0, j]
+        multiply(phi[here], factors[k], p, phi[there])
         samples += 1
         doubtful, fallen, roomy = 0, 0, True
         for s in range(count):
@@ -268,7 +317,20 @@ def first_descent(
             left, right, h, bounds[fallen], constants[fallen], signals[fallen], rates, phi[here], phi[there], p
         ):
             found, taken = root(
-                t, t + h, left, right, bounds[fallen, 4], constants[fallen], signals[fallen], rates, p, phi[2]
+                t,
+                h,
+                k,
+                left,
+                right,
+                bounds[fallen, 4],
+                constants[fallen],
+                signals[fallen],
+                rates,
+                factors,
+                shortest,
+                p,
+                phi[here],
+                phi[2],
             )
             return FOUND if found <= horizon else NONE, found, fallen, samples + taken
         k -= 1
