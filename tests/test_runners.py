@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from small_scene import changed, write
 
-from multiphi_exudyn import ModalDamping, MultiPhiModel, NumericalFailure, RayleighDamping, planar_beam
+from multiphi_exudyn import (
+    ModalDamping,
+    MultiPhiModel,
+    MultiPhiValueError,
+    NumericalFailure,
+    RayleighDamping,
+    planar_beam,
+)
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -137,3 +144,19 @@ def _first_order(structure, damping):
     inverse = np.linalg.inv(structure.mass)
     zero, one = np.zeros_like(inverse), np.eye(len(inverse))
     return np.block([[zero, one], [-inverse @ structure.stiffness, -inverse @ damping]])
+
+
+def test_a_tolerance_in_place_of_a_number_of_modes(tmp_path):
+    data = changed(["models", 1], {"kind": "reduced", "name": "to-1-percent", "tolerance": 0.01})
+    scene = load_scene(write(tmp_path / "scene.toml", data))
+    bench = prepare(scene, mechanics_of(scene))
+    run = run_model(bench, "to-1-percent")
+    assert run.label == "Multi-Phi, compliant levels, modes for a truncation error of 0.01"
+    assert 2 <= run.dofs < bench.structure.n - 1
+    assert run.indicators["0.1"] <= 0.01
+
+
+def test_modes_and_a_tolerance_are_refused(tmp_path):
+    data = changed(["models", 1], {"kind": "reduced", "name": "both", "tolerance": 0.01, "modes": 3})
+    with pytest.raises(MultiPhiValueError, match=r"models\[1\].*need modes or a tolerance, not both"):
+        load_scene(write(tmp_path / "scene.toml", data))

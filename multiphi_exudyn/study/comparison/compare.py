@@ -1,6 +1,6 @@
 """Comparison: every model of a scene run once, and measured against the reference.
 
-Errors are computed here and nowhere else; ``summary`` and ``histories`` are what is written to disk.
+``summary`` and ``histories`` are what is written to disk.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.measures.measures import ROUND_OFF, windows
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.workbench import Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]
-
-ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ class Comparison:
     @property
     def windows(self) -> tuple[float, ...]:
         """Ends [s] of the windows in which errors are given, ascending; the last is the end of the run."""
-        end = self.bench.t_end
-        return (*(w for w in sorted(self.bench.scene.file.outputs.windows) if w < ROUND_OFF * end), end)
+        return windows(self.bench)
 
     @property
     def headline_window(self) -> float:

@@ -14,7 +14,7 @@ from multiphi_exudyn.study.measures.spectra import spectral_difference
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Workbench
 
-__all__ = ["horizons", "measures", "windows"]
+__all__ = ["ROUND_OFF", "horizons", "measures", "windows"]
 
 ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
 Difference = Callable[[np.ndarray, np.ndarray, np.ndarray, float], float]  # values, reference, time, until

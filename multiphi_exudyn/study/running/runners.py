@@ -17,6 +17,7 @@ from multiphi_exudyn.study.scene.scene_file import (
     CraigBamptonModel,
     FullModel,
     GlobalBasisModel,
+    ReducedModel,
     StepwiseModel,
     UserObjectModel,
 )
@@ -60,6 +61,8 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
         return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
     rigid = all(contact.rigid for contact in bench.contacts(spec.contact == "rigid"))
     levels = f"{'rigid' if rigid else 'compliant'} levels, r = {spec.modes}"
+    if isinstance(spec, ReducedModel) and spec.tolerance is not None:
+        levels = f"{'rigid' if rigid else 'compliant'} levels, modes for a truncation error of {spec.tolerance:g}"
     if isinstance(spec, UserObjectModel):
         printed = ", printed frequencies" if bench.overrides else ""
         return f"Exudyn user object, {levels}{printed}, step {spec.step * 1e6:g} µs"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 __all__ = [
@@ -213,8 +213,15 @@ class ReducedModel(Table):
     kind: Literal["reduced"]
     name: Name  # "{modes}" stands for the number of modes
     modes: Modes | None = None  # none given: the scene's
+    tolerance: Positive | None = None  # truncation error wanted, from which the modes follow, in place of a number
     contact: Literal["as-given", "rigid"] = "as-given"
     loop: Literal["numpy", "compiled"] = "numpy"  # what carries the run from event to event; the answer is the same
+
+    @model_validator(mode="after")
+    def _one_choice_of_modes(self) -> ReducedModel:
+        if self.modes is not None and self.tolerance is not None:
+            raise PydanticCustomError("modes", "modes or a tolerance, not both")
+        return self
 
 
 class UserObjectModel(Table):

@@ -42,7 +42,7 @@ class Scene:
 
     def filled(self, model: ModelSpec) -> ModelSpec:
         """The model with its number of modes, and that number in its name."""
-        if isinstance(model, FullModel):
+        if isinstance(model, FullModel) or (isinstance(model, ReducedModel) and model.tolerance is not None):
             return model
         modes = self.file.modes if model.modes is None else model.modes
         return model.model_copy(update={"modes": modes, "name": model.name.replace("{modes}", str(modes))})

@@ -19,7 +19,7 @@ from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.level import LevelOverride
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.modes import complete_modes
 from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.mechanics import Mechanics
@@ -97,7 +97,10 @@ class Workbench:
     def model(self, spec: ReducedModel | UserObjectModel | StepwiseModel) -> MultiPhiModel:
         """The reduced model of a scene's entry."""
         rigid = not isinstance(spec, StepwiseModel) and spec.contact == "rigid"
-        return MultiPhiModel(self.structure, self.contacts(rigid), modes=spec.modes or "all", overrides=self.overrides)
+        modes: int | str | Tolerance = spec.modes or "all"
+        if isinstance(spec, ReducedModel) and spec.tolerance is not None:
+            modes = Tolerance(spec.tolerance)
+        return MultiPhiModel(self.structure, self.contacts(rigid), modes=modes, overrides=self.overrides)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
