@@ -58,10 +58,11 @@ class CraigBampton:
 def craig_bampton(structure: LinearStructure, interface: Sequence[str], modes: int) -> CraigBampton:
     """Reduce ``structure`` to its ``interface`` points, independent of each other, and ``modes`` modes inside."""
     held = [UnilateralContact(name, name, gap=0.0) for name in interface]
-    level = MultiPhiModel(structure, held, modes=max(modes, 1)).level(interface)
-    if not held or modes > structure.n - len(held):
-        needed = f"at most {structure.n - len(held)} beside 1 interface point or more"
+    if not held or not 0 <= modes <= structure.n - len(held):
+        needed = f"0 to {structure.n - len(held)} modes beside 1 interface point or more"
         raise MultiPhiValueError(f"modes: got {modes} and {len(held)} interface points, need {needed}")
+    kept = max(modes, 1) if len(held) < structure.n else "all"
+    level = MultiPhiModel(structure, held, modes=kept).level(interface)
     base, inside = level.base, level.vectors[:, :modes]
     constraint = np.column_stack([_constraint_mode(level, i) for i in range(len(held))])
     basis = np.column_stack([constraint, inside])
