@@ -10,13 +10,13 @@ from small_study import METHODS, coarser, contact, map_pairs, result_of, row, sm
 
 from multiphi_exudyn.study.accuracy import study_report
 from multiphi_exudyn.study.accuracy.direct_labels import Label, place_labels
+from multiphi_exudyn.study.accuracy.figure_style import styles
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
 from multiphi_exudyn.study.accuracy.study_figures import (
     along_figure,
     convergence_figure,
     indicator_figure,
     pareto_figure,
-    styles,
 )
 from multiphi_exudyn.study.accuracy.study_findings import choices, error_words, findings, shown_points
 from multiphi_exudyn.study.accuracy.study_report import render_study
@@ -99,6 +99,8 @@ def test_without_a_full_model_that_holds_the_tolerance_nothing_is_called_faster(
     assert with_full == "The cheapest that reaches 10 % is Multi-Phi (r = 8): 1 ms; no full model does."
     alone = findings(result_of(rows, timings, methods=METHODS[:1])).outcome[0]
     assert alone == "The cheapest that reaches 10 % is Multi-Phi (r = 8): 1 ms."
+    full = findings(result_of([row("full ANCF", 0.05)], [timing("full ANCF", 1.0)])).outcome[0]
+    assert full == "The cheapest that reaches 10 % is full ANCF: 1 s."
     nobody = findings(result_of([row("Multi-Phi", 0.9)], [timing("Multi-Phi", 1.0)])).outcome[0]
     assert nobody == "None of the settings reaches 10 %."
 
@@ -136,6 +138,12 @@ def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
     assert len(sources) == 4  # error over time, convergence, indicator, maps
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
     assert not re.search(r"href=|url\(|<script|http", page)
+
+
+def test_the_page_says_the_first_lines(page, result):
+    found, text = findings(result), text_of(page)
+    for sentence in (found.asked, *found.outcome, *found.distrust):
+        assert sentence in text.replace("&#39;", "'")
 
 
 def test_names_and_causes_are_escaped(page):

@@ -1,0 +1,141 @@
+"""How a study's pictures look: one colour and one marker per method, axes in percent, marks of failures.
+
+Colours are Okabe and Ito's colour-blind-safe set; full models are black and grey, the reference and its coarser copy
+lines without marks. Grey bands: errors below the reference's own uncertainty.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+from matplotlib.transforms import Transform
+
+from multiphi_exudyn.study.accuracy.along_axis import FINEST
+from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, StudyResult, full_methods, names_of, settings
+from multiphi_exudyn.study.comparison.findings import seconds
+from multiphi_exudyn.study.comparison.plots import CONTACT, RESOLUTION, WIDTH
+
+__all__ = [
+    "GRID",
+    "LINE",
+    "NOTE",
+    "Style",
+    "error_label",
+    "gaps",
+    "legend_below",
+    "marks",
+    "note",
+    "panels_of",
+    "percent_axis",
+    "single",
+    "styles",
+    "uncertainty_band",
+    "value_axis",
+]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8A6D00", "#56B4E9", "#7F3C8D", "#E69F00")
+MARKERS = ("o", "D", "^", "v", "<", ">", "p", "h")
+FULL_COLOURS = ("#000000", "#7A7A7A", "#4D4D4D")
+FULL_MARKERS = ("s", "P", "X")
+GRID, LINE, NOTE = "#EEEEEE", "#B0B0B0", "#555555"
+FIELD_LABELS = {"modes": "modes r"}
+MOST_TICKS = 10
+WIDE = 10.0  # ratio of largest to smallest value from which an axis is logarithmic
+
+
+@dataclass(frozen=True)
+class Style:
+    """How one method is drawn."""
+
+    colour: str
+    marker: str
+    line: str = "-"
+
+
+def styles(result: StudyResult) -> dict[str, Style]:
+    """One style per method, then those of the reference and its coarser copy."""
+    neutral = zip(itertools.cycle(FULL_COLOURS), itertools.cycle(FULL_MARKERS), strict=False)
+    coloured = zip(itertools.cycle(COLOURS), itertools.cycle(MARKERS), strict=False)
+    full = full_methods(result)
+    own = {name: Style(*next(neutral if name in full else coloured)) for name in names_of(settings(result))}
+    return own | {REFERENCE: Style("#000000", "None", "--"), COARSER: Style("#7A7A7A", "None", ":")}
+
+
+def single(height: float) -> tuple[Figure, Axes]:
+    """One panel of a given height [inches]."""
+    figure, axes = panels_of([height])
+    return figure, axes[0]
+
+
+def panels_of(heights: Sequence[float], sharex: bool = False) -> tuple[Figure, list[Axes]]:
+    """Panels of given heights [inches] under each other."""
+    figure = Figure(figsize=(WIDTH, sum(heights)), dpi=RESOLUTION, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = list(figure.subplots(len(heights), 1, squeeze=False, sharex=sharex, height_ratios=heights)[:, 0])
+    for each in axes:
+        each.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def marks(style: Style) -> dict[str, Any]:
+    """A method's marker as keywords of a plot."""
+    return {"marker": style.marker, "color": style.colour, "ms": 6.5, "mec": "white", "mew": 0.7}
+
+
+def gaps(axes: Axes, places: Sequence[float], style: Style) -> None:
+    """Crosses on the upper edge."""
+    if places:
+        edge: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+        axes.plot(places, np.ones(len(places)), "x", color=style.colour, ms=7, mew=1.8, zorder=6, **edge)
+
+
+def uncertainty_band(axes: Axes, own: float | None) -> None:
+    """Errors that the reference cannot tell from none."""
+    if own:
+        lowest, highest = axes.get_ylim()
+        axes.axhspan(min(lowest, 100 * own) / 1e3, 100 * own, color=CONTACT, lw=0, zorder=0)
+        axes.set_ylim(min(lowest, 50 * own), max(highest, 200 * own))
+        note(axes, "the reference's own uncertainty", (0.01, 100 * own), axes.get_yaxis_transform(), (0, -3), va="top")
+
+
+def note(
+    axes: Axes, text: str, at: tuple[float, float], system: Transform, offset: tuple[float, float], **placing: Any
+) -> None:
+    """A remark at a point of a coordinate system, ``offset`` in points."""
+    shift: dict[str, Any] = {"xytext": offset, "textcoords": "offset points", "color": NOTE, "fontsize": 9}
+    axes.annotate(text, at, xycoords=system, **shift, **placing)
+
+
+def percent_axis(axes: Axes) -> None:
+    """Values that are percents already, written as such."""
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
+
+
+def value_axis(axes: Axes, axis: str, values: Sequence[float]) -> None:
+    """Logarithmic where the values are far apart, with the values themselves as ticks."""
+    ticks = sorted(set(values))
+    if ticks[0] > 0 and (axis in FINEST or ticks[-1] / ticks[0] >= WIDE):
+        axes.set_xscale("log")
+        shown = ticks[:: -(-len(ticks) // MOST_TICKS)]
+        axes.set_xticks(shown, [seconds(tick) if axis == "step" else f"{tick:g}" for tick in shown])
+        axes.set_xticks([], minor=True)
+    axes.set_xlabel(FIELD_LABELS.get(axis, axis))
+
+
+def error_label(result: StudyResult) -> str:
+    """Which error an axis shows."""
+    return f"NRMSE to {result.window:g} s\nworst of {', '.join(result.judged_points)}"
+
+
+def legend_below(figure: Figure, panels: Sequence[Axes]) -> None:
+    """One for all panels."""
+    found = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=3, fontsize=9, frameon=False)
