@@ -129,6 +129,8 @@ def load_study(source: str, *, quick: bool = False) -> Study:
     for field, value in (file.change | (file.quick.change if quick else {})).items():
         _put(data, field, value)
     _put(data, "outputs.tolerances", list(file.tolerances))
+    if file.reference is not None:
+        _put_reference(data, file)
     if file.window is not None:
         _put(data, "outputs.windows", [file.window])
     study = Study(path.stem, path, file, scene_path, data, quick)
@@ -145,6 +147,8 @@ def _check(study: Study) -> None:
     for name in study.file.maps:
         if name not in names:
             _refuse(study, "maps", name, f"one of the methods: {', '.join(names)}")
+    if study.file.coarser is not None and study.file.reference is None:
+        _refuse(study, "reference", "none", "the study's own reference for its coarser copy")
     if not names and study.file.budget is None:
         _refuse(study, "methods", "none", "a method or a budget")
     for method in study.file.methods:
@@ -180,6 +184,14 @@ def _nearby(method: MethodSpec) -> list[dict[str, float]]:
     return [{}] + [
         {field: factors[i] for field, factors in method.nearby.items() if i < len(factors)} for i in range(count)
     ]
+
+
+def _put_reference(data: dict[str, Any], file: StudyFile) -> None:
+    """The study's own reference, and its copy if it has one, in place of the scene's models."""
+    given = {REFERENCE: file.reference, COARSER: file.coarser}
+    models = {name: model for name, model in given.items() if model is not None}
+    data["models"] = [model | {"name": name} for name, model in models.items()]
+    data["comparison"] = {name: name for name in models}
 
 
 def _put(data: dict[str, Any], field: str, value: Any) -> None:

@@ -47,7 +47,8 @@ class StudyFile(Table):
     """A whole study file.
 
     scene: a shipped scene or a TOML file beside the study. change: field -> value, for all runs. axes: field -> values;
-    every method runs at every combination of them. window [s]: the errors that are ranked are those from 0 to here.
+    every method runs at every combination of them. reference, coarser: models that take the place of the scene's own
+    reference and its coarser copy; a reference without a copy has no uncertainty. window [s]: the errors that are ranked are those from 0 to here.
     tolerances: for which the cheapest settings are looked up. time_limit_s: of one run, wall clock.
     timing: whether settings are timed, alone on the machine. histories: keep those of every run.
     maps: methods whose time-frequency maps are drawn, each at its most accurate setting, beside the reference's.
@@ -57,6 +58,8 @@ class StudyFile(Table):
     scene: str
     change: dict[str, Any] = Field(default_factory=dict)
     axes: dict[str, Values] = Field(default_factory=dict)
+    reference: dict[str, Any] | None = None
+    coarser: dict[str, Any] | None = None
     methods: tuple[MethodSpec, ...] = ()
     budget: BudgetSpec | None = None
     window: Positive | None = None
