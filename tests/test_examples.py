@@ -28,3 +28,14 @@ def test_paper_rig(capsys, monkeypatch, tmp_path):
     assert first == pytest.approx([0.06897, 0.06897], abs=2e-5)
     assert (tmp_path / "rig.png").stat().st_size > 10_000
     assert capsys.readouterr().out.count("ok") == 2
+
+
+def test_parameter_study(capsys, tmp_path):
+    example = load("parameter_study")
+    example.AXES = {"stiffness": [1e5, 1e6], "displacement": [0.02]}
+    path = str(tmp_path / "runs.sqlite")
+    rows = example.main(path, "serial")
+    assert [row.status for row in rows] == ["ok", "ok"]
+    assert rows[1].values["first contact [ms]"] == pytest.approx(68.97, abs=0.1)
+    assert example.main(path, "serial") == rows
+    assert capsys.readouterr().out.count("impulse") == 4
