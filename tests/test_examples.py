@@ -1,5 +1,6 @@
 """The examples run, and each is checked by one number."""
 
+import importlib
 import importlib.util
 from pathlib import Path
 
@@ -30,9 +31,10 @@ def test_paper_rig(capsys, monkeypatch, tmp_path):
     assert capsys.readouterr().out.count("ok") == 2
 
 
-def test_parameter_study(capsys, tmp_path):
-    example = load("parameter_study")
-    example.AXES = {"stiffness": [1e5, 1e6], "displacement": [0.02]}
+def test_parameter_study(capsys, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    example = importlib.import_module("parameter_study")
+    monkeypatch.setattr(example, "AXES", {"stiffness": [1e5, 1e6], "displacement": [0.02]})
     path = str(tmp_path / "runs.sqlite")
     rows = example.main(path, "serial")
     assert [row.status for row in rows] == ["ok", "ok"]
