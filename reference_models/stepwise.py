@@ -29,6 +29,8 @@ INSTANT = 64 * np.finfo(float).eps  # of time, and s: solve_ivp locates events t
 CHATTER = 200  # events in a row, in less than
 CHATTER_PERIODS = 10  # periods of the highest kept mode, are chatter
 
+UNSTABLE = 2.0  # times the energy of the start: a run that has gained as much is not worth its end
+
 Function = Callable[[float, np.ndarray], Any]
 
 
@@ -121,7 +123,9 @@ def solve_stepwise(
     penetrating = np.flatnonzero(base.directions.T @ y + base.gaps < 0)
     state = rule.start(y, np.zeros_like(y), tuple(map(int, penetrating)), ())[0]
     size = np.linalg.norm(y), np.linalg.norm(base.modes.omega * y)
-    return _Integration(rule, method, rtol, (float(size[0]), float(size[1]))).run(state, t_end)
+    integration = _Integration(rule, method, rtol, (float(size[0]), float(size[1])))
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that blows up
+        return integration.run(state, t_end)
 
 
 @dataclass(frozen=True)
@@ -136,20 +140,26 @@ class _Integration:
     def run(self, state: State, t_end: float) -> StepwiseRun:
         """From ``state`` at t = 0, restarted in the next level after every event."""
         segments: list[StepwiseSegment] = []
-        evaluations, message, time = 0, "", 0.0
+        evaluations, message, time, most = 0, "", 0.0, UNSTABLE * (state.kinetic + state.potential)
         while time < t_end and not message:
             found, asking = self._segment(state, time, t_end)
             segments.append(StepwiseSegment(state.level, found.sol))
-            evaluations, time, message = evaluations + found.nfev, float(found.t[-1]), _failure(found, segments)
+            evaluations, time, message = evaluations + found.nfev, float(found.t[-1]), self._failure(found, segments)
             if asking and not message:
                 modes = state.level.level.modes
                 reached = found.y[:, -1]
                 arrived = replace(state, displacement=reached[:modes], velocity=reached[modes:])
-                try:
-                    state = self.rule.decide(arrived, self._together(arrived, asking, time))[0]
-                except NumericalFailure as failure:
-                    message = f"at t = {time:.9g} s: {failure}"
+                state, message = self._decided(arrived, asking, time, most)
         return StepwiseRun(self.rule.model, tuple(segments), message, evaluations)
+
+    def _decided(self, state: State, asking: set[int], time: float, most: float) -> tuple[State, str]:
+        """State after an event, or the failure there; most: energy [J] beyond which a run is unstable."""
+        if not state.kinetic + state.potential <= most:
+            return state, f"at t = {time:.9g} s: energy gained, the integration is unstable at this tolerance"
+        try:
+            return self.rule.decide(state, self._together(state, asking, time))[0], ""
+        except NumericalFailure as failure:
+            return state, f"at t = {time:.9g} s: {failure}"
 
     def _segment(self, state: State, time: float, t_end: float) -> tuple[Any, set[int]]:
         """solve_ivp's result in one level, and the contacts that ask to change at its end."""
@@ -170,6 +180,17 @@ class _Integration:
         )
         times = found.t_events if found.status == 1 else [()] * len(watched)
         return found, {contact for (contact, _), at in zip(watched, times, strict=True) if len(at)}
+
+    def _failure(self, found: Any, segments: Sequence[StepwiseSegment]) -> str:
+        """Why the run cannot go on, or ""."""
+        time = float(found.t[-1])
+        if found.status < 0:
+            return f"at t = {time:.9g} s: {' '.join(str(found.message).split())}"
+        recent = segments[-CHATTER:]
+        highest = max(segment.level.level.highest_frequency for segment in recent)
+        if len(segments) > CHATTER and highest * (time - recent[0].start) < CHATTER_PERIODS:
+            return f"at t = {time:.9g} s: chatter, {CHATTER} events within {CHATTER_PERIODS} periods of {highest:g} Hz"
+        return ""
 
     def _together(self, state: State, asking: set[int], time: float) -> set[int]:
         """With those that reach zero at the same instant, as far as roots are resolved: solve_ivp leaves them out."""
@@ -230,18 +251,6 @@ def _falling(row: Row, time: float, *, positive: bool = True, while_negative: Ro
 
     event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
     return event
-
-
-def _failure(found: Any, segments: Sequence[StepwiseSegment]) -> str:
-    """Why the run cannot go on, or ""."""
-    time = float(found.t[-1])
-    if found.status < 0 or not np.all(np.isfinite(found.y[:, -1])):
-        return f"at t = {time:.9g} s: {' '.join(str(found.message).split())}"
-    if len(segments) > CHATTER:
-        highest = max(segment.level.level.highest_frequency for segment in segments[-CHATTER:])
-        if highest * (time - segments[-CHATTER].start) < CHATTER_PERIODS:
-            return f"at t = {time:.9g} s: chatter, {CHATTER} events within {CHATTER_PERIODS} periods of {highest:g} Hz"
-    return ""
 
 
 def _of_segment(segment: StepwiseSegment, rows: np.ndarray, time: np.ndarray) -> np.ndarray:

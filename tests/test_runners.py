@@ -26,6 +26,11 @@ MODELS = [
     {"kind": "user-object", "name": "body", "step": 1e-4},
     {"kind": "user-object", "name": "coarse-body", "step": 4e-4},
     {"kind": "reduced", "name": "rigid", "contact": "rigid"},
+    {"kind": "reduced", "name": "compiled", "loop": "compiled"},
+    {"kind": "craig-bampton", "name": "component", "modes": 12, "step": 1e-5},
+    {"kind": "solve-ivp", "name": "stepwise", "method": "DOP853", "rtol": 1e-9},
+    {"kind": "global-basis", "name": "one-basis", "modes": 8},
+    {"kind": "global-basis", "name": "one-rigid-basis", "modes": 8, "contact": "rigid"},
 ]
 
 
@@ -83,6 +88,72 @@ def test_a_body_in_exudyn_answers_as_the_model_by_itself(runs):
 
 def test_a_body_with_a_coarse_step_is_put_on_the_common_grid(runs):
     assert difference(runs, "coarse-body", "compliant") < 2e-5
+
+
+def test_the_baselines_answer_as_the_models_they_replace(runs):
+    for one, other, tolerance in (
+        ("compiled", "compliant", 1e-10),
+        ("stepwise", "compliant", 1e-7),
+        ("component", "all", 1e-4),
+        ("one-basis", "all", 1e-5),
+        ("one-rigid-basis", "rigid", 0.05),
+    ):
+        assert difference(runs, one, other) < tolerance, one
+        for field in ("gaps", "contact_force"):
+            found, exact = getattr(runs[one], field)["stop"], getattr(runs[other], field)["stop"]
+            assert np.linalg.norm(found - exact) <= 100 * tolerance * np.linalg.norm(exact), (one, field)
+
+
+@pytest.mark.parametrize(("one", "other"), [("component", "all"), ("stepwise", "compliant"), ("one-basis", "all")])
+def test_the_baselines_meet_the_stop_when_the_models_they_replace_do(runs, one, other):
+    np.testing.assert_allclose(runs[one].contact_intervals["stop"], runs[other].contact_intervals["stop"], atol=1e-6)
+    assert runs[one].impulse["stop"] == pytest.approx(runs[other].impulse["stop"], rel=1e-3)
+    energy = np.interp(runs[other].energy_time, runs[one].energy_time, runs[one].energy)
+    np.testing.assert_allclose(energy, runs[other].energy, rtol=2e-3, atol=1e-3 * energy[0])
+
+
+def test_labels_say_what_a_model_is(bench, runs):
+    assert runs["component"].label == "Craig-Bampton in Exudyn, 2 interface points + 12 modes, step 10 µs"
+    assert runs["stepwise"].label == "solve_ivp, DOP853, rtol 1e-09, compliant levels, r = 6"
+    assert runs["one-rigid-basis"].label == "global basis, rigid levels, r = 8 from each of two"
+    assert runs["compiled"].label == runs["compliant"].label + ", compiled"
+
+
+def test_a_component_loaded_inside_starts_from_a_projection_and_says_so(tmp_path):
+    outputs = {"t_end": 0.01, "interval": 1e-4, "points": ["middle"]}
+    component = {"kind": "craig-bampton", "name": "component", "modes": 3, "step": 1e-4}
+    models = [{"kind": "reduced", "name": "all", "modes": "all"}, component]
+    bench = bench_of(tmp_path, outputs=outputs, models=models, comparison={"reference": "all"})
+    assert bench.interface == ("middle",)
+    projected, exact = (run_model(bench, name, progress=False) for name in ("component", "all"))
+    assert projected.label.endswith(", start projected")
+    assert projected.ledger["truncation_strain"] > 0
+    assert projected.points["middle"][0] == pytest.approx(exact.points["middle"][0], rel=1e-9)
+    assert projected.energy[0] + projected.ledger["truncation_strain"] == pytest.approx(exact.energy[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        {"kind": "craig-bampton", "modes": 2, "step": 1e-3},
+        {"kind": "solve-ivp", "modes": 12, "method": "RK45", "rtol": 0.5},
+    ],
+)
+def test_a_baseline_that_gains_energy_has_failed(tmp_path, model):
+    models = [{"kind": "reduced", "name": "all", "modes": "all"}, model | {"name": "coarse"}]
+    bench = bench_of(tmp_path, models=models, comparison={"reference": "all"}, damping={"modal_ratios": []})
+    run = run_model(bench, "coarse", progress=False)
+    assert run.status == "failed"
+    assert "energy gained" in run.message
+    assert run.online_s > 0
+
+
+def test_a_beam_is_linearised_once_for_all_scenes(tmp_path):
+    first, again = bench_of(tmp_path), bench_of(tmp_path, start={"load_at": "tip", "force": 2.0})
+    assert again.structure_s == first.structure_s > 0
+    np.testing.assert_array_equal(again.structure.stiffness, first.structure.stiffness)
+    other = bench_of(tmp_path, models=[MODELS[0] | {"elements": 7}])
+    assert other.structure.n > first.structure.n
 
 
 def test_rigid_levels_have_another_contact_law(runs):

@@ -12,6 +12,7 @@ from multiphi_exudyn import MultiPhiValueError, RayleighDamping
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scene_file import FullModel
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.study.scene.workbench import prepare
 from reference_models.rig import rig
 
 
@@ -82,6 +83,9 @@ def test_end_time_and_modes_are_replaced_and_equal_models_run_once():
     assert "compliant-r12" in load_scene("paper-rig", modes=4).models  # has its own number of modes
 
 
+COMPONENT = {"kind": "craig-bampton", "name": "cb", "modes": 2, "step": 1e-4}
+STEPWISE = {"kind": "solve-ivp", "name": "ivp", "method": "RK45", "rtol": 1e-4}
+
 BROKEN = {
     "unknown field": (["outputs", "steps"], 3, "outputs.steps: got 3, need no field of this name"),
     "missing table": (["start"], None, "start: got nothing, need a value"),
@@ -97,6 +101,17 @@ BROKEN = {
     "no models": (["models"], [], "models: got [], need"),
     "no modes": (["models", 1, "modes"], 0, "models[1].modes: got 0, need"),
     "modes by half": (["models", 1, "modes"], 2.5, "models[1].modes: got 2.5, need a valid integer or 'all'"),
+    "fewer than no modes": (["models", 1], COMPONENT | {"modes": -1}, "models[1].modes: got -1, need greater than or"),
+    "no step": (["models", 1], {k: COMPONENT[k] for k in ("kind", "name", "modes")}, "models[1].step: got nothing"),
+    "radius above one": (
+        ["models", 1], COMPONENT | {"spectral_radius": 1.1}, "models[1].spectral_radius: got 1.1, need less than or"
+    ),
+    "unknown method": (["models", 1], STEPWISE | {"method": "RK4"}, "models[1].method: got 'RK4', need 'RK45', 'DOP"),
+    "no tolerance": (["models", 1], STEPWISE | {"rtol": 0.0}, "models[1].rtol: got 0.0, need greater than or equal"),
+    "contact of a stepwise model": (
+        ["models", 1], STEPWISE | {"contact": "rigid"}, "models[1].contact: got 'rigid', need no field of this name"
+    ),
+    "unknown loop": (["models", 1, "loop"], "fast", "models[1].loop: got 'fast', need 'numpy' or 'compiled'"),
     "no start": (["start", "displacement"], 0.0, "start.displacement: got 0.0, need a value that is not zero"),
     "another kind": (["models", 0, "kind"], "exact", "models[0]: got"),
     "structure of no form": (["structure"], {}, "structure: got {}, need a table with the field rig or beam"),
@@ -139,6 +154,58 @@ def test_a_full_model_needs_a_beam_and_a_finite_stiffness(tmp_path):
     np.savez(tmp_path / "one.npz", mass=np.eye(1), stiffness=np.eye(1))
     data["structure"] = {"matrices": "one.npz", "points": {"middle": 0, "tip": 0}}
     assert "matrices have no full model" in complaint(tmp_path, data)
+
+
+@pytest.mark.parametrize("model", [COMPONENT, STEPWISE])
+def test_a_penalty_model_needs_a_finite_stiffness(tmp_path, model):
+    data = changed(["models"], [*BEAM["models"], model])
+    line = complaint(tmp_path, changed(["contacts", 0, "stiffness"], math.inf, data))
+    assert line == f"stiffness of contact stop: got 'inf', need a finite one: {model['name']} is a penalty model"
+
+
+def test_a_component_needs_contacts_on_single_points(tmp_path):
+    data = changed(["models"], [*BEAM["models"], COMPONENT])
+    data = changed(["contacts", 0, "direction"], {"middle": 1.0, "tip": -1.0}, data)
+    assert complaint(tmp_path, data).startswith("models[2].kind: got 'craig-bampton', need another kind: its contacts")
+
+
+def test_printed_frequencies_and_a_stepwise_model_exclude_each_other(tmp_path):
+    structure = {"rig": "as-published", "support_stiffness": 1e6}
+    variant = {"title": "t", "base": "paper-rig", "structure": structure, "models": [STEPWISE]}
+    variant["comparison"] = {"reference": "ivp"}
+    assert "models[0].kind: got 'solve-ivp', need reduced" in complaint(tmp_path, variant)
+
+
+@pytest.mark.parametrize(
+    ("model", "modes", "expected"),
+    [
+        (COMPONENT, 115, "modes of cb: got 115, need at most 114 beside 2 interface points"),
+        (STEPWISE, 116, "modes of ivp: got 116, need at most 115 for this structure"),
+        ({"kind": "global-basis", "name": "one"}, 116, "modes of one: got 116, need at most 115 for this structure"),
+    ],
+)
+def test_a_baseline_of_more_modes_than_there_are_is_refused(tmp_path, model, modes, expected):
+    data = changed(["models"], [*BEAM["models"], model | {"modes": modes}])
+    data["outputs"] = {"points": ["middle", "tip"]}
+    assert prepared(tmp_path, data) == expected
+
+
+def test_contact_points_that_follow_from_each_other_are_refused(tmp_path):
+    np.savez(tmp_path / "three.npz", mass=np.eye(3), stiffness=np.eye(3), double=[2.0, 0.0, 0.0])
+    data = changed(["models"], [COMPONENT | {"modes": 0}])
+    data["structure"] = {"matrices": "three.npz", "points": {"middle": 0, "tip": 1, "double": "double"}}
+    data["contacts"] = [BEAM["contacts"][0] | {"name": name, "direction": name} for name in ("middle", "double")]
+    data["comparison"] = {"reference": "cb"}
+    assert prepared(tmp_path, data).endswith("need another: contact point double follows from the others")
+
+
+def prepared(tmp_path, data):
+    """The one line with which preparing a scene is refused, without its file."""
+    file = write(tmp_path / "scene.toml", data)
+    scene = load_scene(file)
+    with pytest.raises(MultiPhiValueError) as caught:
+        prepare(scene, mechanics_of(scene))
+    return str(caught.value).removeprefix(file + ": ")
 
 
 @pytest.mark.parametrize("arrays", [{"mass": np.eye(2)}, {"mass": np.eye(2), "stiffness": np.eye(3)}])
