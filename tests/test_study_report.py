@@ -83,6 +83,16 @@ def test_the_short_form_and_an_unknown_uncertainty_are_told():
     assert "A reference failed" in " ".join(findings(result_of([row("reference", status="failed")])).distrust)
 
 
+def test_a_busy_machine_and_unsteady_repeats_are_told():
+    calm = timing("a", 1.0)
+    busy = replace(calm, values=calm.values | {"load_average": 3.25, "repeats_s": [1.0, 1.0, 4.0]})
+    doubts = [" ".join(findings(result_of([row("a", 0.1)], [each])).distrust) for each in (calm, busy)]
+    assert "not alone" not in doubts[0]
+    assert "differ most" not in doubts[0]
+    assert "not alone on the machine: the load average rose to 3.2" in doubts[1]
+    assert "The repeats of a differ most: 4 to 1." in doubts[1]
+
+
 def test_what_lies_below_the_uncertainty_is_told_as_that():
     given = result_of([row("reference"), row("coarser", 0.03), row("a", 0.02)], [timing("a", 1.0)])
     assert "Who reaches 2 %, 1 % is not decided here." in " ".join(findings(given).distrust)
@@ -262,6 +272,13 @@ def test_maps_stand_side_by_side_with_the_levels_named_once():
     assert all(mesh.get_clim() == (-60.0, 0.0) for axes in maps for mesh in axes.collections[:1])
 
 
+def test_values_beside_a_map_do_not_cover_each_other():
+    close = {"open": [4.0, 37.0], "stop": [17.0, 37.5, 80.0]}
+    figure = map_figure([replace(pair, frequencies=close) for pair in map_pairs()[:1]])
+    assert [text.get_text() for text in figure.axes[1].texts] == ["open 4", "37", "stop 17", "80"]
+    assert len(figure.axes[1].lines) == 5
+
+
 def test_equal_colours_of_a_row_mean_equal_amplitudes():
     pair = map_pairs()[0]
     quiet = replace(pair, reduced=replace(pair.full, amplitude=0.1 * pair.full.amplitude))
@@ -280,3 +297,15 @@ def test_labels_avoid_points_each_other_and_the_edge():
     boxes = [text.get_window_extent() for text in axes.texts[before:]]
     assert not boxes[0].overlaps(boxes[1])
     assert all(axes.bbox.x0 < box.x0 and box.x1 < axes.bbox.x1 for box in boxes)
+
+
+def test_a_label_in_a_corner_stays_inside_even_where_it_covers_points():
+    figure = pareto_figure(result_of([row("a", 0.1)], [timing("a", 1.0)]), {})
+    axes = figure.axes[0]
+    corner = (axes.get_xlim()[1] / 1.001, axes.get_ylim()[1] / 1.001)
+    crowd = [tuple(axes.transData.inverted().transform(axes.transData.transform(corner) - 10 - i)) for i in range(9)]
+    place_labels(figure, axes, [Label("in the corner", "#000000", [corner])], crowd)
+    figure.draw_without_rendering()
+    box = axes.texts[-1].get_window_extent()
+    assert box.x1 < axes.bbox.x1
+    assert box.y1 < axes.bbox.y1

@@ -6,6 +6,8 @@ mean equal amplitudes. Hatched: the cone of influence, where the ends of the rec
 
 from __future__ import annotations
 
+import itertools
+import math
 import textwrap
 from collections.abc import Mapping, Sequence
 
@@ -23,7 +25,8 @@ from multiphi_exudyn.study.measures.spectra import Map
 __all__ = ["map_figure"]
 
 LOWEST = -60.0  # dB
-LEVEL_COLOURS = ("#FFFFFF", "#E69F00", "#56B4E9", "#CC79A7")
+LEVEL_COLOURS = (("#FFFFFF", "#000000"), ("#E69F00", "#B87A00"), ("#CC79A7", "#A0417C"))  # of line and of text
+APART = 0.035  # heights of the axes between two values that stand beside a map
 LINE_LENGTH = 48  # characters of a title
 STRIP = (1.015, 0.035)  # bottom and height, in heights of the axes
 
@@ -68,11 +71,14 @@ def _map(axes: Axes, drawn: Map, most: float, contacts: Intervals) -> QuadMesh:
 
 def _levels(axes: Axes, frequencies: Mapping[str, Sequence[float]], drawn: Map, named: bool) -> None:
     """Natural frequencies of each level as dashed lines; their values stand beside one of the maps."""
-    beside = axes.get_yaxis_transform()
-    for (level, values), colour in zip(frequencies.items(), LEVEL_COLOURS, strict=False):
-        inside = [value for value in values if drawn.frequencies[0] <= value <= drawn.frequencies[-1]]
+    lowest, highest = drawn.frequencies[0], drawn.frequencies[-1]
+    taken: list[float] = []
+    for (level, values), (colour, dark) in zip(frequencies.items(), itertools.cycle(LEVEL_COLOURS), strict=False):
+        inside = [value for value in values if lowest <= value <= highest]
         for i, value in enumerate(inside):
             axes.axhline(value, color=colour, ls=(0, (4, 4)), lw=0.9)
-            if named:
+            height = math.log(value / lowest) / math.log(highest / lowest)
+            if named and all(abs(height - other) > APART for other in taken):
+                taken.append(height)
                 name = f"{level} {value:.3g}" if i == 0 else f"{value:.3g}"
-                axes.text(1.01, value, name, va="center", fontsize=7.5, transform=beside)
+                axes.text(1.01, height, name, color=dark, va="center", fontsize=7.5, transform=axes.transAxes)

@@ -37,6 +37,7 @@ __all__ = [
 ]
 
 MOST_POINTS = 6  # of the scene's axes that pictures and tables are shown for
+BUSY = 1.5  # load average from which others were at work: the run itself makes 1
 UNSTEADY = 2.0  # longest over shortest repeat from which a time is worth a word
 
 
@@ -101,7 +102,7 @@ def timing_words(result: StudyResult) -> str:
     if not values:
         return ""
     counts = [len(each["repeats_s"]) for each in values]
-    loads = [each["load_average"] for each in values if each["load_average"] is not None]
+    loads = _loads(result)
     load = f" Load average of the machine meanwhile: {min(loads):.2g} to {max(loads):.2g}." if loads else ""
     repeats = f"{min(counts)}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
     return f"{len(values)} settings timed, {repeats} repeats each.{load}"
@@ -205,6 +206,15 @@ def _times(result: StudyResult) -> Iterable[str]:
         ratio, setting = max(spreads, key=lambda pair: pair[0])
         most = f" The repeats of {_named(setting)} differ most: {ratio:.2g} to 1." if ratio > UNSTEADY else ""
         yield f"Run times are wall clock on one machine: ratios count.{most}"
+    load = max(_loads(result), default=0.0)
+    if load > BUSY:
+        yield f"The timing pass was not alone on the machine: the load average rose to {load:.2g}. Take times again."
+
+
+def _loads(result: StudyResult) -> list[float]:
+    """The machine's load averages while settings were timed, where the system tells them."""
+    given = [row.values["load_average"] for row in result.timings if row.status == "ok"]
+    return [load for load in given if load is not None]
 
 
 def _named(setting: Setting) -> str:

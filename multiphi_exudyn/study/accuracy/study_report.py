@@ -157,7 +157,10 @@ def _references(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
 
 def _indicator(result: StudyResult) -> Picture | None:
     figure = study_figures.indicator_figure(result)
-    caption = "Every run that has an indicator, nearby ones included. On the line the prediction is exact."
+    caption = (
+        "Every run that has an indicator, nearby ones included. On the line the prediction is exact. It predicts what "
+        "truncation costs, not what a contact law other than the reference's does."
+    )
     return None if figure is None else _picture(figure, caption)
 
 
