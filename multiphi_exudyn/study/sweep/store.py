@@ -1,10 +1,11 @@
 """File of finished runs: each is one row, there as a whole or not at all.
 
-SQLite, one transaction per run. Journal: write-ahead log, so that a commit is one append to a second file, readers and
-a writer do not wait for each other, and a process killed at any moment leaves either the run or nothing. Synchronous
-NORMAL: a commit does not wait for the disk. What the system holds outlives a killed process; a power failure may take
-the last runs, never the file, and those are then computed again. The log needs memory that its users share: all who
-write into one file are on one machine (workers elsewhere are not concerned, they hand their rows back).
+SQLite, one transaction per run (its environment, which many runs share, is there before). Journal: write-ahead log, so
+that a commit is one append to a second file, readers and a writer do not wait for each other, and a process killed at
+any moment leaves either the run or nothing. Synchronous NORMAL: a commit does not wait for the disk. What the system
+holds outlives a killed process; a power failure may take the last runs, never the file, and those are then computed
+again. The log needs memory that its users share: all who write into one file are on one machine (workers elsewhere are
+not concerned, they hand their rows back).
 
 A run's key is (name, sha256 of its parameters' canonical JSON): sorted, without blanks, 1 and 1.0 being different.
 A new file is made under a temporary name and linked to its own, so that nobody ever sees a part of it.
@@ -122,17 +123,12 @@ class Store:
         """
         if row.status not in STATUSES:
             raise MultiPhiValueError(f"row: status {row.status!r}; need one of {', '.join(STATUSES)}")
-        given, content = checked(parameters), plain(row.values, "values")
+        given, values = checked(parameters), plain(row.values, "values")
+        fields: dict[str, Any] = {"name": name, "key": key_of(given), "parameters": json.dumps(given)}
+        fields |= {"status": row.status, "message": row.message, "content": json.dumps(values)}
+        fields |= {"elapsed_s": row.elapsed_s, "finished": row.finished, "histories": histories}
         with self._sound():
-            environment = self._environment(row.environment)
-            fields: dict[str, Any] = {
-                "name": name,
-                "key": key_of(given),
-                "parameters": json.dumps(given),
-                "status": row.status,
-            }
-            fields |= {"message": row.message, "content": json.dumps(content), "elapsed_s": row.elapsed_s}
-            fields |= {"environment": environment, "finished": row.finished, "histories": histories}
+            fields["environment"] = self._environment(row.environment)
             places, marks = ", ".join(fields), ", ".join(f":{field}" for field in fields)
             order = f"INSERT INTO runs ({places}) VALUES ({marks}) ON CONFLICT DO NOTHING"
             return self._connection.execute(order, fields).rowcount == 1
