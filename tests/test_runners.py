@@ -11,8 +11,10 @@ from multiphi_exudyn import (
     NumericalFailure,
     RayleighDamping,
     planar_beam,
+    simulate,
 )
 from multiphi_exudyn.study.measures.metrics import nrmse
+from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -26,7 +28,6 @@ MODELS = [
     {"kind": "user-object", "name": "body", "step": 1e-4},
     {"kind": "user-object", "name": "coarse-body", "step": 4e-4},
     {"kind": "reduced", "name": "rigid", "contact": "rigid"},
-    {"kind": "reduced", "name": "compiled", "loop": "compiled"},
     {"kind": "craig-bampton", "name": "component", "modes": 12, "step": 1e-5},
     {"kind": "solve-ivp", "name": "stepwise", "method": "DOP853", "rtol": 1e-9},
     {"kind": "global-basis", "name": "one-basis", "modes": 8},
@@ -92,7 +93,6 @@ def test_a_body_with_a_coarse_step_is_put_on_the_common_grid(runs):
 
 def test_the_baselines_answer_as_the_models_they_replace(runs):
     for one, other, tolerance in (
-        ("compiled", "compliant", 1e-10),
         ("stepwise", "compliant", 1e-7),
         ("component", "all", 1e-4),
         ("one-basis", "all", 1e-5),
@@ -116,7 +116,23 @@ def test_labels_say_what_a_model_is(bench, runs):
     assert runs["component"].label == "Craig-Bampton in Exudyn, 2 interface points + 12 modes, step 10 µs"
     assert runs["stepwise"].label == "solve_ivp, DOP853, rtol 1e-09, compliant levels, r = 6"
     assert runs["one-rigid-basis"].label == "global basis, rigid levels, r = 8 from each of two"
-    assert runs["compiled"].label == runs["compliant"].label + ", compiled"
+
+
+@pytest.mark.parametrize("kind", ["reduced", "global-basis"])
+@pytest.mark.parametrize(("loop", "compiled"), [("numpy", False), ("compiled", True)])
+def test_the_loop_is_the_one_asked_for(tmp_path, monkeypatch, kind, loop, compiled):
+    asked = set()
+
+    def simulated(model, t_end, displacement, compiled):
+        asked.add(compiled)
+        return simulate(model, t_end, displacement, compiled=False)
+
+    monkeypatch.setattr(reduced_runner, "simulate", simulated)
+    models = [{"kind": kind, "name": "one", "loop": loop}]
+    run = run_model(bench_of(tmp_path, models=models, comparison={"reference": "one"}), "one", progress=False)
+    assert run.ok
+    assert asked == {compiled}
+    assert run.label.endswith(", compiled") is compiled
 
 
 def test_a_component_loaded_inside_starts_from_a_projection_and_says_so(tmp_path):
