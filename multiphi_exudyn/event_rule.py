@@ -195,7 +195,8 @@ class EventRule:
         value = own.sign(state.displacement, state.velocity)
         if value > 0:
             return Phase.ARMED
-        rate = own.rate_sign(state.velocity, state.level.acceleration(state.displacement, state.velocity))
+        acceleration = state.level.acceleration(state.displacement, state.velocity)
+        rate = own.rate_sign(state.velocity, acceleration, np.abs(state.level.level.omega * state.displacement))
         if value == 0 or rate == 0:
             table = SignalTable(state.level.level.response, [own, own], [False, True])
             value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))

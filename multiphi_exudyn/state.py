@@ -124,21 +124,25 @@ class Row:
         terms = self.position * displacement
         return sign_of(terms + self.rate * velocity if self._rated else terms, self.constant)
 
-    def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray) -> int:
-        """Sign of the time derivative, zero where it is round-off of its terms."""
+    def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray, swing: np.ndarray) -> int:
+        """Sign of the time derivative, zero where it is round-off of its terms; swing: speeds (r,) of the motion.
+
+        At a turning point all velocities may be round-off of what they were before.
+        """
         terms = self.position * velocity
-        return sign_of(terms + self.rate * acceleration if self._rated else terms, 0.0)
+        size = float(np.abs(self.position).dot(swing))
+        return sign_of(terms + self.rate * acceleration if self._rated else terms, 0.0, size)
 
     @functools.cached_property
     def _rated(self) -> bool:
         return bool(np.any(self.rate))
 
 
-def sign_of(terms: np.ndarray, constant: float) -> int:
-    """Sign of a sum, zero where it is round-off of its terms."""
+def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
+    """Sign of a sum, zero where it is round-off of its terms and of ``size``."""
     values = terms.tolist()
     value = sum(values) + constant
-    if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant)):
+    if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant) + size):
         return 0
     return 1 if value > 0 else -1
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multiphi_exudyn.compiled.search import BOUNDS, SHORTEST
+from multiphi_exudyn.compiled.waves import BOUNDS, SHORTEST
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.state import Row
 from multiphi_exudyn.transition import LoadedLevel
