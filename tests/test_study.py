@@ -13,6 +13,7 @@ from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
 
+SHIPPED = ("budget", "initial-displacement", "modes", "modes-rigid", "pareto", "sets")
 STUDY = {
     "title": "a small study",
     "scene": "small.toml",
@@ -120,8 +121,9 @@ class TestCases:
             load_study("paretto")
 
     @pytest.mark.parametrize("quick", [False, True])
-    @pytest.mark.parametrize("name", list(shipped_studies()))
+    @pytest.mark.parametrize("name", SHIPPED)
     def test_the_shipped_studies_are_sound(self, name, quick):
+        assert tuple(shipped_studies()) == SHIPPED
         study = load_study(name, quick=quick)
         assert study.runs(study.points[0]) or study.budgets()
 

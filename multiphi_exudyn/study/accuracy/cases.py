@@ -115,7 +115,8 @@ class Study:
 
 def shipped_studies() -> dict[str, str]:
     """name -> title of the studies that come with the package."""
-    return {path.stem: load_study(path.stem).file.title for path in sorted(_shipped_folder().glob("*.toml"))}
+    names = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
+    return {name: load_study(name).file.title for name in names}
 
 
 def load_study(source: str, *, quick: bool = False) -> Study:
