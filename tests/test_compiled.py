@@ -55,7 +55,7 @@ def assert_same(expected, found, tolerance):
 
 
 def stopped(run):
-    """Whether an impact has stopped all motion, of one mode for instance: signs after it are round-off in either loop."""
+    """Whether an impact has stopped all motion, of one mode say: signs after it are round-off in either loop."""
     velocities = [run.velocity(event.time) for event in run.events if event.impulse]
     mass = run.model.structure.mass
     return any(v @ mass @ v < 1e-20 * run.ledger.initial for v in velocities)

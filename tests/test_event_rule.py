@@ -89,6 +89,15 @@ class TestWhateverTheScene:
             assert np.min(force) >= -1e-8 * max(1.0, np.max(np.abs(force)))
 
 
+@pytest.mark.parametrize(("seed", "damping"), [(199, "given"), (1047, "given"), (1429, "modal"), (2747, "given")])
+def test_a_rigid_contact_does_not_wait_for_its_reaction_to_rise_to_zero(seed, damping):
+    """Closed at the start, with a reaction that truncation has put below zero and that rises: it opens at once."""
+    m, run = random_run(seed, t_end=3.0, damping=damping, kind="rigid")
+    assert [event.kind for event in run.events if event.time == 0][:2] == ["close", "open"]
+    t = np.linspace(0, 3, 3001)
+    assert min(np.min(run.contact_force(contact.name, t)) for contact in m.contacts) >= -1e-9
+
+
 class TestSmallestScenes:
     def test_a_refused_contact_asks_only_where_it_may_close(self):
         """80 of 122 modes: the reaction of the level to enter is round-off of terms 1e9 times as large."""
