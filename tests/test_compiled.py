@@ -1,5 +1,6 @@
 """The compiled loop gives the NumPy loop's answer: same events, phases, losses and messages, states to round-off."""
 
+import importlib
 import math
 import subprocess
 import sys
@@ -221,6 +222,17 @@ class TestWithoutNumba:
     def test_the_compiled_one_is_refused(self):
         with pytest.raises(MultiPhiError, match="need it: pip install multiphi-exudyn\\[fast\\]"):
             mp.simulate(oscillator(), 1.0, compiled=True)
+
+
+def test_no_place_for_a_cache_only_costs_time(monkeypatch):
+    caching = pytest.importorskip("numba.core.caching")
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+    waves = importlib.import_module("multiphi_exudyn.compiled.waves")
+
+    def doubled(x):
+        return 2 * x
+
+    assert waves.cached(doubled)(3.5) == 7.0
 
 
 def test_numba_is_loaded_by_the_first_run_alone():

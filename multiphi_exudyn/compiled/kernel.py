@@ -7,7 +7,6 @@ others is seen when the cache (``__pycache__``) has been removed.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from multiphi_exudyn.compiled.decision import (
@@ -24,7 +23,7 @@ from multiphi_exudyn.compiled.decision import (
 )
 from multiphi_exudyn.compiled.pack import Levels
 from multiphi_exudyn.compiled.search import FOUND, UNDECIDED, first_descent, meets_another
-from multiphi_exudyn.compiled.waves import BOUNDS, copy, exponentials, inlined, jit
+from multiphi_exudyn.compiled.waves import BOUNDS, cached, copy, exponentials, inlined, jit
 
 __all__ = ["CHATTER", "CLOSE", "DONE", "FULL", "LEFT", "run"]
 
@@ -82,7 +81,7 @@ def note(event: np.ndarray, kind: np.ndarray, time: float, amounts: np.ndarray, 
     kind[0], kind[1] = contact, change
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def run(
     k: Levels,
     a: int,

@@ -8,6 +8,8 @@ and a series for what is shorter than the tabulated lengths, so that no run of a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numba
 import numpy as np
@@ -15,6 +17,7 @@ import numpy as np
 __all__ = [
     "BOUNDS",
     "SHORTEST",
+    "cached",
     "copy",
     "derivatives",
     "exponentials",
@@ -33,6 +36,14 @@ BOUNDS = 6  # derivatives that are bounded: g to its fifth
 
 jit = numba.njit(error_model="numpy")
 inlined = numba.njit(error_model="numpy", forceinline=True)  # a call would copy the levels' many arrays
+
+
+def cached(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``function`` compiled when it is first called, and kept on disk where there is a place for it."""
+    try:
+        return numba.njit(function, cache=True, nogil=True, error_model="numpy")
+    except RuntimeError:  # neither beside the source nor in the user's cache folder
+        return numba.njit(function, nogil=True, error_model="numpy")
 
 
 @jit
