@@ -200,6 +200,8 @@ class DescentFinder:
         for s, constant in enumerate(constants):
             limit = HERMITE * step**4 * bounds[s][4] - constant
             doubtful = (controls[s] <= limit).nonzero()[0].tolist()
+            if doubtful and doubtful[0] < 3 and _lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
+                doubtful = [k for k in doubtful if k > 2]
             if doubtful:
                 search = _Search(self, self._derivatives(local[s], SAMPLED), constant, bounds[s])
                 end = (horizon if first is None else first.time) - start
@@ -252,6 +254,7 @@ class _Search:
     def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
         self._finder = finder
         self._basis = finder.basis
+        self._rates = finder.basis.rates if finder.basis.pure else None
         self._rows = _parts(derivatives)
         self._constant = constant
         self._bounds = bounds
@@ -297,8 +300,7 @@ class _Search:
     def _point(self, t: float) -> list[float]:
         """g and its first four derivatives at t."""
         self._finder.evaluations += 1
-        basis = self._basis
-        samples = np.exp(basis.rates * t) if basis.pure else basis.at(t)
+        samples = self._basis.at(t) if self._rates is None else np.exp(self._rates * t)
         values: list[float] = self._rows.dot(samples.view(float)).tolist()
         values[0] += self._constant
         return values
@@ -383,6 +385,15 @@ class _Search:
                     return min(max(following, left), right)
             t = following if slope and left < following < right else (left + right) / 2
         return t
+
+
+def _lifts_off(controls: list[float], constant: float, width: float, bounds: list[float]) -> bool:
+    """``_Search._rises`` by the Bernstein coefficients of an interval, without their constant."""
+    left, inner_left, inner_right, right = controls
+    if left + constant < -ZERO * (bounds[0] + abs(constant)):
+        return False
+    lifted = min(3 * (inner_left + constant), 1.5 * (inner_right + constant), right + constant)
+    return lifted > LIFTED * width**4 * bounds[4]
 
 
 def _parts(coefficients: np.ndarray) -> np.ndarray:

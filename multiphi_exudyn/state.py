@@ -130,12 +130,16 @@ class Row:
         At a turning point all velocities may be round-off of what they were before.
         """
         terms = self.position * velocity
-        size = float(np.abs(self.position).dot(swing))
+        size = float(self._sizes.dot(swing))
         return sign_of(terms + self.rate * acceleration if self._rated else terms, 0.0, size)
 
     @functools.cached_property
     def _rated(self) -> bool:
         return bool(np.any(self.rate))
+
+    @functools.cached_property
+    def _sizes(self) -> np.ndarray:
+        return np.abs(self.position)
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:

@@ -206,6 +206,15 @@ class TestFailures:
         assert runs[1].stats.function_evaluations > 1.5 * runs[0].stats.function_evaluations
 
 
+@pytest.mark.parametrize(("value", "risen"), [(0.0, True), (1e-3, True), (-1e-3, False)])
+def test_only_what_starts_at_zero_or_above_rises(value, risen):
+    """g = value + t: a straight line, whose bounds are those of its slope; below zero it has fallen already."""
+    search = pytest.importorskip("multiphi_exudyn.compiled.search")
+    left, right, bounds = np.array([value, 1.0]), np.array([value + 1, 1.0]), np.array([1.0, 1, 0, 0, 0, 0])
+    line = (value, np.zeros((2, 1)), np.zeros((2, 1)), np.ones((2, 1)), 1)
+    assert search.rises.py_func(left, right, 1.0, bounds, *line) is risen
+
+
 class TestWithoutNumba:
     @pytest.fixture(autouse=True)
     @staticmethod
