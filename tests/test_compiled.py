@@ -215,6 +215,16 @@ def test_only_what_starts_at_zero_or_above_rises(value, risen):
     assert search.rises.py_func(left, right, 1.0, bounds, *line) is risen
 
 
+@pytest.mark.parametrize(("value", "slope", "meets"), [(1e-13, -1.0, True), (1e-13, 1.0, False), (1e-9, -1.0, False)])
+def test_a_second_signal_that_falls_through_zero_at_the_root_is_seen(value, slope, meets):
+    """Two signals where the one exponential is 1: the first is at its root, the second ``value`` above zero."""
+    search = pytest.importorskip("multiphi_exudyn.compiled.search")
+    signals, slopes = np.zeros((2, 2, 1)), np.zeros((2, 2, 1))
+    signals[1, 0, 0], slopes[1, 0, 0] = 1 + value, slope
+    phi = np.array([[1.0], [0.0]])
+    assert search.meets_another.py_func(0, signals, slopes, np.array([0.0, -1.0]), 2, phi, 1) is meets
+
+
 class TestWithoutNumba:
     @pytest.fixture(autouse=True)
     @staticmethod
