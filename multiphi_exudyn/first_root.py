@@ -61,7 +61,8 @@ class Descent:
 class DescentFinder:
     """Finds first descents of signals on one basis of exponentials; keeps that basis' sample tables.
 
-    refine: factor on the density of the samples (the answer does not depend on it; the work does).
+    refine: factor on the density of the samples (the answer does not depend on it; the work does). The compiled loop
+    takes it when it first meets the level.
     """
 
     def __init__(self, basis: Exponentials, refine: float = 1.0) -> None:
