@@ -10,6 +10,7 @@ from small_study import result_of, row, small_study, timing
 
 from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
+    Setting,
     cheapest,
     front,
     full_methods,
@@ -227,3 +228,20 @@ def test_settings_are_said_in_words():
         "rtol = 1e-06, contact = rigid, start.displacement = 0.02"
     )
     assert words({}) == ""
+
+
+def test_a_setting_lasts_where_every_finer_one_holds_too():
+    """Errors of mesh and step cancel at steps 4 and 2; the mesh error shows at step 1."""
+    errors = {(6, 8): 0.05, (6, 4): 0.004, (6, 2): 0.006, (6, 1): 0.02, (9, 2): 0.008, (9, 1): None}
+    rows = [row("full", error, setting={"elements": n, "step": h}) for (n, h), error in errors.items()]
+    method = {"name": "full", "model": {"kind": "full"}}
+    found = settings(result_of(rows, methods=[method | {"refine": "step"}]))
+    assert [s.lasting_error for s in found] == [0.05, 0.02, 0.02, 0.02, None, None]
+    assert all(s.lasting_error == s.error for s in settings(result_of(rows, methods=[method])))
+
+
+def test_the_cheapest_lasting_setting_is_another_one():
+    lucky = Setting("m", {}, {"step": 2}, 0.01, 0.01, "", {}, {"online_s": 1.0}, lasting_error=0.05)
+    sound = Setting("m", {}, {"step": 1}, 0.01, 0.01, "", {}, {"online_s": 2.0}, lasting_error=0.01)
+    assert cheapest([lucky, sound], 0.02) == {"m": lucky}
+    assert cheapest([lucky, sound], 0.02, lasting=True) == {"m": sound}

@@ -309,3 +309,12 @@ def test_a_label_in_a_corner_stays_inside_even_where_it_covers_points():
     box = axes.texts[-1].get_window_extent()
     assert box.x1 < axes.bbox.x1
     assert box.y1 < axes.bbox.y1
+
+
+def test_lasting_settings_have_a_table_of_their_own():
+    methods = [m | ({"refine": "step"} if "step" in m["axes"] else {}) for m in METHODS]
+    told = render_study(small_study(methods=methods))
+    assert told.count("times faster than the full model") == 2 * render_study(small_study()).count(
+        "times faster than the full model"
+    )
+    assert "where every finer setting has to hold it too" in told

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
@@ -86,7 +86,9 @@ class StudyResult:
         groups: dict[str, list[Row]] = {}
         for row in self.rows:
             groups.setdefault(_setting_key(row), []).append(row)
-        return tuple(_setting(self, group, timings.get(key)) for key, group in groups.items())
+        alone = [_setting(self, group, timings.get(key)) for key, group in groups.items()]
+        finer = {method.name: method.refine for method in self.study.methods}
+        return tuple(replace(each, lasting_error=_lasting(each, alone, finer.get(each.method))) for each in alone)
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,9 @@ class Setting:
     """One setting of a method at one point of the scene's axes.
 
     error: the worst of the nearby runs; None where one of them has none, and message names the cause.
-    own_error: of the setting itself. values, timing: of its own run in the error and in the timing pass, {} without.
+    own_error: of the setting itself. lasting_error: the worst of it and of every finer setting that was tried, finer
+    in its method's field ``refine`` alone; of methods without such a field its error.
+    values, timing: of its own run in the error and in the timing pass, {} without.
     """
 
     method: str
@@ -105,6 +109,7 @@ class Setting:
     message: str
     values: Mapping[str, Any]
     timing: Mapping[str, Any]
+    lasting_error: float | None = None
 
     @property
     def online_s(self) -> float | None:
@@ -174,9 +179,13 @@ def front(settings: Sequence[Setting]) -> list[Setting]:
     return kept
 
 
-def cheapest(settings: Sequence[Setting], tolerance: float) -> dict[str, Setting | None]:
-    """For each method the fastest setting whose error holds the tolerance; None where there is none."""
-    return {name: _fastest([s for s in settings if s.method == name], tolerance) for name in names_of(settings)}
+def cheapest(settings: Sequence[Setting], tolerance: float, lasting: bool = False) -> dict[str, Setting | None]:
+    """For each method the fastest setting whose error holds the tolerance; None where there is none.
+
+    lasting: whether its lasting error has to.
+    """
+    chosen = [s for s in settings if _holds(s.lasting_error if lasting else s.error, tolerance)]
+    return {name: next(iter(front([s for s in chosen if s.method == name])), None) for name in names_of(settings)}
 
 
 def times_faster(chosen: Mapping[str, Setting | None], full: Sequence[str]) -> dict[str, float | None]:
@@ -256,8 +265,26 @@ def _coarser(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
     return [s for s in references(result) if s.method == COARSER and s.at == at]
 
 
-def _fastest(settings: Sequence[Setting], tolerance: float) -> Setting | None:
-    return next(iter(front([s for s in settings if s.error is not None and s.error <= tolerance])), None)
+def _holds(error: float | None, tolerance: float) -> bool:
+    return error is not None and error <= tolerance
+
+
+def _lasting(own: Setting, others: Sequence[Setting], refine: str | None) -> float | None:
+    """The worst error of ``own`` and of those that differ from it by a smaller value of ``refine`` only."""
+    if refine is None or refine not in own.setting:
+        return own.error
+    finer = [s.error for s in others if _coarseness(s, refine) == _coarseness(own, refine) and _finer(s, own, refine)]
+    known = [error for error in finer if error is not None]
+    return max(known) if len(known) == len(finer) else None
+
+
+def _coarseness(setting: Setting, refine: str) -> str:
+    """Equal for settings that differ in ``refine`` at most."""
+    return key_of({"method": setting.method, "at": setting.at, "setting": {**setting.setting, refine: None}})
+
+
+def _finer(setting: Setting, own: Setting, refine: str) -> bool:
+    return refine in setting.setting and setting.setting[refine] <= own.setting[refine]
 
 
 def _word(field: str, value: Any) -> str:

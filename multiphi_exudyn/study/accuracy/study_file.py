@@ -3,6 +3,7 @@
 A *field* is a place in a scene file, written with dots ("start.displacement"). A *setting* is one choice of a method's
 own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
 be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
+Errors of mesh and step can cancel for a whole range of steps: a setting *lasts* where every finer one holds as well.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ class MethodSpec(Table):
     model: dict[str, Any]
     axes: dict[str, Values] = Field(default_factory=dict)
     nearby: dict[str, Factors] = Field(default_factory=dict)  # field -> factors on its value
+    refine: str | None = None  # field whose smaller values are finer: a setting lasts if all finer ones hold too
     quick: dict[str, Values] = Field(default_factory=dict)  # axes of the short form, in place of those of the same name
 
 
@@ -48,10 +50,11 @@ class StudyFile(Table):
 
     scene: a shipped scene or a TOML file beside the study. change: field -> value, for all runs. axes: field -> values;
     every method runs at every combination of them. reference, coarser: models that take the place of the scene's own
-    reference and its coarser copy; a reference without a copy has no uncertainty. window [s]: the errors that are ranked are those from 0 to here.
-    tolerances: for which the cheapest settings are looked up. time_limit_s: of one run, wall clock.
-    timing: whether settings are timed, alone on the machine. histories: keep those of every run.
-    maps: methods whose time-frequency maps are drawn, each at its most accurate setting, beside the reference's.
+    reference and its coarser copy; a reference without a copy has no uncertainty.
+    window [s]: the errors that are ranked are those from 0 to here. tolerances: for which the cheapest settings are
+    looked up. time_limit_s: of one run, wall clock. timing: whether settings are timed, alone on the machine.
+    histories: keep those of every run. maps: methods whose time-frequency maps are drawn, each at its most accurate
+    setting, beside the reference's.
     """
 
     title: Annotated[str, Field(min_length=1)]

@@ -70,9 +70,12 @@ def shown_points(result: StudyResult) -> list[Mapping[str, Any]]:
     return (timed or points(result))[:MOST_POINTS]
 
 
-def choices(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> list[Choice]:
-    """Every method's cheapest setting for a tolerance at one point of the scene's axes, the fastest first."""
-    chosen = cheapest(settings_at(result, at), tolerance)
+def choices(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasting: bool = False) -> list[Choice]:
+    """Every method's cheapest setting for a tolerance at one point of the scene's axes, the fastest first.
+
+    lasting: whether every finer setting has to hold it as well.
+    """
+    chosen = cheapest(settings_at(result, at), tolerance, lasting)
     faster = times_faster(chosen, full_methods(result))
     found = [Choice(name, setting, faster[name]) for name, setting in chosen.items()]
     return sorted(found, key=lambda choice: _time(choice.setting))
@@ -148,9 +151,19 @@ def _cheapest_words(result: StudyResult, at: Mapping[str, Any], tolerance: float
     if best.faster is None and full:
         faster = "; no full model does"
     elif best.faster is not None and best.method not in full:
-        faster = f", {times(best.faster)} faster than the cheapest full model that does"
+        faster = (
+            f", {times(best.faster)} faster than the cheapest full model that does{_lastingly(result, at, tolerance)}"
+        )
     online = seconds(best.setting.online_s)
     return f"The cheapest that reaches {share(tolerance)} is {_named(best.setting)}: {online}{faster}."
+
+
+def _lastingly(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> str:
+    """How much faster where a setting has to hold the tolerance at every finer step as well."""
+    if not any(method.refine for method in result.study.methods):
+        return ""
+    best = choices(result, at, tolerance, lasting=True)[0]
+    return f" ({times(best.faster)}, where every finer setting has to hold it too)" if best.faster is not None else ""
 
 
 def _distrust(result: StudyResult) -> Iterable[str]:

@@ -88,6 +88,7 @@ def render_study(result: StudyResult) -> str:
         shown=[_point(result, at) for at in shown_points(result)],
         count=len(points(result)),
         choices=choices,
+        kinds=[False, True] if any(method.refine for method in result.study.methods) else [False],
         full=full_methods(result),
         error_words=error_words,
         timing=timing_words(result),
