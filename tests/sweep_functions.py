@@ -61,7 +61,8 @@ def exudyn_steps(case):
     """A unit mass under a unit force for 1 s, with a user function in each of the steps."""
     import exudyn  # not what every worker of every test should load
 
-    exudyn.config.printToConsole = False
+    from reference_models.exudyn_quiet import quiet
+
     mbs = exudyn.SystemContainer().AddSystem()
     mass = mbs.CreateMassPoint(mass=1.0)
     mbs.CreateForce(itemNumber=mass, loadVector=[1.0, 0.0, 0.0])
@@ -72,7 +73,8 @@ def exudyn_steps(case):
     settings.timeIntegration.endTime = 1.0
     settings.timeIntegration.verboseMode = 0
     settings.solution.file.write = False
-    mbs.SolveDynamic(settings)
+    with quiet():
+        mbs.SolveDynamic(settings)
     return {"position": mbs.GetObjectOutputBody(mass, exudyn.OutputVariableType.Position)[0]}
 
 
