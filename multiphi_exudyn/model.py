@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -83,7 +84,7 @@ class MultiPhiModel:
         if not self._can_share():
             object.__setattr__(self, "_shared", {"structure": self.structure, "contacts": self.contacts, "levels": {}})
 
-    @property
+    @functools.cached_property
     def base(self) -> Base:
         """Coordinates common to all levels, built on first use."""
         if "base" not in self._shared:
