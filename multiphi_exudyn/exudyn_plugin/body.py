@@ -168,6 +168,9 @@ class MultiPhiBody:
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
             return
+        if self._alone:
+            self._write(mbs, state, force)
+            return
         reaction = own.force(after) - self._applied(mbs)  # of constraints: known from the level before
         self._write(mbs, state, force)
         present = self._significant(self._applied(mbs) + reaction, after)
@@ -201,9 +204,10 @@ class MultiPhiBody:
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
 
     def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """The modal force, or zeros where it is what an iterative solver leaves of the accelerations in x."""
+        """The modal force; zeros where it is what an iterative solver leaves of the accelerations in x, and alone."""
         q_tt = x[2 * self._size : -1]
-        return force if force.dot(force) > NEGLIGIBLE**2 * q_tt.dot(q_tt) else np.zeros(self._size)
+        acts = not self._alone and force.dot(force) > NEGLIGIBLE**2 * q_tt.dot(q_tt)
+        return force if acts else np.zeros(self._size)
 
     def _applied(self, mbs: Any) -> np.ndarray:
         """Modal force (s,) of loads and connectors in the present state of the system."""
