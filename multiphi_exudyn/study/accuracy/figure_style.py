@@ -103,7 +103,7 @@ def uncertainty_band(axes: Axes, own: float | None) -> None:
         lowest, highest = axes.get_ylim()
         axes.axhspan(min(lowest, 100 * own) / 1e3, 100 * own, color=CONTACT, lw=0, zorder=0)
         axes.set_ylim(min(lowest, 50 * own), max(highest, 200 * own))
-        note(axes, "the reference's own uncertainty", (0.01, 100 * own), axes.get_yaxis_transform(), (0, -3), va="top")
+        note(axes, "grey: below the reference's own uncertainty", (0.01, 0.0), axes.transAxes, (0, 4), va="bottom")
 
 
 def note(
