@@ -16,6 +16,7 @@ from multiphi_exudyn import (
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import damping_matrix, prepare, start_configuration
@@ -248,3 +249,11 @@ def test_modes_and_a_tolerance_are_refused(tmp_path):
     data = changed(["models", 1], {"kind": "reduced", "name": "both", "tolerance": 0.01, "modes": 3})
     with pytest.raises(MultiPhiValueError, match=r"models\[1\].*need modes or a tolerance, not both"):
         load_scene(write(tmp_path / "scene.toml", data))
+
+
+def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once():
+    for duration, expected in ((0.001, 100), (0.03, 7), (0.5, 3), (3.0, 0)):
+        result, first, repeats = repeated(lambda duration=duration: ("answer", duration), 7)
+        assert (result, first) == ("answer", duration)
+        assert abs(len(repeats) - expected) <= 1
+    assert repeated(lambda: ("answer", 0.001), 0)[2] == ()

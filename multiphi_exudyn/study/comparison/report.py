@@ -20,6 +20,7 @@ from reference_models.rig import rig
 __all__ = ["render"]
 
 TEMPLATE = "report.html.j2"
+DEFINED = ("nrmse", "horizon", "first_contact", "inner_losses", "closed_time", "impulse", "ledger")  # on the page
 HISTORY = (
     "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
@@ -49,6 +50,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
         levels=levels,
         losses=losses,
         metrics=metrics,
+        definitions=[metrics.METRICS[name] for name in DEFINED],
         pictures=list(_pictures(comparison, levels)),
         contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
     )

@@ -11,6 +11,7 @@ __all__ = ["repeated", "timed"]
 T = TypeVar("T")
 
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
+STEADY_S = 0.1  # s, over which runs of milliseconds are repeated: a machine is now faster, now slower
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
@@ -20,13 +21,15 @@ def timed(run: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - started
 
 
-def repeated(run: Callable[[], tuple[T, float]], most: int) -> tuple[T, float, tuple[float, ...]]:
+def repeated(run: Callable[[], tuple[T, float]], fewest: int) -> tuple[T, float, tuple[float, ...]]:
     """Of a run that gives (result, seconds): the first result, its time, and the times of the repeats.
 
-    There are ``most`` of them, as far as they fit into REPEAT_BUDGET_S.
+    There are ``fewest`` of them as far as they fit into REPEAT_BUDGET_S, none for 0; more of short runs, for STEADY_S.
     """
     result, first = run()
     repeats: list[float] = []
-    while len(repeats) < most and first + sum(repeats) < REPEAT_BUDGET_S:
+    spent = 0.0
+    while fewest and (len(repeats) < fewest or spent < STEADY_S) and first + spent < REPEAT_BUDGET_S:
         repeats.append(run()[1])
+        spent += repeats[-1]
     return result, first, tuple(repeats)

@@ -51,7 +51,7 @@ class Workbench:
 
     structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
     longest_period: of the open level [s]; infinite where it has a rigid-body mode.
-    repeats: of a model's online part, for its time.
+    repeats: of a model's online part, for its time; more where it is short.
     """
 
     scene: Scene
