@@ -40,11 +40,11 @@ def _complete(result: StudyResult) -> bool:
 
 
 def _tell(result: StudyResult, folder: Path) -> None:
-    """The cheapest setting of every method for every tolerance, at the first point of the axes."""
-    at = points(result)[0]
+    """The cheapest setting of every method for every tolerance, at the first point of the axes, if it was timed."""
+    at = points(result)[0] if result.rows else {}
     known = [setting for setting in settings(result) if setting.at == at]
     full = full_methods_of(result)
-    for tolerance in result.study.tolerances:
+    for tolerance in result.study.tolerances if result.timings else ():
         chosen = cheapest(known, tolerance)
         faster = times_faster(chosen, full)
         print(f"\ncheapest within {percent(tolerance)} to {result.window:g} s{', ' + words(at) if at else ''}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import scipy.stats
 
-from multiphi_exudyn.study.accuracy.analysis import StudyResult, error_of
+from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, StudyResult, error_of
 
 __all__ = ["Correlation", "indicators", "rank_correlation"]
 
@@ -25,10 +25,10 @@ class Correlation:
 
 
 def indicators(result: StudyResult) -> dict[str, list[tuple[float | None, float | None]]]:
-    """Method -> (indicator, error) of every run that has an indicator, nearby ones included."""
+    """Method -> (indicator, error) of every run of it that has an indicator, nearby ones included."""
     found: dict[str, list[tuple[float | None, float | None]]] = {}
     for row in result.rows:
-        if row.values.get("indicator") is not None:
+        if row.values.get("indicator") is not None and row.parameters["method"] not in (REFERENCE, COARSER):
             found.setdefault(row.parameters["method"], []).append((row.values["indicator"], error_of(result, row)))
     return found
 

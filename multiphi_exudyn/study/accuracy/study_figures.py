@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
@@ -95,7 +95,8 @@ def indicator_figure(result: StudyResult) -> Figure | None:
     axes.set(xscale="log", yscale="log")
     for name, found in pairs.items():
         known = np.array([(100 * i, 100 * e) for i, e in found if i and e]).reshape(-1, 2)
-        axes.plot(*known.T, linestyle="None", **marks(styles(result)[name]), label=name)
+        if len(known):
+            axes.plot(*known.T, linestyle="None", **marks(styles(result)[name]), label=name)
     line = axes.dataLim.intervalx if axes.has_data() else (1.0, 1.0)
     axes.plot(line, line, color=LINE, lw=1, label="equal", zorder=0)
     coefficient = "unknown" if correlation.coefficient is None else f"{correlation.coefficient:.2f}"
@@ -125,6 +126,7 @@ def along_figure(result: StudyResult, axis: str) -> Figure:
             percent_axis(axes)
         else:
             axes.set_ylabel(f"losses of contact\nin the first phase, {table.contact}")
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     value_axis(panels[-1], axis, tables[-1].values)
     legend_below(figure, panels)
     return figure
