@@ -318,3 +318,27 @@ def test_lasting_settings_have_a_table_of_their_own():
         "times faster than the full model"
     )
     assert "where every finer setting has to hold it too" in told
+
+
+def test_budgets_without_methods_are_told_in_words():
+    parts = [
+        {"cause": "contact law", "size": 0.1, "share": 0.8, "uncertainty": 1e-6},
+        {"cause": "modal truncation", "size": 0.04, "share": 0.204, "uncertainty": 1e-6},
+        {"cause": "time integration", "size": 1e-4, "share": -0.004, "uncertainty": 1e-6},
+    ]
+    whole = {"total": 0.12, "parts": parts, "explained": True}
+    values = {"windows": {"0.1": {"rigid": {"all": None}}, "0.3": {"rigid": {"all": whole}}}}
+    rows = [row("budget", at={"start.displacement": 0.02}), row("budget", at={"start.displacement": 0.05})]
+    rows += [row("budget", at={"start.displacement": 0.06}, status="failed", message="why")]
+    rows[:2] = [
+        replace(rows[0], values=values),
+        replace(rows[1], values={"windows": {"0.1": {"rigid": {"all": None}}}}),
+    ]
+    told = findings(result_of([], budgets=tuple(rows), methods=[]))
+    assert told.asked.startswith("Where does the difference between the full and the reduced model come from?")
+    assert [line.partition(": ")[2] for line in told.outcome] == [
+        "rigid levels, to 0.3 s: 12.0 % in all, of which contact law 80 %, modal truncation 20 %; "
+        "the parts explain it.",
+        "rigid levels, to 0.1 s: fewer than two of the models ran.",
+        "failed, why.",
+    ]

@@ -1,7 +1,7 @@
 """Command line: ``multiphi-exudyn compare | budget | study | scenes | studies``.
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
-every reference and at least one setting of every method ran; settings that fail are rows with their cause.
+all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ STORE = "runs.sqlite"
 
 
 def run_study_file(source: str, out: Path | None, quick: bool, where: str, workers: int | None) -> bool:
-    """Run a study into its folder; True if every reference and at least one setting of every method ran."""
+    """Run a study into its folder; True if all references and budgets, and one setting of every method, ran."""
     study = load_study(source, quick=quick)
     folder = results_folder(out or Path(f"multiphi-{study.name}"))
     with Store(folder / STORE) as store, open_executor(where, workers) as executor:
@@ -36,7 +36,8 @@ def run_study_file(source: str, out: Path | None, quick: bool, where: str, worke
 def _complete(result: StudyResult) -> bool:
     ran = {row.parameters["method"] for row in result.rows if row.status == "ok"}
     references = all(row.status == "ok" for row in result.rows if row.parameters["method"] == "reference")
-    return references and {method.name for method in result.study.methods} <= ran
+    budgets = all(row.status == "ok" for row in result.budgets)
+    return references and budgets and {method.name for method in result.study.methods} <= ran
 
 
 def _tell(result: StudyResult, folder: Path) -> None:
@@ -56,5 +57,6 @@ def _tell(result: StudyResult, folder: Path) -> None:
                 f"{seconds(setting.online_s or 0.0):>9}  {times(faster[name]):>12}  {percent(setting.error or 0.0):>8}"
             )
             print(f"  {name:32}  {line}  {words(setting.setting)}")
-    failed = sum(row.status != "ok" for row in result.rows)
-    print(f"\n{len(result.rows)} runs, {failed} without an answer\n{folder / 'report.html'}")
+    rows = result.rows + result.budgets
+    failed = sum(row.status != "ok" for row in rows)
+    print(f"\n{len(rows)} runs, {failed} without an answer\n{folder / 'report.html'}")

@@ -88,7 +88,7 @@ def run_study(study: Study, store: Store, executor: Executor | None = None, prog
     def passed(function: Function, cases: Sequence[Parameters], name: str, **how: Any) -> tuple[Row, ...]:
         return sweep(function, cases, store, name, budget_s=study.file.time_limit_s, progress=progress, **how)
 
-    references = [study.reference(at) for at in study.points]
+    references = [study.reference(at) for at in study.points if study.file.methods]
     rows = list(passed(MeasuredRun(study, None), references, ERRORS, executor=executor, keep_histories=True))
     for case in references:
         measured = MeasuredRun(study, _stored(store, case))

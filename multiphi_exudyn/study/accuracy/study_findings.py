@@ -22,6 +22,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     uncertainty,
     words,
 )
+from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
 from multiphi_exudyn.study.comparison.findings import percent, seconds, times
 
 __all__ = [
@@ -112,6 +113,8 @@ def timing_words(result: StudyResult) -> str:
 
 
 def _asked(result: StudyResult) -> str:
+    if not result.study.methods:
+        return budget_asked(result)
     given, window = settings(result), f"{result.window:g} s"
     axes = result.study.axes
     where = f", at {len(points(result))} points of {' × '.join(axes)}" if axes else ""
@@ -124,7 +127,7 @@ def _asked(result: StudyResult) -> str:
 
 
 def _outcome(result: StudyResult) -> Iterable[str]:
-    """One sentence per tolerance; where there are several points, one line per point."""
+    """One sentence per tolerance; where there are several points, one line per point. Then the budgets."""
     shown = shown_points(result)
     for at in shown:
         found = list(_outcome_at(result, at))
@@ -132,6 +135,7 @@ def _outcome(result: StudyResult) -> Iterable[str]:
             yield from found
         elif found:
             yield f"At {words(at)}: {' '.join(found)}"
+    yield from budget_outcome(result)
 
 
 def _outcome_at(result: StudyResult, at: Mapping[str, Any]) -> Iterable[str]:
