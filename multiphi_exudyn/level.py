@@ -82,6 +82,11 @@ class Base:
         return np.array([contact.gap for contact in self.contacts])
 
     @functools.cached_property
+    def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """|H| (m, c) and |gaps| (c,): with them a gap's round-off is judged."""
+        return np.abs(self.directions), np.abs(self.gaps)
+
+    @functools.cached_property
     def stiffnesses(self) -> np.ndarray:
         """Contact stiffnesses (c,) [N/m], inf where rigid."""
         return np.array([contact.stiffness for contact in self.contacts])

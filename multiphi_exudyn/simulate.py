@@ -249,7 +249,8 @@ def _start(model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.n
     base = model.base
     y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
     gaps = (y @ base.directions + base.gaps).tolist()
-    scales = (TOUCHING * (np.abs(base.gaps) + np.abs(y) @ np.abs(base.directions))).tolist()
+    directions, initial = base.magnitudes
+    scales = (TOUCHING * (initial + np.abs(y) @ directions)).tolist()
     penetrating, touching = list[int](), list[int]()
     for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
         if contact.rigid and gap < -scale:

@@ -14,7 +14,7 @@ from multiphi_exudyn.trajectory import Segment
 
 __all__ = ["NUMBERS", "PHASES", "Record"]
 
-ROWS = 256  # at first
+ROWS = 128  # at first
 PHASES = tuple(Phase)
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
