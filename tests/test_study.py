@@ -84,6 +84,20 @@ class TestCases:
             other = load_study(study_file(change))
             assert first.runs(first.points[0])[1] != other.runs(other.points[0])[1]
 
+    def test_the_matrices_and_the_versions_that_made_a_run_belong_to_it(self, tmp_path, study_file, monkeypatch):
+        scene = SCENE | {"structure": {"matrices": "beam.npz", "points": {"tip": 1}}, "contacts": [], "damping": None}
+        scene |= {"start": {"load_at": "tip", "force": 1.0}}
+        del scene["damping"]
+        write(tmp_path / "small.toml", scene)
+        found = []
+        for stiffness in (3.0, 4.0):
+            np.savez(tmp_path / "beam.npz", mass=np.eye(20), stiffness=stiffness * np.eye(20))
+            study = load_study(study_file(STUDY | {"axes": {}, "quick": {}}))
+            found.append(study.runs({})[1]["content"])
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.cases._versions", lambda: {"exudyn": "another"})
+        found.append(study.runs({})[1]["content"])
+        assert len(set(found)) == 3
+
     def test_another_title_or_another_method_beside_it_alters_nothing(self, study_file):
         first = load_study(study_file())
         other = load_study(study_file(STUDY | {"title": "another", "methods": STUDY["methods"][:1]}))

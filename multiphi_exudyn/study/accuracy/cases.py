@@ -3,14 +3,15 @@
     {"scene": name, "content": hash, "at": {field: value}, "method": name, "setting": {field: value},
      "nearby": {field: factor}}
 
-content stands for the scene file with the study's changes, the reference, and the method's model: a run is found again
-only where everything that could alter it is the same. The method "reference" is the base scene's reference at that
-point of the axes, "coarser" the reference's coarser copy.
+content stands for the scene file with the study's changes, the reference, the method's model, the matrices a scene
+names, and the versions of this package and of Exudyn: a run is found again only where all that could alter it is the
+same. The method "reference" is the scene's reference at that point of the axes, "coarser" its coarser copy.
 """
 
 from __future__ import annotations
 
 import copy
+import functools
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
@@ -22,6 +23,7 @@ from typing import Any
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE
 from multiphi_exudyn.study.accuracy.study_file import MethodSpec, StudyFile
+from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
@@ -49,6 +51,12 @@ class Study:
     scene_path: Path
     scene: Mapping[str, Any]
     quick: bool = False
+
+    @functools.cached_property
+    def _matrices(self) -> str:
+        """What stands in the file of matrices that the scene names; empty without such a file."""
+        named = self.scene_path.parent / str(self.scene.get("structure", {}).get("matrices", ""))
+        return hashlib.sha256(named.read_bytes()).hexdigest() if named.is_file() else ""
 
     @property
     def points(self) -> list[dict[str, Any]]:
@@ -105,7 +113,7 @@ class Study:
         model = next((given.model for given in self.file.methods if given.name == method), {})
         return {
             "scene": self.file.scene,
-            "content": _hash([self.scene, model]),
+            "content": _hash([self.scene, model, self._matrices, _versions()]),
             "at": dict(at),
             "method": method,
             "setting": dict(setting),
@@ -210,6 +218,12 @@ def _put(data: dict[str, Any], field: str, value: Any) -> None:
 def _hash(content: Any) -> str:
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    known = machine()["versions"]
+    return {name: known[name] for name in ("multiphi-exudyn", "exudyn")}
 
 
 def _shipped_folder() -> Path:

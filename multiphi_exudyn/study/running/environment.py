@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-__all__ = ["environment"]
+__all__ = ["environment", "machine"]
 
 PACKAGES = ("multiphi-exudyn", "exudyn", "numpy", "scipy")
 IMPORTED = ("multiphi_exudyn", "exudyn")
@@ -20,16 +20,23 @@ IMPORT_LIMIT_S = 60  # s; an import that takes longer is not reported
 
 
 def environment() -> dict[str, Any]:
-    """Versions, machine, thread settings, and the import time [s] of each package in a fresh interpreter."""
+    """Machine and versions, the date, and the import time [s] of each package in a fresh interpreter."""
     return {
         "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        **machine(),
+        "import_s": {name: _import_time(name) for name in IMPORTED},
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Versions, machine and thread settings."""
+    return {
         "python": platform.python_version(),
         "system": platform.platform(),
         "processor": _processor(),
         "cores": os.cpu_count(),
         "threads": {name: os.environ.get(name, "not set") for name in THREADS},
         "versions": {name: _version(name) for name in PACKAGES},
-        "import_s": {name: _import_time(name) for name in IMPORTED},
     }
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import importlib.metadata
 import json
-import os
 import pickle
 import platform
 import time
@@ -18,12 +16,11 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.sweep.store import STATUSES, Row, pack, plain
 from multiphi_exudyn.study.sweep.time_limit import call_within
 
 __all__ = ["Function", "Outcome", "ended", "run_case"]
-
-PACKAGES = ("multiphi-exudyn", "exudyn", "numpy", "scipy")
 
 
 @dataclass(frozen=True)
@@ -122,18 +119,5 @@ def _line(text: str) -> str:
 @functools.cache
 def _environment() -> dict[str, Any]:
     """Machine and versions of the process that computes."""
-    return {
-        "host": platform.node(),
-        "system": platform.platform(),
-        "cores": os.cpu_count(),
-        "blas_threads": max((pool["num_threads"] for pool in threadpool_info()), default=1),
-        "python": platform.python_version(),
-        "versions": {name: _version(name) for name in PACKAGES},
-    }
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"
+    threads = max((pool["num_threads"] for pool in threadpool_info()), default=1)
+    return {"host": platform.node(), "blas_threads": threads, **machine()}
