@@ -44,7 +44,8 @@ def simulate(
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: constant loads.
     compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
     A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
-    The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early.
+    The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
+    that is ok says where a Tolerance could not be reached.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
     if isinstance(model.modes, Tolerance):

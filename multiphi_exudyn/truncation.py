@@ -16,11 +16,12 @@ It predicts an error, it does not bound it: it knows nothing of how fast neighbo
 level holds and the next one drops weighs little in it (keep the levels' highest frequencies near each other).
 A level's static residual, the part of a contact's flexibility that its modes do not hold, is known before any run:
 
-    rho = 1 - (sum over kept modes of (h.psi)^2 / omega^2) / (the same over all modes)
+    rho = 1 - (sum over kept modes of (h.psi)^2 / omega^2) / (the same over all modes that may be taken)
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -61,7 +62,10 @@ def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> 
     """Estimate of the relative error of displacements that truncation has made from 0 to ``until`` [s] (the end)."""
     end = trajectory.t_end if until is None else until
     lost = sum(defect.size**2 for defect in defects(trajectory) if defect.time <= end)
-    return float(np.sqrt(lost)) / _amplitude(trajectory, end)
+    amplitude = _amplitude(trajectory, end)
+    if amplitude == 0:
+        return math.inf if lost else 0.0
+    return math.sqrt(lost) / amplitude
 
 
 def adapted(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) -> Trajectory:
@@ -74,7 +78,10 @@ def adapted(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) ->
     assert isinstance(tolerance, Tolerance), "who calls this has looked"
     assert most is not None, "a tolerance has a largest number"
     level = replace(model, modes=most).level(())
-    count = _holding(level, tolerance.error)
+    rigid = int(np.sum(level.omega == 0))
+    if rigid == level.modes:
+        return run(replace(model, modes=rigid))
+    count = max(_holding(level, tolerance.error), rigid + 1)
     while True:
         count = min(count, level.modes)
         trajectory = run(replace(model, modes=UpTo(ABOVE * float(level.frequencies[count - 1]), most)))

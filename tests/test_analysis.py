@@ -209,7 +209,7 @@ def test_the_csv_gives_every_number_back():
         assert line["nrmse.0.3.node3"] == ("" if error is None else str(error))
     times = [float(line["timing.online_s"]) for line in read if line["timing.online_s"]]
     assert times == [row.values["online_s"] for row in result.timings]
-    assert read[0]["date"] == "2026-01-02T03:04:05+00:00"
+    assert read[0]["finished"] == "2026-01-02T03:04:05Z"
     nearby = [line for line in read if line["nearby.step"]]
     assert len(nearby) == 2 * 2 * (12 + 12)
     assert all(line["timing.online_s"] == "" for line in nearby)

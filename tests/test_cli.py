@@ -138,7 +138,7 @@ STUDY = {
 def test_a_study_leaves_runs_table_and_report_and_goes_on_where_it_was(scene, tmp_path, capsys):
     path = write(tmp_path / "small-study.toml", STUDY)
     folder = tmp_path / "multiphi-small-study"
-    assert cli.main(["study", path, "--quick", "--on", "serial"]) == 0
+    assert cli.main(["study", path, "--quick", "--on", "serial", "--out", str(folder)]) == 0
     assert {file.name for file in folder.iterdir()} == {"report.html", "runs.csv", "runs.sqlite"}
     assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 2
     capsys.readouterr()

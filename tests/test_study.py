@@ -69,6 +69,13 @@ class TestCases:
         assert study.model_name(study.reference(study.points[0])) == "all"
         assert study.model_name(study.runs(study.points[0])[0]) == "r12"
 
+    def test_a_reference_with_its_number_of_modes_in_its_name(self, tmp_path, study_file):
+        models = [{"kind": "reduced", "name": "fine-{modes}", "modes": 12}, {"kind": "reduced", "name": "own-{modes}"}]
+        for reference in ("fine-12", "own-6"):
+            write(tmp_path / "small.toml", SCENE | {"models": models, "comparison": {"reference": reference}})
+            study = load_study(study_file())
+            assert list(study.scene_for(study.reference({})).models) == [reference]
+
     def test_the_short_form(self, study_file):
         study = load_study(study_file(), quick=True)
         assert study.points == [{"start.displacement": 0.01}]
@@ -120,6 +127,9 @@ class TestCases:
             (["methods"], [], "methods: got 'none', need a method or a budget"),
             (["maps"], ["nothing"], "maps: got 'nothing', need one of the methods"),
             (["time_limit_s"], 0, "time_limit_s: got 0"),
+            (["methods", 0, "refine"], "step", "refine of levels: got 'step', need a field"),
+            (["change"], {"models": [1]}, "models[0]: got 1"),
+            (["change"], {"structure": "x"}, "structure: got 'x'"),
             (["tolerances"], [], "tolerances"),
             (["surprise"], 1, "surprise: got 1, need no field of this name"),
         ],
@@ -179,6 +189,12 @@ class TestRunning:
             (r.parameters, r.status, r.values) for r in there.rows
         ]
         assert here.timings == there.timings == ()
+
+    def test_nothing_runs_where_the_reference_failed_and_the_study_says_so(self, study_file, store):
+        data = STUDY | {"reference": {"kind": "craig-bampton", "modes": 2, "step": 1e-4, "newton_tolerance": 1e-30}}
+        result = run_study(load_study(study_file(data)), store, progress=False)
+        assert [row.parameters["method"] for row in result.rows] == ["reference", "reference"]
+        assert {row.status for row in result.rows} == {"failed"}
 
     def test_a_method_that_fails_is_a_gap_with_its_cause(self, study_file, store):
         data = changed(["methods", 1, "model"], {"kind": "craig-bampton", "modes": 2, "newton_tolerance": 1e-30}, STUDY)

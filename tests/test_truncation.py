@@ -151,3 +151,21 @@ def test_a_limit_needs_positive_numbers(kind, given):
 def test_a_limit_needs_numbers(kind, given):
     with pytest.raises(mp.MultiPhiTypeError, match=f"{kind.__name__}: got"):
         kind(*given)
+
+
+def test_no_motion_has_no_error():
+    model = mp.MultiPhiModel(chain(4), [stop()], modes=mp.Tolerance(0.01))
+    run = mp.simulate(model, 1.0)
+    assert mp.truncation_indicator(run) == 0.0
+    pushed = mp.MultiPhiModel(chain(4), modes=1)
+    assert mp.truncation_indicator(mp.simulate(pushed, 1.0, velocity=np.eye(4)[1]), 0.0) == math.inf
+
+
+def test_a_tolerance_keeps_the_rigid_body_modes():
+    free = mp.MultiPhiModel(chain(4, ends=0), [stop()], modes=mp.Tolerance(1.5, most=3))
+    run = mp.simulate(free, 2.0, displacement=np.ones(4), velocity=-np.ones(4))
+    assert run.status == "ok"
+    assert run.model.level(()).modes >= 2
+    single = mp.LinearStructure([[1.0]], [[0.0]], points={"m0": 0})
+    falling = mp.simulate(mp.MultiPhiModel(single, modes=mp.Tolerance(0.1)), 1.0, velocity=np.array([1.0]))
+    assert falling.at("m0", 1.0) == pytest.approx(1.0)

@@ -33,6 +33,9 @@ def run_budget(source: str, t_end: float | None, modes: int | None, out: Path | 
 
 
 def _tell(values: dict[str, Any]) -> None:
+    for name, rung in values["rungs"].items():
+        if rung["status"] != "ok":
+            print(f"{name}: {rung['status']}, {rung['message']}")
     for window, ladders in values["windows"].items():
         for ladder, groups in ladders.items():
             found = groups["all"]

@@ -24,7 +24,7 @@ STORE = "runs.sqlite"
 def run_study_file(source: str, out: Path | None, quick: bool, where: str, workers: int | None) -> bool:
     """Run a study into its folder; True if all references and budgets, and one setting of every method, ran."""
     study = load_study(source, quick=quick)
-    folder = results_folder(out or Path(f"multiphi-{study.name}"))
+    folder = results_folder(out or Path(f"multiphi-{study.name}{'-quick' if quick else ''}"))
     with Store(folder / STORE) as store, open_executor(where, workers) as executor:
         result = run_study(study, store, executor, progress=sys.stderr.isatty())
     write_whole(folder / "runs.csv", csv_text(result).encode())

@@ -33,6 +33,7 @@ FINEST: Mapping[str, Callable[[Iterable[float]], float]] = {
     "elements": max,
     "step": min,
     "rtol": min,
+    "tolerance": min,
     "newton_tolerance": min,
 }
 

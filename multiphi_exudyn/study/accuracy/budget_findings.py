@@ -30,6 +30,7 @@ def budget_outcome(result: StudyResult) -> Iterable[str]:
         at = f"At {words(row.parameters['at'])}: " if row.parameters["at"] else ""
         if row.status != "ok":
             yield f"{at}{row.status}, {row.message}."
+        if not row.values:
             continue
         window, ladders = max(row.values["windows"].items(), key=lambda item: float(item[0]))
         for ladder, groups in ladders.items():
@@ -39,7 +40,8 @@ def budget_outcome(result: StudyResult) -> Iterable[str]:
 def _parts(found: Mapping[str, Any] | None) -> str:
     if found is None:
         return "fewer than two of the models ran."
-    named = sorted((part for part in found["parts"] if abs(part["share"]) >= SHOWN), key=lambda part: -part["share"])
+    known = [part for part in found["parts"] if part["share"] is not None]
+    named = sorted((part for part in known if abs(part["share"]) >= SHOWN), key=lambda part: -part["share"])
     shares = ", ".join(f"{part['cause']} {100 * part['share']:.0f} %" for part in named)
     explained = {True: "the parts explain it", False: "the parts do not explain it", None: "not checked"}
     return f"{percent(found['total'])} in all, of which {shares}; {explained[found['explained']]}."

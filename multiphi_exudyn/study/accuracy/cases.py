@@ -4,8 +4,8 @@
      "nearby": {field: factor}}
 
 content stands for the scene file with the study's changes, the reference, the method's model, the matrices a scene
-names, and the versions of this package and of Exudyn: a run is found again only where all that could alter it is the
-same. The method "reference" is the scene's reference at that point of the axes, "coarser" its coarser copy.
+names, the time limit, and the versions of this package and of Exudyn: a run is found again only where all that could
+alter it is the same. The method "reference" is the scene's reference at that point of the axes, "coarser" its copy.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import copy
 import functools
 import hashlib
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -21,10 +22,11 @@ from pathlib import Path
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE
+from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_file import MethodSpec, StudyFile
 from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 from multiphi_exudyn.study.sweep.sweep import grid
@@ -33,6 +35,7 @@ __all__ = ["BUDGET", "CASE", "Parameters", "Study", "load_study", "shipped_studi
 
 CASE = "case"  # name of the model that a case runs
 BUDGET = "budget"  # method of the error budgets' cases
+DEFAULT_MODES = SceneFile.model_fields["modes"].default
 MOST_RUNS = 1_000_000  # of a study: beyond that a typing error is likelier than a wish
 
 Parameters = dict[str, Any]
@@ -83,13 +86,13 @@ class Study:
         return [] if wanted is None else [self._case(at, BUDGET, wanted.model_dump(), {}) for at in self.points]
 
     def scene_for(self, parameters: Mapping[str, Any]) -> Scene:
-        """The scene of a case: its full models that play a part, and the case's own model under the name CASE."""
+        """The scene of a case: its models that play a part, and the case's own model under the name CASE."""
         data = copy.deepcopy(dict(self.scene))
         for field, value in parameters["at"].items():
             _put(data, field, value)
         parts = data["comparison"]
         named = {parts["reference"], parts.get("coarser"), *parts.get("cheapest", ())}
-        models = [model for model in data["models"] if model.get("name") in named]
+        models = [m for m in data["models"] if parameters["method"] == BUDGET or _name(m, data) in named]
         if parameters["method"] not in (REFERENCE, COARSER, BUDGET):
             models.append(self._model(parameters) | {"name": CASE})
         return scene_of(self.scene_path, data | {"models": models})
@@ -113,7 +116,7 @@ class Study:
         model = next((given.model for given in self.file.methods if given.name == method), {})
         return {
             "scene": self.file.scene,
-            "content": _hash([self.scene, model, self._matrices, _versions()]),
+            "content": _hash([self.scene, model, self.file.time_limit_s, self._matrices, _versions()]),
             "at": dict(at),
             "method": method,
             "setting": dict(setting),
@@ -142,6 +145,7 @@ def load_study(source: str, *, quick: bool = False) -> Study:
         _put_reference(data, file)
     if file.window is not None:
         _put(data, "outputs.windows", [file.window])
+    scene_of(scene_path, data)
     study = Study(path.stem, path, file, scene_path, data, quick)
     _check(study)
     return study
@@ -161,18 +165,33 @@ def _check(study: Study) -> None:
     if not names and study.file.budget is None:
         _refuse(study, "methods", "none", "a method or a budget")
     for method in study.file.methods:
-        for field in method.nearby:
-            if not isinstance((method.model | {k: v[0] for k, v in method.axes.items()}).get(field), (int, float)):
-                _refuse(study, f"nearby of {method.name}", field, "a field of the model or its axes that is a number")
-    per_point = len(study.runs(study.points[0]))
-    if per_point * len(study.points) > MOST_RUNS:
-        _refuse(study, "axes", f"{per_point * len(study.points)} runs", f"at most {MOST_RUNS}")
+        fields = [("nearby", field) for field in method.nearby] + [("refine", method.refine)] * bool(method.refine)
+        for kind, field in fields:
+            if not all(is_number(value) for value in method.axes.get(field or "", [method.model.get(field or "")])):
+                _refuse(study, f"{kind} of {method.name}", field, "a field of the model or its axes that is a number")
+    if "outputs.t_end" in study.file.axes and study.file.window is None:
+        _refuse(study, "window", "none", "one that every end time of the axis outputs.t_end reaches")
+    _check_size(study)
     for case in _samples(study):
         try:
             mechanics_of(study.scene_for(case))
         except MultiPhiValueError as error:
             told = str(error).removeprefix(f"{study.scene_path}: ")
             raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
+
+
+def _check_size(study: Study) -> None:
+    axes = [study.file.axes, *(method.axes for method in study.file.methods)]
+    points, *settings = (math.prod(map(len, each.values())) for each in axes)
+    runs = points * sum(settings)
+    if runs > MOST_RUNS:
+        _refuse(study, "axes", f"{runs} runs", f"at most {MOST_RUNS}")
+
+
+def _name(model: Mapping[str, Any], scene: Mapping[str, Any]) -> str:
+    """A model's name with its number of modes filled in."""
+    modes = model.get("modes", scene.get("modes", DEFAULT_MODES))
+    return str(model.get("name")).replace("{modes}", str(modes))
 
 
 def _samples(study: Study) -> Iterator[Parameters]:

@@ -1,8 +1,8 @@
 """A study from beginning to end: references, error pass, error budgets, timing pass, maps.
 
 The error pass runs wherever the executor has workers. The timing pass is another one: each setting again, one at a
-time, in this process, with nothing else of the study running, a first run and its repeats. All of it is kept in the
-store as it ends, so a study that was stopped goes on where it was.
+time, in this process, with nothing else of the study running, a first run and its repeats. Every run is kept in the
+store as it ends, so a study that was stopped goes on where it was; maps are made anew with every report.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.study.accuracy.analysis import MapPair, Setting, StudyResult, settings
@@ -77,9 +79,11 @@ class BudgetRun:
     study: Study
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
-        """The budget's values."""
+        """The budget's values; failed, with the cause, where a rung is missing."""
         bench = _bench(self.study, parameters)
-        return Outcome(budget(bench, parameters["setting"]["modes"], progress=False).values())
+        values = budget(bench, parameters["setting"]["modes"], progress=False).values()
+        causes = [f"{name}: {rung['message']}" for name, rung in values["rungs"].items() if rung["status"] != "ok"]
+        return Outcome(values, {}, "failed" if causes else "ok", "; ".join(causes))
 
 
 def run_study(study: Study, store: Store, executor: Executor | None = None, progress: bool = True) -> StudyResult:
@@ -91,10 +95,11 @@ def run_study(study: Study, store: Store, executor: Executor | None = None, prog
     references = [study.reference(at) for at in study.points if study.file.methods]
     rows = list(passed(MeasuredRun(study, None), references, ERRORS, executor=executor, keep_histories=True))
     for case in references:
-        measured = MeasuredRun(study, _stored(store, case))
-        kept = study.file.histories
-        rows += passed(measured, study.runs(case["at"]), ERRORS, executor=executor, keep_histories=kept)
-    budgets = sweep(BudgetRun(study), study.budgets(), store, BUDGETS, executor=executor, progress=progress)
+        reference = _stored(store, case)
+        if reference is not None:  # without one nothing can be measured there
+            measured, kept = MeasuredRun(study, reference), study.file.histories
+            rows += passed(measured, study.runs(case["at"]), ERRORS, executor=executor, keep_histories=kept)
+    budgets = passed(BudgetRun(study), study.budgets(), BUDGETS, executor=executor)
     timings = passed(TimedRun(study), _timed(study, rows), TIMING) if study.file.timing else ()
     return _result(study, tuple(rows), timings, budgets, store)
 
@@ -135,11 +140,17 @@ def _result(
         budgets=budgets,
         maps=(),
         environment=environment(),
-        assumptions=bench.mechanics.assumptions,
+        assumptions=_assumptions(study),
         quick=study.quick,
     )
     reference = _stored(store, first)
     return result if reference is None else replace(result, maps=tuple(_maps(study, result, reference)))
+
+
+def _assumptions(study: Study) -> tuple[str, ...]:
+    """What the scenes rest on, at all points of the axes."""
+    scenes = [study.scene_for(study.reference(at)) for at in study.points]
+    return tuple(dict.fromkeys(sentence for scene in scenes for sentence in mechanics_of(scene).assumptions))
 
 
 def _maps(study: Study, result: StudyResult, full: ModelRun) -> Iterator[MapPair]:
@@ -155,7 +166,7 @@ def _pairs(study: Study, setting: Setting, full: ModelRun) -> Iterator[MapPair]:
     case = next(c for c in study.runs(setting.at) if (c["method"], c["setting"]) == (setting.method, setting.setting))
     bench = replace(_bench(study, case), repeats=0)
     run = run_model(bench, CASE, progress=False)
-    if not run.ok:
+    if not run.ok or not np.any(FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1):
         return
     frequencies = FREQUENCIES[FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1]
     for point in bench.points:
@@ -175,8 +186,9 @@ def _in_contact(run: ModelRun) -> list[list[float]]:
 
 
 def _level_frequencies(bench: Workbench) -> dict[str, list[float]]:
-    """Natural frequencies [Hz], within the map, of the open level and of each contact closed alone."""
-    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False), modes="all", overrides=bench.overrides)
+    """Natural frequencies [Hz] of the case's levels, within the map: the open one, each contact closed alone."""
+    rigid = getattr(bench.scene.models[CASE], "contact", "as-given") == "rigid"
+    model = MultiPhiModel(bench.structure, bench.contacts(rigid), modes="all", overrides=bench.overrides)
     levels = {"open": (), **{f"{contact.name} closed": (contact.name,) for contact in model.contacts}}
     lowest, highest = FREQUENCIES[0], FREQUENCIES[-1]
     return {

@@ -31,7 +31,7 @@ def csv_text(result: StudyResult) -> str:
 
 def _cells(row: Row) -> dict[str, Any]:
     of_run = {"status": row.status, "cause": row.message, "elapsed_s": row.elapsed_s, "finished": row.finished}
-    return of_run | {"date": row.environment.get("date", "")} | _flat(row.values)
+    return of_run | _flat(row.values)
 
 
 def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.analysis import (
@@ -39,6 +40,7 @@ __all__ = [
 
 MOST_POINTS = 6  # of the scene's axes that pictures and tables are shown for
 BUSY = 1.5  # load average from which others were at work: the run itself makes 1
+FORGOTTEN = timedelta(minutes=4)  # after which a load average of the last minute knows nothing of an earlier load
 UNSTEADY = 2.0  # longest over shortest repeat from which a time is worth a word
 
 
@@ -172,7 +174,7 @@ def _lastingly(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> 
 
 def _distrust(result: StudyResult) -> Iterable[str]:
     if result.quick:
-        yield "This is the study's short form: few settings, few repeats. It shows that everything runs, no more."
+        yield "This is the study's short form: few settings. It shows that everything runs, no more."
     for at in shown_points(result):
         yield _own_uncertainty(result, at)
     yield from _failures(result)
@@ -215,6 +217,9 @@ def _failures(result: StudyResult) -> Iterable[str]:
             f"{len(bad)} of {len(result.rows)} runs failed or took too long. Settings without an error: {len(gaps)} of "
             f"{len(settings(result))}. The causes are listed below."
         )
+    remarks = list(dict.fromkeys(row.message for row in result.rows if row.status == "ok" and row.message))
+    if remarks:
+        yield f"Runs that reached their end had {len(remarks)} remarks, the first: {remarks[0]}."
 
 
 def _times(result: StudyResult) -> Iterable[str]:
@@ -225,12 +230,20 @@ def _times(result: StudyResult) -> Iterable[str]:
         yield f"Run times are wall clock on one machine: ratios count.{most}"
     load = max(_loads(result), default=0.0)
     if load > BUSY:
-        yield f"The timing pass was not alone on the machine: the load average rose to {load:.2g}. Take times again."
+        yield f"The timing pass was not alone on the machine: the load average rose to {load:.2g}."
+    hosts = {row.environment.get("host") for row in result.timings}
+    if len(hosts) > 1:
+        yield f"Times were taken on {len(hosts)} machines: compare no time of one with a time of another."
 
 
 def _loads(result: StudyResult) -> list[float]:
-    """The machine's load averages while settings were timed, where the system tells them."""
-    given = [row.values["load_average"] for row in result.timings if row.status == "ok"]
+    """The machine's load averages while settings were timed, where the system tells them.
+
+    Those of the first minutes, which still remember what ran before, do not count.
+    """
+    ended = [datetime.fromisoformat(row.finished.replace("Z", "+00:00")) for row in result.timings]
+    late = [row for row, at in zip(result.timings, ended, strict=True) if at - min(ended) > FORGOTTEN]
+    given = [row.values["load_average"] for row in late if row.status == "ok"]
     return [load for load in given if load is not None]
 
 

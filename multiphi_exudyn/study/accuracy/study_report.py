@@ -174,7 +174,7 @@ def _correlations(result: StudyResult) -> dict[str, Correlation]:
 
 
 def _budget(result: StudyResult) -> Picture | None:
-    values = [row.values for row in result.budgets if row.status == "ok"]
+    values = [row.values for row in result.budgets if row.values]
     caption = (
         "Bars: size of each part, whiskers its uncertainty, numbers its share of the whole difference in %. "
         "Pale: no larger than its uncertainty. Dashed line: the whole difference between full and reduced."

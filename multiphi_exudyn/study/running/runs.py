@@ -16,7 +16,7 @@ __all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays"]
 class ModelRun:
     """What a model answered; a failed one has a status, a cause and no histories.
 
-    kind: "reduced", "user-object" or "full". label: for tables and figures. dofs: coordinates integrated.
+    kind: as in a scene's file. label: for tables and figures. dofs: coordinates integrated.
     time: (k,) s, the same for every run of a comparison. points [m], gaps [m], contact_force [N]: (k,) each.
     contact_intervals: contact -> (m, 2) s. impulse: contact -> N s to the end of the run.
     energy_time (j,) s, energy (j,) J: kinetic + strain, compliant contacts included. ledger: J, row by row.

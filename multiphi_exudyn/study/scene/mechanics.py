@@ -177,7 +177,7 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
     _check_published(scene, mechanics)
     for i, model in enumerate(scene.file.models):
         if isinstance(model, FullModel) and mechanics.beam is None:
-            refuse(scene, f"models[{i}].kind", "full", "reduced or user-object: matrices have no full model")
+            refuse(scene, f"models[{i}].kind", "full", "another kind: matrices have no full model")
         for contact in mechanics.contacts:
             _check_contact_of(scene, f"models[{i}].kind", model, contact)
 

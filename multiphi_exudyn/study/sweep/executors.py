@@ -10,6 +10,7 @@ Worker processes are spawned: a script that opens them needs ``if __name__ == "_
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import os
 import re
@@ -167,7 +168,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     with client:
         try:
             client.wait_for_workers(1, timeout=ANSWER_S)
-        except TimeoutError:
+        except (TimeoutError, asyncio.TimeoutError):  # one and the same only from Python 3.11 on
             raise MultiPhiValueError(f"where: {address} has no workers; need at least one Dask worker") from None
         executor = client.get_executor(pure=False)
         executor.workers = sum(client.nthreads().values())

@@ -214,8 +214,8 @@ def _create(path: Path) -> None:
                 connection.executescript(SCHEMA)
             with contextlib.suppress(FileExistsError):
                 os.link(new, path)
-    except OSError as error:
-        raise _unusable(path, f"cannot be made ({error.strerror})") from error
+    except (OSError, sqlite3.Error) as error:
+        raise _unusable(path, f"cannot be made ({getattr(error, 'strerror', None) or error})") from error
 
 
 def _opened(path: Path) -> sqlite3.Connection:
