@@ -9,7 +9,7 @@ import pytest
 from small_scene import changed, write
 
 from multiphi_exudyn.study.measures import metrics
-from multiphi_exudyn.study.measures.measures import horizons, measures, windows
+from multiphi_exudyn.study.measures.measures import horizons, measures
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -148,7 +148,7 @@ def test_measures_are_json_without_numbers_that_do_not_exist(bench, reference, s
 
 def test_windows_end_with_the_run(bench):
     def of(t_end):
-        return windows(replace(bench, time=1e-3 * np.arange(round(t_end / 1e-3) + 1)))
+        return replace(bench, time=1e-3 * np.arange(round(t_end / 1e-3) + 1)).windows
 
     assert [of(t_end) for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
 

@@ -153,7 +153,7 @@ def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(c
         time = 1e-3 * np.arange(round(t_end / 1e-3) + 1)
         return replace(comparison, bench=replace(comparison.bench, time=time))
 
-    assert [with_end(t_end).windows for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
+    assert [with_end(t_end).bench.windows for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
     assert [with_end(t_end).headline_window for t_end in (0.05, 0.3, 1.0)] == [0.05, 0.3, 0.3]
 
 

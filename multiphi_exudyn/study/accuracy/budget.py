@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
@@ -95,7 +94,7 @@ class Budget:
                     ladder: {group: decomposition(rungs, points, until) for group, points in groups.items()}
                     for ladder, rungs in self.ladders.items()
                 }
-                for until in Comparison(self.bench, {}, {}).windows
+                for until in self.bench.windows
             },
         }
 

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
-from multiphi_exudyn.study.measures.measures import ROUND_OFF, windows
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scene.workbench import Workbench
+from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]
 
@@ -52,11 +51,6 @@ class Comparison:
         if not self.reference.ok:
             return {}
         return {name: run for name, run in self.runs.items() if run.ok and run is not self.reference}
-
-    @property
-    def windows(self) -> tuple[float, ...]:
-        """Ends [s] of the windows in which errors are given, ascending; the last is the end of the run."""
-        return windows(self.bench)
 
     @property
     def headline_window(self) -> float:
@@ -200,7 +194,7 @@ def _row(comparison: Comparison, run: ModelRun) -> dict[str, Any]:
 def _errors(comparison: Comparison, run: ModelRun) -> dict[str, dict[str, float]]:
     return {
         f"{until:g}": {point: comparison.error(run, point, until) for point in comparison.bench.points}
-        for until in comparison.windows
+        for until in comparison.bench.windows
     }
 
 

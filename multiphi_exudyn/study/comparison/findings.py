@@ -160,7 +160,7 @@ def _own_uncertainty(comparison: Comparison) -> Iterable[str]:
     if own is None or own.name not in comparison.measured:
         yield "The reference's own uncertainty is unknown here: no coarser copy of it ran."
         return
-    known = ", ".join(f"{percent(comparison.worst_error(own, w))} to {w:g} s" for w in comparison.windows)
+    known = ", ".join(f"{percent(comparison.worst_error(own, w))} to {w:g} s" for w in comparison.bench.windows)
     yield (
         f"The reference is uncertain itself: it differs from a coarser copy of itself by {known}. "
         "Smaller differences say nothing."

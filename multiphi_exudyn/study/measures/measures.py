@@ -14,9 +14,8 @@ from multiphi_exudyn.study.measures.spectra import spectral_difference
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Workbench
 
-__all__ = ["ROUND_OFF", "horizons", "measures", "windows"]
+__all__ = ["horizons", "measures"]
 
-ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
 Difference = Callable[[np.ndarray, np.ndarray, np.ndarray, float], float]  # values, reference, time, until
 DIFFERENCES: dict[str, Difference] = {
     "nrmse": metrics.nrmse,
@@ -41,12 +40,6 @@ def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dic
         "ledger": {row: _number(value) for row, value in run.ledger.items()},
         "frequencies": level_frequencies(run, [contact.name for contact in bench.mechanics.contacts]) if run.ok else {},
     }
-
-
-def windows(bench: Workbench) -> tuple[float, ...]:
-    """Ends [s] of the windows that differences are given for, ascending; the last is the end of the run."""
-    named = sorted(bench.scene.file.outputs.windows)
-    return (*(until for until in named if until < ROUND_OFF * bench.t_end), bench.t_end)
 
 
 def horizons(bench: Workbench, run: ModelRun, reference: ModelRun) -> dict[str, float]:
@@ -74,7 +67,7 @@ def _by_window(
             point: _number(measure(run.points[point], reference.points[point], run.time, until))
             for point in bench.points
         }
-        for until in windows(bench)
+        for until in bench.windows
     }
 
 

@@ -69,9 +69,7 @@ def _run(
 
 
 def _indicators(bench: Workbench, trajectory: Trajectory) -> dict[str, float]:
-    ends = {f"{until:g}": until for until in bench.scene.file.outputs.windows if until < bench.t_end}
-    ends[f"{bench.t_end:g}"] = bench.t_end
-    return {name: truncation_indicator(trajectory, until) for name, until in ends.items()}
+    return {f"{until:g}": truncation_indicator(trajectory, until) for until in bench.windows}
 
 
 def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, np.ndarray]:

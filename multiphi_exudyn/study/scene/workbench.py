@@ -36,11 +36,12 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["Workbench", "damping_matrix", "prepare", "start_configuration"]
+__all__ = ["ROUND_OFF", "Workbench", "damping_matrix", "prepare", "start_configuration"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
 REPEATS = 7
+ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
 KEPT_STRUCTURES = 32  # linearised beams kept for later scenes; each is two matrices of some 100 DoFs
 ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
 
@@ -76,6 +77,12 @@ class Workbench:
     def t_end(self) -> float:
         """End of the run [s]: the last time of the grid."""
         return float(self.time[-1])
+
+    @property
+    def windows(self) -> tuple[float, ...]:
+        """Ends [s] of the windows that differences are given for, ascending; the last is the end of the run."""
+        named = sorted(self.scene.file.outputs.windows)
+        return (*(until for until in named if until < ROUND_OFF * self.t_end), self.t_end)
 
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
         """The scene's contacts, as given or all of them rigid."""
