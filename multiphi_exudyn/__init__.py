@@ -8,7 +8,20 @@ from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.level import Level, LevelOverride
-from multiphi_exudyn.loads import ConstantLoad
+from multiphi_exudyn.loads import (
+    BaseMotion,
+    ConstantLoad,
+    FunctionLoad,
+    Gravity,
+    Harmonic,
+    HarmonicLoad,
+    Sampled,
+    SampledLoad,
+    Smooth,
+    StopMotion,
+    Sweep,
+    SweepLoad,
+)
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event
@@ -17,10 +30,15 @@ from multiphi_exudyn.trajectory import Ledger, Trajectory
 from multiphi_exudyn.truncation import truncation_indicator
 
 __all__ = [
+    "BaseMotion",
     "Beam",
     "Clamp",
     "ConstantLoad",
     "Event",
+    "FunctionLoad",
+    "Gravity",
+    "Harmonic",
+    "HarmonicLoad",
     "Ledger",
     "Level",
     "LevelOverride",
@@ -33,7 +51,13 @@ __all__ = [
     "NumericalFailure",
     "PointMass",
     "RayleighDamping",
+    "Sampled",
+    "SampledLoad",
     "Section",
+    "Smooth",
+    "StopMotion",
+    "Sweep",
+    "SweepLoad",
     "Tolerance",
     "Trajectory",
     "UnilateralContact",

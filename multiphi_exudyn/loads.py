@@ -1,18 +1,196 @@
-"""Loads on a structure: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1).
+"""Loads and moving supports: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and the boundary values x_k(t) of (38.4).
 
-A constant load belongs to the asymptotic configuration of every level, K_l x_inf,l = f, so that it is exact for any
-number of modes.
+A *course* says how a quantity goes with time: Harmonic, Sampled, Smooth, Sweep. A load is a place and a course,
+
+    f(t) = p u(t)
+
+a moving stop adds its way to a gap, g = h.x + gap - z(t), and a moving base moves the whole structure, x being what
+remains relative to it:
+
+    M x'' + C x' + K x = f - M e z''(t)
+
+A constant load belongs to the asymptotic configuration of every level, so that it is exact for any number of modes.
+Every other course is a history (history.py), to which the response is known in closed form.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.structure import At, is_real
+from multiphi_exudyn.history import History
+from multiphi_exudyn.structure import At, LinearStructure, is_real
 
-__all__ = ["ConstantLoad"]
+__all__ = [
+    "BaseMotion",
+    "ConstantLoad",
+    "Course",
+    "FunctionLoad",
+    "Gravity",
+    "Harmonic",
+    "HarmonicLoad",
+    "Load",
+    "Sampled",
+    "SampledLoad",
+    "Smooth",
+    "StaticLoad",
+    "StopMotion",
+    "Sweep",
+    "SweepLoad",
+    "VaryingLoad",
+]
+
+SWEEPS = ("linear", "logarithmic")
+TIGHTEST = 1e-12  # tolerance of a course: below it lies the round-off of its polynomials
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """u(t) = amplitude cos(2 pi frequency_hz t + phase)."""
+
+    amplitude: float
+    frequency_hz: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_numbers("harmonic", amplitude=self.amplitude, frequency_hz=self.frequency_hz, phase=self.phase)
+        if self.frequency_hz < 0:
+            raise MultiPhiValueError(f"harmonic frequency_hz: got {self.frequency_hz!r}, need a frequency >= 0 Hz")
+
+    def history(self, end: float, finer: float = 1.0) -> History:
+        """The course up to ``end`` [s]."""
+        return History.harmonic(self.amplitude, 2 * math.pi * self.frequency_hz, self.phase)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Straight lines between samples: time (k,) ascending [s], values (k,); zero before the first, after the last."""
+
+    time: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        time, values = _samples("time", self.time), _samples("values", self.values)
+        if time.shape != values.shape or len(time) < 2:
+            raise MultiPhiValueError(
+                f"samples: got {len(time)} times and {len(values)} values, need two or more of each, as many of both"
+            )
+        if not np.all(np.diff(time) > 0):
+            worst = int(np.argmin(np.diff(time)))
+            raise MultiPhiValueError(
+                f"samples: got time {time[worst + 1]:g} s after {time[worst]:g} s, need ascending times"
+            )
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def from_csv(cls, path: str | Path, column: int = 1) -> Sampled:
+        """Two or more columns of numbers, time [s] first; lines that begin with # are skipped."""
+        try:
+            table = np.loadtxt(path, delimiter=",", ndmin=2)
+        except (OSError, ValueError) as error:
+            raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {error}") from error
+        if not 1 <= column < table.shape[1]:
+            raise MultiPhiValueError(f"samples: got column {column} of {path}, need 1 to {table.shape[1] - 1}")
+        return cls(table[:, 0], table[:, column])
+
+    def history(self, end: float, finer: float = 1.0) -> History:
+        """The course up to ``end`` [s]."""
+        return History.sampled(self.time, self.values)
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """u(t) = function(t), a smooth function of time [s] that takes (k,) times or single ones.
+
+    tolerance: of the response, relative to its largest value; see simulate.
+    """
+
+    function: Callable[[Any], Any]
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise MultiPhiTypeError(f"function: got {self.function!r}, need a function of time")
+        _check_tolerance(self.tolerance)
+
+    def history(self, end: float, finer: float = 1.0) -> History:
+        """The course up to ``end`` [s], to tolerance / finer of its largest value."""
+        largest = float(np.max(np.abs(self._values(np.linspace(0.0, end, 257)))))
+        return History.smooth(self._values, end, self.tolerance / finer * largest)
+
+    def _values(self, times: np.ndarray) -> np.ndarray:
+        try:
+            values = np.asarray(self.function(times))
+            if values.shape != times.shape:
+                values = np.array([float(self.function(t)) for t in times.tolist()])
+        except (TypeError, ValueError):  # math.sin and branches take one time only
+            values = np.array([float(self.function(t)) for t in times.tolist()])
+        if not np.all(np.isfinite(values)):
+            worst = float(times[int(np.argmin(np.isfinite(values)))])
+            raise MultiPhiValueError(f"function: gives a value that is not finite at t = {worst:g} s")
+        return values.astype(float)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """u(t) = amplitude cos(phase(t)), whose frequency goes from start_hz to end_hz in ``duration`` [s], then zero.
+
+        linear        f = start + (end - start) t / T
+        logarithmic   f = start (end / start)^(t / T)
+
+    tolerance: of the response, relative to its largest value; see simulate.
+    """
+
+    amplitude: float
+    start_hz: float
+    end_hz: float
+    duration: float
+    law: str = "linear"
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        given = {"start_hz": self.start_hz, "end_hz": self.end_hz, "duration": self.duration}
+        _check_numbers("sweep", amplitude=self.amplitude, **given)
+        for name, value in given.items():
+            if not value > 0:
+                raise MultiPhiValueError(f"sweep {name}: got {value!r}, need a value > 0")
+        if self.law not in SWEEPS:
+            raise MultiPhiValueError(f"sweep law: got {self.law!r}, need one of: {', '.join(SWEEPS)}")
+        _check_tolerance(self.tolerance)
+
+    def frequency(self, t: np.ndarray) -> np.ndarray:
+        """f (k,) [Hz]."""
+        if self.law == "linear":
+            return self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration)
+        return np.asarray(self.start_hz * np.exp(self._octaves * (t / self.duration)))
+
+    def phase(self, t: np.ndarray) -> np.ndarray:
+        """2 pi integral of f (k,) [rad]."""
+        if self.law == "linear" or self._octaves == 0:
+            cycles = (self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration) / 2) * t
+        else:
+            cycles = self.start_hz * self.duration / self._octaves * np.expm1(self._octaves * (t / self.duration))
+        return np.asarray(2 * math.pi * cycles)
+
+    @property
+    def _octaves(self) -> float:
+        return math.log(self.end_hz / self.start_hz)
+
+    def history(self, end: float, finer: float = 1.0) -> History:
+        """The course up to ``end`` [s], to tolerance / finer of its amplitude."""
+        allowed = self.tolerance / finer * abs(self.amplitude)
+        last = min(end, self.duration)
+        return History.modulated(self.amplitude, self.phase, lambda t: 2 * math.pi * self.frequency(t), last, allowed)
+
+
+Course: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
 
 
 @dataclass(frozen=True)
@@ -20,14 +198,186 @@ class ConstantLoad:
     """f(t) = p force.
 
     at: where, a point name, {point: coefficient} or an (n,) row p. force: N (N m on a rotation).
-    Gravity g is the row M e g, e the direction's unit vector, with force 1.
     """
 
     at: At
     force: float
 
     def __post_init__(self) -> None:
-        if not is_real(self.force):
-            raise MultiPhiTypeError(f"load force: got {self.force!r}, need a number")
-        if not math.isfinite(self.force):
-            raise MultiPhiValueError(f"load force: got {self.force!r}, need a finite number")
+        _check_numbers("load", force=self.force)
+
+    def row(self, structure: LinearStructure) -> np.ndarray:
+        """The static force (n,)."""
+        return self.force * structure.row(self.at)
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """f = M e acceleration: the weight of the whole structure.
+
+    direction: e, what a unit of rigid-body motion along gravity moves every degree of freedom by, a row (n,),
+    {point: coefficient} or a point's name. acceleration: m/s2.
+    """
+
+    direction: At
+    acceleration: float = 9.81
+
+    def __post_init__(self) -> None:
+        _check_numbers("gravity", acceleration=self.acceleration)
+
+    def row(self, structure: LinearStructure) -> np.ndarray:
+        """The static force (n,)."""
+        return np.asarray(self.acceleration * (structure.mass @ structure.row(self.direction)))
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicLoad:
+    """f(t) = p amplitude cos(2 pi frequency_hz t + phase). at: as in ConstantLoad. amplitude: N. phase: rad.
+
+    Several of them make a sum of harmonics.
+    """
+
+    at: At
+    amplitude: float
+    frequency_hz: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        _ = self.course  # checked by being made
+
+    @property
+    def course(self) -> Harmonic:
+        """u(t)."""
+        return Harmonic(self.amplitude, self.frequency_hz, self.phase)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoad:
+    """f(t) = p u(t), straight lines between samples: time (k,) [s], force (k,) [N]; zero outside them.
+
+    at: as in ConstantLoad. ``Sampled.from_csv`` reads samples from a file.
+    """
+
+    at: At
+    time: np.ndarray
+    force: np.ndarray
+
+    def __post_init__(self) -> None:
+        course = Sampled(self.time, self.force)
+        object.__setattr__(self, "time", course.time)
+        object.__setattr__(self, "force", course.values)
+
+    @property
+    def course(self) -> Sampled:
+        """u(t)."""
+        return Sampled(self.time, self.force)
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionLoad:
+    """f(t) = p function(t), a smooth function of time [s]; tolerance: of the response, see Smooth."""
+
+    at: At
+    function: Callable[[Any], Any]
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        _ = self.course  # checked by being made
+
+    @property
+    def course(self) -> Smooth:
+        """u(t)."""
+        return Smooth(self.function, self.tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class SweepLoad:
+    """f(t) = p amplitude cos(phase(t)) from start_hz to end_hz in ``duration`` [s]; law, tolerance: see Sweep."""
+
+    at: At
+    amplitude: float
+    start_hz: float
+    end_hz: float
+    duration: float
+    law: str = "linear"
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        _ = self.course  # checked by being made
+
+    @property
+    def course(self) -> Sweep:
+        """u(t)."""
+        return Sweep(self.amplitude, self.start_hz, self.end_hz, self.duration, self.law, self.tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class StopMotion:
+    """A contact whose stop moves: g = h.x + gap - z(t). contact: its name. course: z(t) [m], away from the stop.
+
+    The stop of a rigid contact may not jump in velocity, so its course is Harmonic, Smooth or Sweep.
+    """
+
+    contact: str
+    course: Course
+
+    def __post_init__(self) -> None:
+        _check_course("stop motion", self.course)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """A base that moves by e z(t); x is then relative to it, x_absolute = x + e z.
+
+    direction: e, as in Gravity. course: z(t) [m], twice differentiable: Harmonic, Smooth or Sweep.
+    fixed_stops: names of the contacts whose stops stay where they are; all others move with the base.
+    """
+
+    direction: At
+    course: Harmonic | Smooth | Sweep
+    fixed_stops: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        _check_course("base motion", self.course)
+        if isinstance(self.course, Sampled):
+            raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
+        if isinstance(self.fixed_stops, str):
+            raise MultiPhiTypeError(f"fixed_stops: got {self.fixed_stops!r}, need a tuple of contact names")
+
+
+StaticLoad: TypeAlias = "ConstantLoad | Gravity"
+VaryingLoad: TypeAlias = "HarmonicLoad | SampledLoad | FunctionLoad | SweepLoad"
+Load: TypeAlias = "StaticLoad | VaryingLoad | StopMotion | BaseMotion"
+
+
+def _check_numbers(what: str, **given: float) -> None:
+    for name, value in given.items():
+        if not is_real(value):
+            raise MultiPhiTypeError(f"{what} {name}: got {value!r}, need a number")
+        if not math.isfinite(value):
+            raise MultiPhiValueError(f"{what} {name}: got {value!r}, need a finite number")
+
+
+def _check_tolerance(value: float) -> None:
+    _check_numbers("course", tolerance=value)
+    if not TIGHTEST <= value < 1:
+        raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
+
+
+def _check_course(what: str, course: Any) -> None:
+    if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
+        raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
+
+
+def _samples(name: str, given: Any) -> np.ndarray:
+    """A copy (k,) of finite numbers that nobody can change."""
+    try:
+        values = np.array(given, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise MultiPhiTypeError(f"samples {name}: got {type(given).__name__}, need (k,) numbers") from error
+    if values.ndim != 1:
+        raise MultiPhiValueError(f"samples {name}: got shape {values.shape}, need (k,)")
+    if not np.all(np.isfinite(values)):
+        raise MultiPhiValueError(f"samples {name}: got a value that is NaN or infinite, need finite numbers")
+    values.flags.writeable = False
+    return values

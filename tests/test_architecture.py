@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
-    ("modes", "modal_response", "first_root"),
+    ("modes", "modal_response", "first_root", "history"),
     ("structure", "beam", "contact", "loads"),
     ("level", "transition", "model"),
     ("state", "event_rule", "trajectory", "truncation", "simulate", "compiled"),
