@@ -27,6 +27,7 @@ instant is a failure, with its cause.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -98,21 +99,26 @@ class EventRule:
         target = self.level(set(level.level.indices) ^ {contact})
         move, there = self.transition(level, target), self.function(target, contact)
         constant = there.constant + float(there.position @ move.offset)
-        return Row(there.position @ move.matrix, there.rate @ move.matrix, constant)
+        return Row(there.position @ move.matrix, there.rate @ move.velocity_matrix, constant)
 
-    def watch(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
+    def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
-        key = (level.level.indices, phases)
+        key = (state.closed, phases)
         if key not in self._tables:
-            found = [
-                (contact, *wait)
-                for contact, phase in enumerate(phases)
-                for wait in self._waiting_for(level, contact, phase)
-            ]
-            rows, rates = [item[2] for item in found], [item[3] for item in found]
-            table = SignalTable(level.level.response, rows, rates)
-            self._tables[key] = [(contact, asks) for contact, asks, _, _ in found], table
+            waiting, rows, rates = self.watched(state.level, phases)
+            self._tables[key] = waiting, SignalTable(state.basis, state.shapes, rows, rates)
         return self._tables[key]
+
+    def watched(
+        self, level: LoadedLevel, phases: tuple[Phase, ...]
+    ) -> tuple[list[tuple[int, bool]], list[Row], list[bool]]:
+        """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
+        found = [
+            (contact, *wait)
+            for contact, phase in enumerate(phases)
+            for wait in self._waiting_for(level, contact, phase)
+        ]
+        return [(item[0], item[1]) for item in found], [item[2] for item in found], [item[3] for item in found]
 
     def _waiting_for(self, level: LoadedLevel, contact: int, phase: Phase) -> list[tuple[bool, Row, bool]]:
         """(asks, function, whether its rate is meant) of what ends a contact's phase by falling through zero."""
@@ -132,10 +138,11 @@ class EventRule:
 
         penetrating: compliant contacts that start closed. touching: rigid contacts that start at their gap.
         """
-        level, changes, admissible = self.level(penetrating), list[Change](), velocity
+        level, changes, admissible, stop_work = self.level(penetrating), list[Change](), velocity, 0.0
         if touching:
-            rows = self.model.base.directions[:, list(touching)].T
-            admissible, impulses = nearest_admissible(rows, velocity)
+            rows = np.column_stack([self.model.base.directions.T, -self.stop_speeds])[list(touching)]
+            moved, impulses = nearest_admissible(rows, np.append(velocity, 1.0), len(velocity))
+            admissible, stop_work = moved[:-1], float(impulses @ self.stop_speeds[list(touching)])
             open_state = self._entered(level, displacement, velocity)
             level = self._impact(open_state, set(touching), set(penetrating))[0].level
             pushed = dict(zip(touching, impulses.tolist(), strict=True))
@@ -145,12 +152,18 @@ class EventRule:
         state = self._entered(level, displacement, admissible)
         kinetic = 0.5 * float(admissible @ admissible)
         loss = Loss(
-            impact=0.5 * float(velocity @ velocity) - kinetic,
+            impact=0.5 * float(velocity @ velocity) - kinetic + stop_work,
             truncation_kinetic=kinetic - state.kinetic,
             truncation_strain=self.potential(displacement, penetrating) - state.potential,
+            stop_work=stop_work,
         )
         state, lost, made = self.decide(state, set())
         return state, loss + lost, changes + made
+
+    @functools.cached_property
+    def stop_speeds(self) -> np.ndarray:
+        """Velocities (c,) [m/s] of the stops at the present instant, along h."""
+        return np.zeros(len(self._rigid))
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
@@ -187,7 +200,7 @@ class EventRule:
         phases = [self._standing(state, contact) for contact in range(len(self._rigid))]
         for contact in refused:
             phases[contact] = Phase.ARMED if phases[contact] is Phase.ARMED else Phase.REFUSED
-        return State(state.level, state.displacement, state.velocity, tuple(phases))
+        return replace(state, phases=tuple(phases))
 
     def _standing(self, state: State, contact: int) -> Phase:
         """ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
@@ -195,11 +208,10 @@ class EventRule:
         value = own.sign(state.displacement, state.velocity)
         if value > 0:
             return Phase.ARMED
-        acceleration = state.level.acceleration(state.displacement, state.velocity)
-        rate = own.rate_sign(state.velocity, acceleration, np.abs(state.level.level.omega * state.displacement))
+        rate = own.rate_sign(state.velocity, state.acceleration, np.abs(state.level.level.omega * state.displacement))
         if value == 0 or rate == 0:
-            table = SignalTable(state.level.level.response, [own, own], [False, True])
-            value, rate = state.level.level.finder.signs(table.signals(state.coefficients()))
+            table = SignalTable(state.basis, state.shapes, [own, own], [False, True])
+            value, rate = state.finder.signs(table.signals(state.coefficients()))
         if value >= 0:
             return Phase.ARMED
         pulls = self._rigid[contact] and contact in state.closed
@@ -270,7 +282,7 @@ class EventRule:
             after = self._at_rest_on(state, struck, compliant | closed)
             pulling = {i for i in closed if self._reaction_sign(state, struck, after.level, i) < (i in freed)}
             if not pulling:
-                dropped = self._loss(state, after, released, struck)
+                dropped = self._loss(state, after, released, struck, plastic)
                 break
             closed = closed - pulling
             after = struck
@@ -287,7 +299,7 @@ class EventRule:
         """
         own, move = self.function(level, contact), self.transition(state.level, level)
         pushed = (own.position @ move.matrix) * state.displacement
-        damped = (own.rate @ self.transition(struck.level, level).matrix) * struck.velocity
+        damped = (own.rate @ self.transition(struck.level, level).velocity_matrix) * struck.velocity
         return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset))
 
     def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
@@ -295,12 +307,13 @@ class EventRule:
         level = self.level(closed)
         displacement = self.transition(state.level, level).displacement(state.displacement)
         velocity = self.transition(struck.level, level).velocity(struck.velocity)
-        return State(level, displacement, velocity, state.phases)
+        return replace(state, level=level, displacement=displacement, velocity=velocity)
 
     @staticmethod
-    def _loss(state: State, after: State, released: State, struck: State) -> Loss:
-        plastic = released.kinetic - struck.kinetic
-        return Loss(plastic, state.kinetic - after.kinetic - plastic, state.potential - after.potential)
+    def _loss(state: State, after: State, released: State, struck: State, plastic: Loss) -> Loss:
+        collided = released.kinetic - struck.kinetic
+        kinetic, strain = state.kinetic - after.kinetic - collided, state.potential - after.potential
+        return replace(plastic, truncation_kinetic=kinetic, truncation_strain=strain)
 
     def _changes(
         self, state: State, striking: set[int], after: State, compliant: set[int], pushed: dict[int, float]
@@ -314,10 +327,22 @@ class EventRule:
 
     def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
         """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
-        rows = state.level.level.gap_rows[touching]
-        velocity, impulses = nearest_admissible(rows, state.velocity)
+        rows = state.level.level.speed_rows[touching]
+        velocity, impulses = nearest_admissible(rows, state.velocity, self._free(state.level))
         after = replace(state, velocity=velocity)
-        return after, impulses, Loss(impact=state.kinetic - after.kinetic)
+        lost = state.kinetic - after.kinetic
+        plastic = self._plastic(lost, rows @ state.velocity, impulses)
+        return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
+
+    @staticmethod
+    def _free(level: LoadedLevel) -> int:
+        """How many coordinates of a level an impulse can change, the first ones."""
+        return level.level.modes
+
+    @staticmethod
+    def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
+        """Energy [J] that an impact dissipates: what the structure lost, as long as no stop moves."""
+        return lost
 
     def _pressing(self, released: State, state: State, touching: list[int]) -> set[int]:
         """Contacts at rest relative to their stop after an impact whose free motion would close them further.
@@ -325,13 +350,12 @@ class EventRule:
         Motion is acceleration, or where that presses none of them the first derivative that counts.
         """
         own = state.level.level
-        rows = own.gap_rows[touching]
+        rows = own.speed_rows[touching]
         speeds = np.abs(released.velocity) + np.abs(state.velocity)
         resting = np.abs(rows @ state.velocity) <= RESTING * np.abs(rows) @ speeds
         if not np.any(resting):
             return set()
-        acceleration = state.level.acceleration(state.displacement, state.velocity)
-        _, multipliers = nearest_admissible(rows[resting], acceleration)
+        _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         return pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
@@ -341,7 +365,8 @@ class EventRule:
         if level is state.level:
             return state, Loss()
         move = self.transition(state.level, level)
-        after = State(level, move.displacement(state.displacement), move.velocity(state.velocity), state.phases)
+        displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
+        after = replace(state, level=level, displacement=displacement, velocity=velocity)
         return after, Loss(0.0, state.kinetic - after.kinetic, state.potential - after.potential)
 
     def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:

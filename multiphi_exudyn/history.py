@@ -24,7 +24,7 @@ import numpy.polynomial.chebyshev as chebyshev
 
 from multiphi_exudyn.errors import NumericalFailure
 
-__all__ = ["History", "Piece"]
+__all__ = ["History", "Piece", "translated"]
 
 DEGREE = 8  # of the polynomials that stand for smooth functions
 MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
@@ -36,9 +36,9 @@ Function = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Piece:
-    """u(t + s) = Re exp(rate s) sum_d coefficients_d s^d for 0 <= s < duration [s]; the last one ends at infinity."""
+    """u(t + s) = Re exp(rate s) sum_d coefficients_d s^d up to t + s = ``until`` [s]; the last one ends at infinity."""
 
-    duration: float
+    until: float
     rate: complex
     coefficients: np.ndarray
 
@@ -119,13 +119,10 @@ class History:
         """What holds from t on."""
         i = int(np.searchsorted(self.breaks, t, side="right")) - 1
         if i < 0 or i >= self.pieces:
-            until = self.breaks[0] if i < 0 else math.inf
-            return Piece(float(until - t), 0j, np.zeros(1, complex))
-        delay = t - float(self.breaks[i])
-        coefficients = self.coefficients[i]
-        if delay:
-            coefficients = _translated(coefficients, delay) * np.exp(self.rates[i] * delay)
-        return Piece(float(self.breaks[i + 1] - t), complex(self.rates[i]), coefficients)
+            return Piece(float(self.breaks[0]) if i < 0 else math.inf, 0j, np.zeros(1, complex))
+        rate = complex(self.rates[i])
+        coefficients = translated(rate, self.coefficients[i], t - float(self.breaks[i]))
+        return Piece(float(self.breaks[i + 1]), rate, coefficients)
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """u at times (k,)."""
@@ -139,9 +136,14 @@ class History:
         return np.where(inside, (values * np.exp(self.rates[i] * s)).real, 0.0)
 
 
-def _translated(coefficients: np.ndarray, delay: float) -> np.ndarray:
-    """sum_d a_d (s + delay)^d in powers of s, by repeated synthetic division."""
-    moved = coefficients.copy()
+def translated(rate: complex, coefficients: np.ndarray, delay: float) -> np.ndarray:
+    """exp(rate s) sum_d a_d s^d of coefficients (D + 1, ...), from a later start: s -> s + delay.
+
+    By repeated synthetic division.
+    """
+    if delay == 0:
+        return coefficients
+    moved = coefficients * np.exp(rate * delay)
     for lowest in range(len(moved) - 1):
         for d in range(len(moved) - 2, lowest - 1, -1):
             moved[d] += delay * moved[d + 1]

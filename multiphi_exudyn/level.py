@@ -157,6 +157,11 @@ class Level:
         doubled = np.where(self.omega > 0, 2 * self.omega, np.inf)
         return np.diagonal(self.damping) / doubled
 
+    @property
+    def speed_rows(self) -> np.ndarray:
+        """Gap velocities (c, r) from eta', as impacts see them."""
+        return self.gap_rows
+
     @functools.cached_property
     def shapes(self) -> np.ndarray:
         """Mass-normalised mode shapes (n, r)."""
@@ -205,12 +210,16 @@ class Level:
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates."""
         base, index = self.base, list(self.indices)
-        directions, stiffness = base.directions[:, index], base.stiffnesses[index]
-        forces, configuration = _rest(base, directions, base.gaps[index], stiffness, load)
+        forces, configuration = self.rest(load, base.gaps[index])
         projected = self.vectors.T @ load
-        drive = np.where(self.omega > 0, 0.0, projected + self.vectors.T @ (directions @ forces))
+        drive = np.where(self.omega > 0, 0.0, projected + self.vectors.T @ (base.directions[:, index] @ forces))
         strain = base.strain(configuration, index)
         return Asymptotic(configuration, forces, drive, projected, strain, strain - float(load @ configuration))
+
+    def rest(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
+        base, index = self.base, list(self.indices)
+        return _rest(base, base.directions[:, index], gaps, base.stiffnesses[index], load)
 
 
 def build_base(structure: LinearStructure, contacts: Sequence[UnilateralContact], modes: int | str) -> Base:

@@ -8,8 +8,8 @@ from enum import Enum
 
 import numpy as np
 
-from multiphi_exudyn.first_root import ZERO, Signals
-from multiphi_exudyn.modal_response import ModalResponse
+from multiphi_exudyn.first_root import ZERO, DescentFinder, Signals
+from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Change", "Event", "Loss", "Phase", "Row", "SignalTable", "State", "sign_of"]
@@ -40,39 +40,69 @@ class State:
     @property
     def kinetic(self) -> float:
         """Kinetic energy [J]."""
-        return 0.5 * float(self.velocity.dot(self.velocity))
+        return float(self.level.kinetic(self.velocity))
 
     @property
     def potential(self) -> float:
         """Strain energy less the potential of static loads [J]; a transition can only lower it."""
         return self.level.potential(self.displacement)
 
+    @property
+    def acceleration(self) -> np.ndarray:
+        """eta'' (r,)."""
+        return self.level.acceleration(self.displacement, self.velocity)
+
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials of the motion that starts here."""
+        return self.level.level.response.basis
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """V (r, p): eta is the real part of V times coefficients times exponentials."""
+        return self.level.level.response.shapes
+
+    @property
+    def finder(self) -> DescentFinder:
+        """Event location on these exponentials."""
+        return self.level.level.finder
+
     def coefficients(self) -> np.ndarray:
-        """Coefficients (p,) of the level's exponentials for the motion that starts here."""
+        """Coefficients (p,) of the exponentials for the motion that starts here."""
         drive = self.level.asymptotic.drive
         return self.level.level.response.coefficients(
             self.displacement, self.velocity, drive if self.level.driven else None
         )
 
+    def after(self, coefficients: np.ndarray, t: float) -> State:
+        """The state a time t [s] later, of the motion with these coefficients."""
+        displacement, velocity = self.level.level.response.state(coefficients, t)
+        return State(self.level, displacement, velocity, self.phases)
+
 
 @dataclass(frozen=True)
 class Loss:
-    """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped."""
+    """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
+
+    stop_work: what moving stops put into it by their impulses, no loss.
+    """
 
     impact: float = 0.0
     truncation_kinetic: float = 0.0
     truncation_strain: float = 0.0
+    stop_work: float = 0.0
 
     def __add__(self, other: Loss) -> Loss:
         return Loss(
             self.impact + other.impact,
             self.truncation_kinetic + other.truncation_kinetic,
             self.truncation_strain + other.truncation_strain,
+            self.stop_work + other.stop_work,
         )
 
     @property
     def total(self) -> float:
-        """Sum of all parts [J]."""
+        """Sum of all that was lost [J]."""
         return self.impact + self.truncation_kinetic + self.truncation_strain
 
 
@@ -152,18 +182,19 @@ def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
 
 
 class SignalTable:
-    """Linear functions of a level's state, ready to become signals of time for any motion in that level.
+    """Linear functions of a level's state, ready to become signals of time for any motion on its basis.
 
-    rows: the functions. rates: those whose time derivative is meant.
+    basis, shapes: exponentials and V (r, p), as in State. rows: the functions.
+    rates: those whose time derivative is meant.
     """
 
-    def __init__(self, response: ModalResponse, rows: list[Row], rates: list[bool]) -> None:
-        r = response.shapes.shape[0]
+    def __init__(self, basis: Exponentials, shapes: np.ndarray, rows: list[Row], rates: list[bool]) -> None:
+        r = len(shapes)
         position = np.array([row.position for row in rows]).reshape(len(rows), r)
         rate = np.array([row.rate for row in rows]).reshape(len(rows), r)
-        self._basis = response.basis
-        self._position = position @ response.shapes
-        self._rate = rate @ response.shapes if np.any(rate) else None
+        self._basis = basis
+        self._position = position @ shapes
+        self._rate = rate @ shapes if np.any(rate) else None
         self._rates = np.flatnonzero(rates)
         self._constants = np.array([0.0 if is_rate else row.constant for row, is_rate in zip(rows, rates, strict=True)])
 

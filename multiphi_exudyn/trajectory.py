@@ -55,6 +55,44 @@ class Segment:
             coefficients = response.basis.derivative(coefficients)
         return (response.shapes @ (coefficients * response.basis.at(t - self.start)).T).real
 
+    def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
+        """Gap (k,) [m] of a contact at times (k,)."""
+        return np.asarray(self.level.level.gap_rows[contact] @ self.modal(t) + self.level.gap_constants[contact])
+
+    def force(self, contact: int, t: np.ndarray) -> np.ndarray:
+        """Contact force (k,) [N] at times (k,), zero where the contact is open."""
+        own = self.level.level
+        if contact not in own.indices:
+            return np.zeros(len(t))
+        k = own.indices.index(contact)
+        moving = own.force_rows[k] @ self.modal(t) + own.force_rate_rows[k] @ self.modal(t, 1)
+        return np.asarray(moving + self.level.asymptotic.forces[k])
+
+    def force_integral(self, contact: int, start: float, end: float) -> float:
+        """Integral of the force of a closed contact [N s], exact: a sum of exponentials plus a constant."""
+        own = self.level.level
+        k, response = own.indices.index(contact), own.response
+        c = response.basis.shifted(self.coefficients, start - self.start)
+        terms = (own.force_rows[k] @ response.shapes) * c
+        terms = terms + (own.force_rate_rows[k] @ response.shapes) * response.basis.derivative(c)
+        integral = float((terms @ response.basis.integrals(end - start)).real)
+        return integral + float(self.level.asymptotic.forces[k]) * (end - start)
+
+    def energy(self, t: np.ndarray) -> np.ndarray:
+        """Kinetic + strain energy (k,) [J] at times (k,)."""
+        return np.asarray(self.level.kinetic(self.modal(t, 1)) + self.level.strain(self.modal(t)))
+
+    def damping_work(self) -> float:
+        """Integral of eta'^T D eta' [J], in closed form pair by pair of exponentials."""
+        own = self.level.level
+        if not np.any(own.damping):
+            return 0.0
+        return own.response.dissipated(self.coefficients, own.damping, self.end - self.start)
+
+    def varying_work(self) -> float:
+        """Work [J] of loads and stops that vary in time."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -130,15 +168,12 @@ class Trajectory:
         """Gap [m] of a contact: a float, or (k,)."""
         i = self.model.index(contact)
 
-        def gaps(segment: Segment, times: np.ndarray) -> np.ndarray:
-            return segment.level.level.gap_rows[i] @ segment.modal(times) + segment.level.gap_constants[i]
-
-        return self._evaluate(t, side, gaps)
+        return self._evaluate(t, side, lambda segment, times: segment.gaps(i, times))
 
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
         i = self.model.index(contact)
-        return self._evaluate(t, side, lambda segment, times: _force(segment, i, times))
+        return self._evaluate(t, side, lambda segment, times: segment.force(i, times))
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
         """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
@@ -147,7 +182,7 @@ class Trajectory:
         if first > last:
             raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
         pushed = sum(
-            _force_integral(segment, i, max(first, segment.start), min(last, segment.end))
+            segment.force_integral(i, max(first, segment.start), min(last, segment.end))
             for segment in self.segments
             if i in segment.level.level.indices and segment.start < last and segment.end > first
         )
@@ -169,7 +204,7 @@ class Trajectory:
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Kinetic + strain energy [J], the strain of closed compliant contacts included."""
-        return self._evaluate(t, side, _energy)
+        return self._evaluate(t, side, lambda segment, times: segment.energy(times))
 
     @functools.cached_property
     def ledger(self) -> Ledger:
@@ -180,15 +215,16 @@ class Trajectory:
         y0, v0 = self.start.displacement, self.start.velocity
         last = self.segments[-1]
         end = np.array([last.end])
+        varying = sum(segment.varying_work() for segment in self.segments)
         reached = last.level.configuration(last.modal(end)[:, 0])
         return Ledger(
             initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating),
-            work_of_loads=float(self.load @ (reached - y0)),
+            work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
-            damping=sum(_damping_work(segment) for segment in self.segments),
-            final=float(_energy(last, end)[0]),
+            damping=sum(segment.damping_work() for segment in self.segments),
+            final=float(last.energy(end)[0]),
         )
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
@@ -201,8 +237,7 @@ class Trajectory:
         for segment in self.segments:
             if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
                 times = np.linspace(segment.start, segment.start + segment.armed_at or segment.end, samples)
-                gaps = segment.level.level.gap_rows[i] @ segment.modal(times) + segment.level.gap_constants[i]
-                depth = min(depth, float(np.min(gaps)))
+                depth = min(depth, float(np.min(segment.gaps(i, times))))
         return depth
 
     # ------------------------------------------------------------------ evaluation
@@ -262,38 +297,3 @@ class Trajectory:
             raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
         found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
         return np.maximum(found, 0)
-
-
-def _energy(segment: Segment, times: np.ndarray) -> np.ndarray:
-    displacement, velocity = segment.modal(times), segment.modal(times, 1)
-    return np.asarray(0.5 * np.sum(velocity**2, axis=0) + segment.level.strain(displacement))
-
-
-def _force(segment: Segment, contact: int, times: np.ndarray) -> np.ndarray:
-    own = segment.level.level
-    if contact not in own.indices:
-        return np.zeros(len(times))
-    k = own.indices.index(contact)
-    force = own.force_rows[k] @ segment.modal(times) + own.force_rate_rows[k] @ segment.modal(times, 1)
-    return np.asarray(force + segment.level.asymptotic.forces[k])
-
-
-def _force_integral(segment: Segment, contact: int, start: float, end: float) -> float:
-    """Exact: the force is a sum of exponentials plus a constant."""
-    own = segment.level.level
-    k = own.indices.index(contact)
-    response = own.response
-    c = response.basis.shifted(segment.coefficients, start - segment.start)
-    terms = (own.force_rows[k] @ response.shapes) * c
-    terms = terms + (own.force_rate_rows[k] @ response.shapes) * response.basis.derivative(c)
-    integral = float((terms @ response.basis.integrals(end - start)).real)
-    return integral + float(segment.level.asymptotic.forces[k]) * (end - start)
-
-
-def _damping_work(segment: Segment) -> float:
-    """Integral of eta'^T D eta' over the segment, in closed form pair by pair of exponentials."""
-    own = segment.level.level
-    if not np.any(own.damping):
-        return 0.0
-    response = own.response
-    return response.dissipated(segment.coefficients, own.damping, segment.end - segment.start)

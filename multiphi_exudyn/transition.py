@@ -66,6 +66,10 @@ class LoadedLevel:
         potential = 0.5 * float(stretched.dot(stretched)) + self.asymptotic.potential
         return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
 
+    def kinetic(self, velocity: np.ndarray) -> np.ndarray:
+        """Kinetic energy [J] of (r,) or of every column of (r, k)."""
+        return np.asarray(0.5 * (velocity * velocity).sum(axis=0))
+
     def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """eta'' (r,) from eta, eta' (38.3)."""
         own = self.level
@@ -76,8 +80,8 @@ class LoadedLevel:
         return float(self.level.gap_rows[contact] @ displacement + self.gap_constants[contact])
 
     def configuration(self, displacement: np.ndarray) -> np.ndarray:
-        """y = Psi eta + y_inf (m,) in base coordinates."""
-        return self.level.vectors @ displacement + self.asymptotic.configuration
+        """y = Psi eta + y_inf in base coordinates, (m,) or (m, k)."""
+        return np.asarray((self.level.vectors @ displacement).T + self.asymptotic.configuration).T
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,11 @@ class Transition:
         """T (r_m, r_l)."""
         return self.target.level.vectors.T @ self.source.level.vectors
 
+    @property
+    def velocity_matrix(self) -> np.ndarray:
+        """The same for velocities."""
+        return self.matrix
+
     @functools.cached_property
     def offset(self) -> np.ndarray:
         """c (r_m,)."""
@@ -104,18 +113,25 @@ class Transition:
 
     def velocity(self, eta_t: np.ndarray) -> np.ndarray:
         """eta'_m from eta'_l."""
-        return self.matrix @ eta_t
+        return self.velocity_matrix @ eta_t
 
 
-def nearest_admissible(rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest_admissible(rows: np.ndarray, vector: np.ndarray, free: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """(v+, p): the vector nearest to ``vector`` (r,) with rows v+ >= 0, and its multipliers p (k,) >= 0.
 
-    Both of Moreau's laws: velocities at an impact, accelerations of contacts that touch at rest.
+    Both of Moreau's laws: velocities at an impact, accelerations of contacts that touch at rest. Only the first
+    ``free`` components change, all of them for None.
     """
+    free = len(vector) if free is None else free
+    rows, given = rows[:, :free], rows @ vector
     if len(rows) == 1:
         row = rows[0]
-        multiplier = max(0.0, -float(row @ vector) / float(row @ row))
-        return vector + multiplier * row, np.array([multiplier])
-    lengths = np.linalg.norm(rows, axis=1)
-    multipliers = scipy.optimize.nnls((rows / lengths[:, None]).T, -vector)[0] / lengths
-    return vector + multipliers @ rows, multipliers
+        multipliers = np.array([max(0.0, -float(given[0]) / float(row @ row))])
+    else:
+        lengths = np.linalg.norm(rows, axis=1)
+        units = rows / lengths[:, None]
+        same = vector if free == len(vector) else np.linalg.lstsq(units, given / lengths, rcond=None)[0]
+        multipliers = scipy.optimize.nnls(units.T, -same)[0] / lengths
+    after = vector.copy()
+    after[:free] += multipliers @ rows
+    return after, multipliers

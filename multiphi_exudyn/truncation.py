@@ -111,9 +111,8 @@ def _size(segment: Segment, displacement: np.ndarray, velocity: np.ndarray) -> f
     base = own.level.base
     held = [i for i in own.level.indices if np.isinf(base.stiffnesses[i])]
     after = _state(segment, segment.start)
-    d = _admissible(base.directions[:, held], displacement - own.asymptotic.configuration)
-    d = d - (after[0] - own.asymptotic.configuration)
-    w = _admissible(base.directions[:, held], velocity) - after[1]
+    d = _admissible(base.directions[:, held], displacement - after[0])
+    w = _admissible(base.directions[:, held], velocity - after[1])
     omega = base.modes.omega
     elastic = omega > 0
     lost = np.where(elastic, w, 0.0) / np.where(elastic, omega, 1.0)

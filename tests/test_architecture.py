@@ -11,10 +11,10 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
-    ("modes", "modal_response", "first_root", "history"),
+    ("modes", "modal_response", "first_root", "history", "forced_response"),
     ("structure", "beam", "contact", "loads"),
-    ("level", "transition", "model"),
-    ("state", "event_rule", "trajectory", "truncation", "simulate", "compiled"),
+    ("level", "transition", "model", "excitation"),
+    ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("exudyn_plugin",),
     ("study.scene",),
     ("study.running",),

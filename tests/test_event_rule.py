@@ -23,6 +23,7 @@ from multiphi_exudyn import (
     planar_beam,
     simulate,
 )
+from multiphi_exudyn.motion import Motion
 from reference_models.rig import rig_beam, rig_contact
 
 DAMPINGS = ("none", "modal", "rayleigh", "given")
@@ -185,7 +186,7 @@ class TestSmallestScenes:
         assert_allclose(run.energy(50.0), 0.5, rtol=1e-10)
 
     def test_more_events_than_the_modes_can_follow_are_a_failure_with_its_cause(self, monkeypatch):
-        monkeypatch.setattr(sys.modules[simulate.__module__], "EVENTS_PER_PERIOD", 1.5)
+        monkeypatch.setattr(sys.modules[Motion.__module__], "EVENTS_PER_PERIOD", 1.5)
         run = simulate(oscillator(gap=0.0, contact=8.0), 1000.0, displacement=[1.0])
         assert run.status == "failed"
         assert "chatter: 200 events in" in run.message

@@ -29,7 +29,7 @@ from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
-from multiphi_exudyn.simulate import CHATTER_WINDOW, Motion
+from multiphi_exudyn.motion import CHATTER_WINDOW, Motion
 from multiphi_exudyn.state import Event, Phase, State
 
 __all__ = ["MultiPhiBody", "flags", "matrices"]

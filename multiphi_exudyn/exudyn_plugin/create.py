@@ -16,7 +16,8 @@ from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.loads import ConstantLoad
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
-from multiphi_exudyn.simulate import Motion, simulate
+from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.structure import is_real
 
 __all__ = ["CreateMultiPhiBody"]

@@ -1,0 +1,368 @@
+"""Driven motion: a run under loads and stops that vary in time, exact from event to event like any other.
+
+In the coordinates xi = (eta, w) of excitation.py the motion from a state is again a sum of exponentials,
+
+    xi(t) = Re V (c exp(lambda t)) + Re sum_j exp(mu_j t) sum_k x_jk t^k
+
+the free response and the closed-form response to the present piece of every load (forced_response.py), so events are
+certified as they are elsewhere. Where a piece ends, the motion goes on in the same level with the next one; a load
+that jumps there may make contacts change, by the same rule.
+
+The work of what varies is that of the loads, of the stops of compliant contacts and of those of rigid ones,
+
+    f.y' + lambda s w' + (Y w').(M y'' + C y' + K y - f)
+
+integrated by Gauss-Legendre quadrature, exact to round-off on panels short beside the shortest period.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.excitation import Drive, DrivenLevel, DrivenTransition, Excitation
+from multiphi_exudyn.first_root import DescentFinder
+from multiphi_exudyn.forced_response import particular
+from multiphi_exudyn.loads import Load
+from multiphi_exudyn.modal_response import Exponentials
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.state import Phase, SignalTable, State
+from multiphi_exudyn.trajectory import Segment, Start, Trajectory
+from multiphi_exudyn.transition import LoadedLevel, Transition
+
+__all__ = ["driven"]
+
+NODES = 20  # of the quadrature on a panel
+PANEL = 6.0  # rad, the phase of the fastest exponential on it: products of two have twice that
+CHUNK = 512  # panels evaluated at a time
+Basis = tuple[tuple[complex, int], ...]  # carriers and numbers of powers
+
+
+@dataclass(frozen=True)
+class Flow:
+    """xi(t) = Re shapes (coefficients * basis) from a state on. key: what distinguishes its basis in its level."""
+
+    basis: Exponentials
+    shapes: np.ndarray
+    coefficients: np.ndarray
+    key: Basis
+
+    @classmethod
+    def of(cls, level: DrivenLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
+        """The motion from xi, xi' under a drive, good for [0, horizon]."""
+        own = level.plain.level
+        response, q = own.response, level.excitation.channels
+        blocks, key = list[np.ndarray](), list[tuple[complex, int]]()
+        for rate, given in drive.terms:
+            forces = given @ level.force.T
+            if np.any(level.force_rate):
+                forces = forces + _rate_of(rate, given) @ level.force_rate.T
+            x = particular(own.omega**2, own.damping, response, rate, forces, horizon)
+            block = np.zeros((max(len(x), len(given)), own.modes + q), complex)
+            block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
+            blocks.append(block)
+            key.append((rate, len(block)))
+        at_once = sum(block[0] for block in blocks).real
+        rate_at_once = sum(_rate_of(k[0], block)[0] for k, block in zip(key, blocks, strict=True)).real
+        (eta, _), (eta_t, _) = level.split(xi - at_once), level.split(xi_t - rate_at_once)
+        steady = level.plain.asymptotic.drive if level.plain.driven else None
+        free = response.coefficients(eta, eta_t, steady)
+        forced = np.concatenate(blocks).T
+        shapes = np.hstack([np.vstack([response.shapes, np.zeros((q, len(free)))]), forced])
+        coefficients = np.concatenate([free, np.ones(forced.shape[1])])
+        return cls(_basis(response.basis, tuple(key)), shapes, coefficients, tuple(key))
+
+    def at(self, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
+        """xi or a derivative, (r + q,) for a scalar, (r + q, k) for (k,) times from the state on."""
+        rows = self.shapes * self.coefficients
+        for _ in range(derivative):
+            rows = self.basis.derivative(rows)
+        return np.asarray((rows @ self.basis.at(t).T).real)
+
+
+@dataclass(frozen=True)
+class DrivenState(State):
+    """A state xi, xi' of a driven level, with the drive from its instant on, that is looked at up to ``until`` [s]."""
+
+    level: DrivenLevel
+    drive: Drive
+    until: float
+    finders: dict[tuple[tuple[int, ...], Basis], DescentFinder]
+
+    @functools.cached_property
+    def flow(self) -> Flow:
+        """The motion that starts here."""
+        horizon = _bucket(min(self.drive.until, self.until) - self.drive.time)
+        return Flow.of(self.level, self.displacement, self.velocity, self.drive, horizon)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """xi'' (r + q,)."""
+        (eta, w), (eta_t, w_t) = self.level.split(self.displacement), self.level.split(self.velocity)
+        forced = self.level.force @ w + self.level.force_rate @ w_t
+        return np.concatenate([self.level.plain.acceleration(eta, eta_t) + forced, self.drive.values[2]])
+
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials of the motion that starts here."""
+        return self.flow.basis
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """xi is the real part of these times coefficients times exponentials."""
+        return self.flow.shapes
+
+    @property
+    def finder(self) -> DescentFinder:
+        """Event location on these exponentials."""
+        key = self.closed, self.flow.key
+        if key not in self.finders:
+            self.finders[key] = DescentFinder(self.flow.basis)
+        return self.finders[key]
+
+    def coefficients(self) -> np.ndarray:
+        """Coefficients (p,) of the exponentials for the motion that starts here."""
+        return self.flow.coefficients
+
+    def after(self, coefficients: np.ndarray, t: float) -> DrivenState:
+        """The state a time t [s] later."""
+        return replace(self, displacement=self.flow.at(t), velocity=self.flow.at(t, 1), drive=self.drive.after(t))
+
+
+class DrivenRule(EventRule):
+    """The event rule under an excitation; ``drive``: at the start of the run, which ends at ``until`` [s]."""
+
+    def __init__(self, model: MultiPhiModel, excitation: Excitation, until: float) -> None:
+        super().__init__(model, excitation.static)
+        self.excitation = excitation
+        self.drive = excitation.drive(0.0)
+        self.until = until
+        self.finders: dict[tuple[tuple[int, ...], Basis], DescentFinder] = {}
+        self._driven: dict[tuple[int, ...], DrivenLevel] = {}
+
+    def level(self, closed: Iterable[int]) -> DrivenLevel:
+        """The level with these contacts closed, under the static loads and the excitation."""
+        key = tuple(sorted(closed))
+        if key not in self._driven:
+            self._driven[key] = DrivenLevel.under(super().level(key), self.excitation)
+        return self._driven[key]
+
+    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+        """The map between two levels, computed once."""
+        key = (source.level.indices, target.level.indices)
+        if key not in self._maps:
+            assert isinstance(source, DrivenLevel)
+            assert isinstance(target, DrivenLevel)
+            self._maps[key] = DrivenTransition(source, target)
+        return self._maps[key]
+
+    def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
+        """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
+        waiting, rows, rates = self.watched(state.level, phases)
+        return waiting, SignalTable(state.basis, state.shapes, rows, rates)
+
+    @functools.cached_property
+    def stop_speeds(self) -> np.ndarray:
+        """Velocities (c,) [m/s] of the stops at the start, along h."""
+        return np.asarray(self.excitation.stops @ self.drive.values[1])
+
+    def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
+        """Strain energy less the potential of the loads [J] at the start of a configuration y (m,)."""
+        base, values, index = self.model.base, self.drive.values[0], list(penetrating)
+        gaps = base.gaps[index] + base.directions[:, index].T @ displacement - self.excitation.stops[index] @ values
+        strain = 0.5 * (np.sum((base.modes.omega * displacement) ** 2) + base.stiffnesses[index] @ gaps**2)
+        return float(strain - self.excitation.load(values) @ displacement)
+
+    def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
+        assert isinstance(level, DrivenLevel)
+        (w, w_t, _), modes = self.drive.values, level.plain.level.modes
+        vectors, shown = level.plain.level.vectors.T, level.level.vectors[:, modes:]
+        eta = vectors @ (displacement - level.asymptotic.configuration - shown @ w)
+        eta_t = vectors @ (velocity - level.carried @ w_t)
+        return DrivenState(
+            level=level,
+            displacement=np.concatenate([eta, w]),
+            velocity=np.concatenate([eta_t, w_t]),
+            phases=(Phase.ARMED,) * len(self._rigid),
+            drive=self.drive,
+            until=self.until,
+            finders=self.finders,
+        )
+
+    @staticmethod
+    def _free(level: LoadedLevel) -> int:
+        assert isinstance(level, DrivenLevel)
+        return level.plain.level.modes
+
+    @staticmethod
+    def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
+        return -0.5 * float(impulses @ speeds)
+
+
+@dataclass(frozen=True)
+class DrivenSegment(Segment):
+    """Motion in one driven level; flow: its closed form. entry_work: work [J] of what jumped where it begins."""
+
+    flow: Flow
+    entry_work: float
+
+    def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """xi or its first or second derivative, (r + q, k) at times (k,)."""
+        return self.flow.at(t - self.start, derivative)
+
+    def force_integral(self, contact: int, start: float, end: float) -> float:
+        """Integral of the force of a closed contact [N s]."""
+        return sum(float(weights @ self.force(contact, times)) for times, weights in self._quadrature(start, end))
+
+    def damping_work(self) -> float:
+        """Integral of y'^T C y' [J]."""
+        if not np.any(self._driven.level.base.damping):
+            return 0.0
+        return sum(float(weights @ self._dissipation(t)) for t, weights in self._quadrature(self.start, self.end))
+
+    def varying_work(self) -> float:
+        """Work [J] of loads and stops that vary in time."""
+        parts = self._quadrature(self.start, self.end)
+        return self.entry_work + sum(float(weights @ self._power(times)) for times, weights in parts)
+
+    @property
+    def _driven(self) -> DrivenLevel:
+        assert isinstance(self.level, DrivenLevel)
+        return self.level
+
+    def _dissipation(self, times: np.ndarray) -> np.ndarray:
+        moved = self._driven.motion(self.modal(times, 1))
+        return np.asarray(np.sum(moved * (self._driven.level.base.damping @ moved), axis=0))
+
+    def _power(self, times: np.ndarray) -> np.ndarray:
+        """Power (k,) [W] of the channels."""
+        level, base = self._driven, self._driven.level.base
+        xi, xi_t = self.modal(times), self.modal(times, 1)
+        w, w_t = level.split(xi)[1], level.split(xi_t)[1]
+        varying = level.excitation.patterns @ w
+        power = np.sum(varying * (level.level.vectors @ xi_t), axis=0)
+        index = [i for i in level.level.indices if not math.isinf(base.stiffnesses[i])]
+        springs = base.stiffnesses[index][:, None] * (
+            level.level.gap_rows[index] @ xi + level.gap_constants[index][:, None]
+        )
+        power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
+        if np.any(level.carried):
+            moved, accelerated = level.motion(xi_t), level.motion(self.modal(times, 2))
+            y = level.configuration(xi)
+            load = level.excitation.static[:, None] + varying
+            residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
+            residual += base.directions[:, index] @ springs
+            power += np.sum((level.carried @ w_t) * residual, axis=0)
+        return np.asarray(power)
+
+    def _quadrature(self, start: float, end: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Times and weights of the integral from start to end, in parts."""
+        fastest = float(np.max(np.abs(self.flow.basis.rates), initial=0.0))
+        panels = max(1, math.ceil(fastest * (end - start) / PANEL))
+        width, (nodes, weights) = (end - start) / panels, _gauss_legendre()
+        for first in range(0, panels, CHUNK):
+            lefts = start + width * np.arange(first, min(panels, first + CHUNK))
+            yield (lefts[:, None] + width * nodes).ravel(), np.tile(width * weights, len(lefts))
+
+
+@dataclass
+class DrivenMotion(Motion):
+    """A run under an excitation."""
+
+    work: float = field(default=0.0, init=False)  # of what varies, at instants, since the last segment began
+
+    def _begin(self) -> None:
+        super()._begin()
+        self.work = self._varying_work(self.start.displacement, self._state)
+
+    @property
+    def _state(self) -> DrivenState:
+        assert isinstance(self.state, DrivenState)
+        return self.state
+
+    def _continue(self, end: float) -> None:
+        """On to the end of the present pieces, and into the next ones."""
+        if self.time >= self._state.drive.until:
+            self._next_piece()
+        self._one_segment(min(end, self._state.drive.until))
+
+    def _next_piece(self) -> None:
+        """The same state under the drive that follows; a load that jumps may make contacts ask."""
+        before, level = self._state, self._state.level
+        assert isinstance(self.rule, DrivenRule)
+        drive = self.rule.excitation.drive(self.time)
+        w, w_t, _ = drive.values
+        (eta, _), (eta_t, old_w_t) = level.split(before.displacement), level.split(before.velocity)
+        eta_t = eta_t + level.plain.level.vectors.T @ (level.carried @ (old_w_t - w_t))
+        displacement, velocity = np.concatenate([eta, w]), np.concatenate([eta_t, w_t])
+        after = replace(before, displacement=displacement, velocity=velocity, drive=drive)
+        moved = level.configuration(after.displacement) - level.configuration(before.displacement)
+        self.work += _energy(after) - _energy(before) - float(self.rule.load @ moved)
+        self.state = after
+        functions = ((i, self.rule.function(level, i)) for i, p in enumerate(after.phases) if p is Phase.ARMED)
+        asking = {i for i, s in functions if s.sign(after.displacement, after.velocity) < 0}
+        if asking:
+            self._decide(asking)
+
+    def _decide(self, asking: set[int]) -> None:
+        before = self._state.level.configuration(self._state.displacement)
+        super()._decide(asking)
+        self.work += self._varying_work(before, self._state)
+
+    def _varying_work(self, before: np.ndarray, state: DrivenState) -> float:
+        """Work [J] of the varying loads where the configuration jumps from y (m,) to that of a state."""
+        _, w = state.level.split(state.displacement)
+        moved = state.level.configuration(state.displacement) - before
+        return float((state.level.excitation.patterns @ w) @ moved)
+
+    def _segment(self, started: float, coefficients: np.ndarray, armed_at: float) -> Segment:
+        state, entry_work, self.work = self._state, self.work, 0.0
+        given = started, self.time, state.level, coefficients, state.phases, armed_at
+        return DrivenSegment(*given, flow=state.flow, entry_work=entry_work)
+
+    def _evaluations(self) -> int:
+        assert isinstance(self.rule, DrivenRule)
+        return self.model.evaluations + sum(finder.evaluations for finder in self.rule.finders.values())
+
+
+def driven(model: MultiPhiModel, loads: Sequence[Load], start: Start, end: float) -> Trajectory:
+    """The run of ``model`` from a start to ``end`` [s] under loads of which some vary in time."""
+    rule = DrivenRule(model, Excitation.of(model, loads, end), end)
+    motion = DrivenMotion(model, rule, start)
+    motion.advance(end)
+    return motion.trajectory(end)
+
+
+def _energy(state: DrivenState) -> float:
+    return float(state.level.kinetic(state.velocity) + state.level.strain(state.displacement))
+
+
+def _rate_of(rate: complex, given: np.ndarray) -> np.ndarray:
+    """Time derivative of exp(rate t) sum_d given_d t^d, as such a sum (D + 1, q)."""
+    result = rate * given
+    result[:-1] += np.arange(1, len(given))[:, None] * given[1:]
+    return result
+
+
+def _basis(free: Exponentials, key: Basis) -> Exponentials:
+    """The exponentials of the free response and t^k exp(mu t) of every carrier."""
+    rates = np.concatenate([free.rates, *(np.full(count, rate) for rate, count in key)])
+    return Exponentials(rates, np.concatenate([free.powers, *(np.arange(count) for _, count in key)]))
+
+
+def _bucket(duration: float) -> float:
+    """The power of two above a duration: bases are shared among pieces of about the same length."""
+    return math.ldexp(1.0, math.frexp(duration)[1])
+
+
+@functools.cache
+def _gauss_legendre() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (nodes + 1) / 2, weights / 2

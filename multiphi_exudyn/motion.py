@@ -1,0 +1,198 @@
+"""Motion: a run under way, from event to event.
+
+Within a level the motion is a sum of exponentials; the next event is the certified first root of a few of them
+(first_root.py); the event rule (event_rule.py) gives the state that follows. A failure on the way ends the run early,
+with its cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.state import Change, Event, Loss, Phase
+from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
+
+__all__ = ["CHATTER_WINDOW", "CompiledMotion", "Motion"]
+
+EVENTS_PER_PERIOD = 20  # of the highest kept mode: more, over CHATTER_WINDOW events, is chatter
+CHATTER_WINDOW = 200
+
+
+@dataclass
+class Motion:
+    """A run under way: advances the state and collects segments and events."""
+
+    model: MultiPhiModel
+    rule: EventRule
+    start: Start
+    time: float = 0.0
+    segments: list[Segment] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    message: str = ""
+    start_loss: Loss = field(default_factory=Loss)
+
+    def __post_init__(self) -> None:
+        self._evaluated, self._transitions = self._evaluations(), self.rule.transitions
+        try:
+            self._begin()
+        except NumericalFailure as failure:
+            self.message = f"at t = 0 s: {failure}"
+
+    def _begin(self) -> None:
+        """First state, with the events of the start."""
+        self.state, self.start_loss, changes = self.rule.start(
+            self.start.displacement, self.start.velocity, self.start.penetrating, self.start.touching
+        )
+        if changes:
+            self._record(changes, self.start_loss)
+            self.start_loss = Loss()
+
+    def advance(self, end: float) -> None:
+        """Carries the state to ``end``, or to the failure that stops it."""
+        try:
+            while not self.message and self.time < end:
+                self._continue(end)
+        except MultiPhiError as failure:
+            self.message = f"at t = {self.time:.9g} s: {failure}"
+
+    def trajectory(self, end: float) -> Trajectory:
+        """What has been collected."""
+        segments, events = self._collected()
+        return Trajectory(
+            model=self.model,
+            segments=segments,
+            events=events,
+            t_end=self.time if self.message else end,
+            status="failed" if self.message else "ok",
+            message=self.message,
+            start=self.start,
+            start_loss=self.start_loss,
+            load=self.rule.load,
+            stats=Statistics(
+                levels_built=self.model.levels_built,
+                levels_possible=2 ** len(self.model.contacts),
+                transitions=self.rule.transitions - self._transitions,
+                events=len(events),
+                segments=len(segments),
+                function_evaluations=self._evaluations() - self._evaluated,
+            ),
+        )
+
+    def _evaluations(self) -> int:
+        """Samples of event signals so far."""
+        return self.model.evaluations
+
+    def _continue(self, end: float) -> None:
+        """Some way towards ``end``."""
+        self._one_segment(end)
+
+    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
+        return tuple(self.segments), tuple(self.events)
+
+    def _keep(self, segment: Segment) -> None:
+        self.segments.append(segment)
+
+    def _keep_event(self, event: Event) -> None:
+        self.events.append(event)
+
+    def _count(self) -> int:
+        return len(self.segments)
+
+    def _recent(self) -> list[tuple[float, float]]:
+        """Start [s] and highest frequency [Hz] of the segments that the chatter check is about."""
+        return [(segment.start, segment.level.level.highest_frequency) for segment in self.segments[-CHATTER_WINDOW:]]
+
+    def _one_segment(self, end: float) -> None:
+        """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
+        state, horizon = self.state, end - self.time
+        finder, coefficients = state.finder, state.coefficients()
+        reached, asking, armed_at = 0.0, set[int](), 0.0
+        phases = state.phases
+        while not asking:
+            waiting, table = self.rule.watch(state, phases)
+            signals = table.signals(coefficients)
+            found = finder.first(signals, horizon, reached)
+            if found is None:
+                reached = horizon
+                break
+            reached = found.time
+            alone = len(phases) == 1  # one contact's signals exclude each other
+            fallen = [waiting[s] for s in ([found.signal] if alone else finder.simultaneous(signals, found))]
+            asking = {contact for contact, asks in fallen if asks}
+            if not asking:
+                armed, armed_at = {contact for contact, _ in fallen}, reached
+                phases = tuple(Phase.ARMED if i in armed else phase for i, phase in enumerate(phases))
+        started, self.time = self.time, end if reached == horizon else self.time + reached
+        self._keep(self._segment(started, coefficients, armed_at))
+        self.state = replace(state.after(coefficients, reached), phases=phases)
+        if asking:
+            self._decide(asking)
+            self._check_chatter()
+
+    def _segment(self, started: float, coefficients: np.ndarray, armed_at: float) -> Segment:
+        """The motion from the present state up to now."""
+        return Segment(started, self.time, self.state.level, coefficients, self.state.phases, armed_at)
+
+    def _decide(self, asking: set[int]) -> None:
+        """These contacts ask to change at this instant."""
+        self.state, loss, changes = self.rule.decide(self.state, asking)
+        self._record(changes, loss)
+
+    def _record(self, changes: list[Change], loss: Loss) -> None:
+        for change in changes:
+            name = self.model.contacts[change.contact].name
+            self._keep_event(Event(self.time, name, change.kind, loss, change.impulse))
+            loss = Loss()
+
+    def _check_chatter(self) -> None:
+        if self._count() <= CHATTER_WINDOW:
+            return
+        starts, frequencies = zip(*self._recent(), strict=True)
+        elapsed, highest = self.time - starts[0], max(frequencies)
+        if elapsed == 0 or 0 < highest * elapsed < CHATTER_WINDOW / EVENTS_PER_PERIOD:
+            raise NumericalFailure(
+                f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {EVENTS_PER_PERIOD} "
+                f"in a period of the highest kept mode ({highest:g} Hz)"
+            )
+
+
+@dataclass
+class CompiledMotion(Motion):
+    """A run that the compiled loop carries; the NumPy loop takes the segments which that one leaves."""
+
+    loop: Any = None
+    record: Any = None
+
+    def __post_init__(self) -> None:
+        self.record = self.loop.record()
+        super().__post_init__()
+
+    def _continue(self, end: float) -> None:
+        given = self.state, self.time, end, self.record, CHATTER_WINDOW, EVENTS_PER_PERIOD
+        self.state, self.time, chatter = self.loop.advance(*given)
+        if chatter:
+            self._check_chatter()
+        if self.time < end:
+            self._one_segment(end)
+
+    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
+        return self.record.segments, self.record.events
+
+    def _keep(self, segment: Segment) -> None:
+        self.record.add(segment)
+
+    def _keep_event(self, event: Event) -> None:
+        self.record.add_event(event)
+
+    def _count(self) -> int:
+        return self.record.count
+
+    def _recent(self) -> list[tuple[float, float]]:
+        return self.record.recent(CHATTER_WINDOW)
