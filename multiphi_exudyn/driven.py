@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,19 +28,21 @@ from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.excitation import Drive, DrivenLevel, DrivenTransition, Excitation
 from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.forced_response import particular
-from multiphi_exudyn.loads import Load
+from multiphi_exudyn.loads import Load, Smooth, Sweep
 from multiphi_exudyn.modal_response import Exponentials
-from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.state import Phase, SignalTable, State
-from multiphi_exudyn.trajectory import Segment, Start, Trajectory
+from multiphi_exudyn.trajectory import Segment, Trajectory
 from multiphi_exudyn.transition import LoadedLevel, Transition
 
-__all__ = ["driven"]
+__all__ = ["DrivenMotion", "DrivenRule", "DrivenState", "to_tolerance"]
 
 NODES = 20  # of the quadrature on a panel
 PANEL = 6.0  # rad, the phase of the fastest exponential on it: products of two have twice that
 CHUNK = 512  # panels evaluated at a time
+REFINEMENTS = 2  # of smooth courses; the second corrects for what the first has changed
+SAFETY = 1.5  # on the factor by which they are refined
+SAMPLES = 257  # of the energy, for its largest value
 Basis = tuple[tuple[complex, int], ...]  # carriers and numbers of powers
 
 
@@ -102,6 +104,12 @@ class DrivenState(State):
         return Flow.of(self.level, self.displacement, self.velocity, self.drive, horizon)
 
     @property
+    def plain(self) -> State:
+        """eta, eta' alone, in the level under static loads."""
+        eta, eta_t = self.level.split(self.displacement)[0], self.level.split(self.velocity)[0]
+        return State(self.level.plain, eta, eta_t, self.phases)
+
+    @property
     def acceleration(self) -> np.ndarray:
         """xi'' (r + q,)."""
         (eta, w), (eta_t, w_t) = self.level.split(self.displacement), self.level.split(self.velocity)
@@ -136,21 +144,28 @@ class DrivenState(State):
 
 
 class DrivenRule(EventRule):
-    """The event rule under an excitation; ``drive``: at the start of the run, which ends at ``until`` [s]."""
+    """The rule ``plain`` under an excitation as well, for motions from ``time`` to ``until`` [s].
 
-    def __init__(self, model: MultiPhiModel, excitation: Excitation, until: float) -> None:
-        super().__init__(model, excitation.static)
+    drive: at ``time``.
+    """
+
+    def __init__(self, plain: EventRule, excitation: Excitation, time: float, until: float) -> None:
+        super().__init__(plain.model, plain.load)
+        self.plain = plain
         self.excitation = excitation
-        self.drive = excitation.drive(0.0)
-        self.until = until
+        self.set_out(time, until)
         self.finders: dict[tuple[tuple[int, ...], Basis], DescentFinder] = {}
         self._driven: dict[tuple[int, ...], DrivenLevel] = {}
+
+    def set_out(self, time: float, until: float) -> None:
+        """Take another time and end [s] for the motions that follow."""
+        self.drive, self.until = self.excitation.drive(time), until
 
     def level(self, closed: Iterable[int]) -> DrivenLevel:
         """The level with these contacts closed, under the static loads and the excitation."""
         key = tuple(sorted(closed))
         if key not in self._driven:
-            self._driven[key] = DrivenLevel.under(super().level(key), self.excitation)
+            self._driven[key] = DrivenLevel.under(self.plain.level(key), self.excitation)
         return self._driven[key]
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
@@ -167,7 +182,7 @@ class DrivenRule(EventRule):
         waiting, rows, rates = self.watched(state.level, phases)
         return waiting, SignalTable(state.basis, state.shapes, rows, rates)
 
-    @functools.cached_property
+    @property
     def stop_speeds(self) -> np.ndarray:
         """Velocities (c,) [m/s] of the stops at the start, along h."""
         return np.asarray(self.excitation.stops @ self.drive.values[1])
@@ -185,11 +200,16 @@ class DrivenRule(EventRule):
         vectors, shown = level.plain.level.vectors.T, level.level.vectors[:, modes:]
         eta = vectors @ (displacement - level.asymptotic.configuration - shown @ w)
         eta_t = vectors @ (velocity - level.carried @ w_t)
+        return self.state(State(level.plain, eta, eta_t, (Phase.ARMED,) * len(self._rigid)))
+
+    def state(self, plain: State) -> DrivenState:
+        """A state eta, eta' of a level under static loads as one under the drive."""
+        w, w_t, _ = self.drive.values
         return DrivenState(
-            level=level,
-            displacement=np.concatenate([eta, w]),
-            velocity=np.concatenate([eta_t, w_t]),
-            phases=(Phase.ARMED,) * len(self._rigid),
+            level=self.level(plain.closed),
+            displacement=np.concatenate([plain.displacement, w]),
+            velocity=np.concatenate([plain.velocity, w_t]),
+            phases=plain.phases,
             drive=self.drive,
             until=self.until,
             finders=self.finders,
@@ -331,12 +351,38 @@ class DrivenMotion(Motion):
         return self.model.evaluations + sum(finder.evaluations for finder in self.rule.finders.values())
 
 
-def driven(model: MultiPhiModel, loads: Sequence[Load], start: Start, end: float) -> Trajectory:
-    """The run of ``model`` from a start to ``end`` [s] under loads of which some vary in time."""
-    rule = DrivenRule(model, Excitation.of(model, loads, end), end)
-    motion = DrivenMotion(model, rule, start)
-    motion.advance(end)
-    return motion.trajectory(end)
+def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> Trajectory:
+    """The run, with smooth courses so fine that the response has their tolerance: ``run`` takes them finer by a factor.
+
+    A modal force that is off by dp leaves z = (omega eta, eta') off by no more than the integral of |dp|, whatever the
+    level. What a course's interpolation leaves, times |P| and the length of the run, is compared with the largest |z|.
+    Sensitivity to events is not in this bound: it separates any two motions that are not the same.
+    """
+    courses = [getattr(load, "course", None) for load in loads]
+    wanted = [course.tolerance for course in courses if isinstance(course, (Smooth, Sweep))]
+    trajectory, finer = run(1.0), 1.0
+    for _ in range(REFINEMENTS if wanted else 0):
+        error = _interpolation_error(trajectory)
+        if trajectory.status != "ok" or error <= min(wanted):
+            return trajectory
+        finer *= SAFETY * error / min(wanted)
+        trajectory = run(finer)
+    if wanted and trajectory.status == "ok" and (error := _interpolation_error(trajectory)) > min(wanted):
+        told = f"smooth loads: the response is certain to {error:.2g} of its largest value, not to {min(wanted):g}"
+        return replace(trajectory, message=told)
+    return trajectory
+
+
+def _interpolation_error(trajectory: Trajectory) -> float:
+    """Bound of the error of z that interpolated courses leave, relative to its largest value."""
+    level = trajectory.segments[0].level
+    assert isinstance(level, DrivenLevel)
+    errors = np.array([history.error for history in level.excitation.histories])
+    lasting = trajectory.t_end * float(np.linalg.norm(np.abs(level.force) @ errors))
+    if lasting == 0:
+        return 0.0
+    energies = np.asarray(trajectory.energy(np.linspace(0.0, trajectory.t_end, SAMPLES)))
+    return lasting / max(math.sqrt(2 * float(np.max(energies))), np.finfo(float).tiny)
 
 
 def _energy(state: DrivenState) -> float:

@@ -27,7 +27,6 @@ instant is a failure, with its cause.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -160,7 +159,7 @@ class EventRule:
         state, lost, made = self.decide(state, set())
         return state, loss + lost, changes + made
 
-    @functools.cached_property
+    @property
     def stop_speeds(self) -> np.ndarray:
         """Velocities (c,) [m/s] of the stops at the present instant, along h."""
         return np.zeros(len(self._rigid))

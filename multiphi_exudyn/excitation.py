@@ -116,6 +116,11 @@ class Excitation:
             terms[piece.rate][: len(piece.coefficients), channel] = piece.coefficients
         return Drive(time, min(piece.until for piece in pieces), tuple(terms.items()))
 
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """w, w' (k, 2, q) at times (k,)."""
+        found = [(history.at(times), history.derivative.at(times)) for history in self.histories]
+        return np.array(found).reshape(self.channels, 2, len(times)).transpose(2, 1, 0)
+
     def load(self, values: np.ndarray) -> np.ndarray:
         """All loads (m,) at an instant with channels w (q,)."""
         return np.asarray(self.static + self.patterns @ values)

@@ -45,11 +45,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class History:
-    """See the module's docstring. breaks: t_i (n + 1,). rates: mu (n,) complex. coefficients: a (n, D + 1) complex."""
+    """See the module's docstring. breaks: t_i (n + 1,). rates: mu (n,) complex. coefficients: a (n, D + 1) complex.
+
+    error: how far it may be from the function it stands for.
+    """
 
     breaks: np.ndarray
     rates: np.ndarray
     coefficients: np.ndarray
+    error: float = 0.0
 
     @classmethod
     def constant(cls, value: float) -> History:
@@ -83,7 +87,7 @@ class History:
         """Pieces of degree DEGREE on [0, end], halved until they agree with the function."""
         lefts, widths = np.arange(FIRST_PIECES) * (end / FIRST_PIECES), np.full(FIRST_PIECES, end / FIRST_PIECES)
         done: list[tuple[np.ndarray, ...]] = []
-        count = 0
+        count, worst = 0, 0.0
         while len(lefts):
             carriers = omega(lefts + widths / 2)
             series, errors, size = _fit(function, lefts, widths, carriers)
@@ -92,6 +96,7 @@ class History:
             lefts, widths = lefts[~good], widths[~good] / 2
             lefts, widths = np.concatenate([lefts, lefts + widths]), np.concatenate([widths, widths])
             count += int(np.sum(good))
+            worst = max(worst, float(np.max(errors[good], initial=0.0)))
             if count + len(lefts) > MOST_PIECES or np.any(widths < np.finfo(float).eps * end):
                 raise NumericalFailure(
                     f"function of time: not smooth enough for a tolerance of {tolerance:g} near t = {lefts[0]:g} s "
@@ -100,7 +105,7 @@ class History:
         starts, widths, carriers, series = (np.concatenate(parts) for parts in zip(*done, strict=True))
         order = np.argsort(starts)
         scaled = series[order] @ _power_matrix() / widths[order, None] ** np.arange(DEGREE + 1)
-        return cls(np.append(starts[order], end), 1j * carriers[order], scaled)
+        return cls(np.append(starts[order], end), 1j * carriers[order], scaled, max(worst, ROUND_OFF * size))
 
     @property
     def pieces(self) -> int:
@@ -113,7 +118,9 @@ class History:
         degrees = np.arange(1, self.coefficients.shape[1])
         moved = np.zeros_like(self.coefficients)
         moved[:, :-1] = degrees * self.coefficients[:, 1:]
-        return History(self.breaks, self.rates, self.rates[:, None] * self.coefficients + moved)
+        steepest = float(np.max(np.abs(self.rates) + 2 * DEGREE**2 / np.diff(self.breaks)))  # Markov's inequality
+        changed = self.rates[:, None] * self.coefficients + moved
+        return History(self.breaks, self.rates, changed, self.error * steepest if self.error else 0.0)
 
     def local(self, t: float) -> Piece:
         """What holds from t on."""
@@ -123,6 +130,26 @@ class History:
         rate = complex(self.rates[i])
         coefficients = translated(rate, self.coefficients[i], t - float(self.breaks[i]))
         return Piece(float(self.breaks[i + 1]), rate, coefficients)
+
+    @functools.cached_property
+    def jumps(self) -> np.ndarray:
+        """u after less u before every break (n + 1,), the first and the last among them; nothing jumps at infinity."""
+        ends = np.diff(self.breaks)
+        last = np.zeros(self.pieces, complex)
+        finite = np.isfinite(ends)
+        for column in self.coefficients[finite].T[::-1]:
+            last[finite] = last[finite] * ends[finite] + column
+        last[finite] *= np.exp(self.rates[finite] * ends[finite])
+        first = self.coefficients[:, 0].real
+        return np.append(first, 0.0) - np.concatenate([[0.0], last.real])
+
+    @functools.cached_property
+    def largest(self) -> float:
+        """A bound of |u|, from the sizes of its terms."""
+        ends = np.diff(self.breaks)
+        degrees = np.arange(self.coefficients.shape[1])
+        reach = np.where(degrees > 0, np.where(np.isfinite(ends), ends, 0.0)[:, None] ** degrees, 1.0)
+        return float(np.max(np.sum(np.abs(self.coefficients) * reach, axis=1)))
 
     def at(self, t: np.ndarray) -> np.ndarray:
         """u at times (k,)."""

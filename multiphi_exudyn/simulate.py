@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.driven import driven
+from multiphi_exudyn.driven import DrivenMotion, DrivenRule, to_tolerance
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.excitation import Excitation
@@ -25,7 +25,7 @@ from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Start, Trajectory
 from multiphi_exudyn.truncation import adapted
 
-__all__ = ["simulate"]
+__all__ = ["simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 
@@ -40,25 +40,48 @@ def simulate(
 ) -> Trajectory:
     """Motion of ``model`` from 0 to t_end [s].
 
-    displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: constant loads.
+    displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
     compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
+    Loads that vary in time are not for the compiled loop.
     A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
-    that is ok says where a Tolerance could not be reached.
+    that is ok says where a Tolerance, or that of a smooth load, could not be reached.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
     if isinstance(model.modes, Tolerance):
         return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads, compiled))
     end = _time("t_end", t_end)
-    start = _start(model, displacement, velocity)
-    excitation = Excitation.of(model, loads, end)
-    if not excitation.channels:
-        motion = _motion(model, _rule(model, excitation.static), start, compiled)
+
+    def run(finer: float) -> Trajectory:
+        motion = started(model, end, displacement, velocity, loads, compiled, finer)
         motion.advance(end)
         return motion.trajectory(end)
+
+    return to_tolerance(run, loads)
+
+
+def started(
+    model: MultiPhiModel,
+    end: float,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    loads: Sequence[Load],
+    compiled: bool | None,
+    finer: float = 1.0,
+) -> Motion:
+    """A motion at its start, for a run to ``end`` [s]; arguments as in ``simulate``.
+
+    finer: smooth courses of loads are taken to their tolerance / finer.
+    """
+    excitation = Excitation.of(model, loads, end, finer)
+    if not excitation.channels:
+        start = _start(model, displacement, velocity, np.zeros(len(model.contacts)))
+        return _motion(model, _rule(model, excitation.static), start, compiled)
     if compiled:
         raise MultiPhiValueError("compiled: got True with loads that vary in time, need None or False")
-    return driven(model, loads, start, end)
+    rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
+    moved = excitation.stops @ rule.drive.values[0]
+    return DrivenMotion(model, rule, _start(model, displacement, velocity, moved))
 
 
 def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
@@ -91,10 +114,13 @@ def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
     return rule
 
 
-def _start(model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None) -> Start:
+def _start(
+    model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None, moved: np.ndarray
+) -> Start:
+    """The start as the contacts see it, whose stops have ``moved`` (c,) [m] along h."""
     base = model.base
     y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
-    gaps = (y @ base.directions + base.gaps).tolist()
+    gaps = (y @ base.directions + base.gaps - moved).tolist()
     directions, initial = base.magnitudes
     scales = (TOUCHING * (initial + np.abs(y) @ directions)).tolist()
     penetrating, touching = list[int](), list[int]()

@@ -202,7 +202,7 @@ class SignalTable:
         """The signals of the motion with these coefficients (p,)."""
         values = self._position * coefficients
         if self._rate is not None:
-            values = values + self._rate * self._basis.derivative(coefficients)
+            values = values + self._basis.derivative(self._rate * coefficients)
         if len(self._rates):
             values[self._rates] = self._basis.derivative(values[self._rates])
         return Signals(values, self._constants)

@@ -31,6 +31,7 @@ from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
 from multiphi_exudyn.motion import CHATTER_WINDOW, Motion
 from multiphi_exudyn.state import Event, Phase, State
+from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["MultiPhiBody", "flags", "matrices"]
 
@@ -53,17 +54,17 @@ class MultiPhiBody:
         self.matched_step = matched_step
         self.time = math.nan
         self._motion = motion
-        self._rule: EventRule = motion.rule
+        self._rule = self._plain_rule()
         self._size = self._rule.level(()).level.modes
-        self._state = motion.state
+        self._state = self._plain(motion.state)
         self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
         self._tests: dict[tuple[int, ...], tuple[StepTest, Lookahead]] = {}
         self._step = self._rounding = self._ahead = self._speed = math.nan
         self._alone, self._clear, self._wait = False, 0, 0
         self._x = np.zeros(0)
         self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
-        self._in_solver = self._stepped(motion.state.closed)
-        self._given = self._in_solver.state(motion.state.displacement, motion.state.velocity, np.zeros(self._size))
+        self._in_solver = self._stepped(self._state.closed)
+        self._given = self._in_solver.state(self._state.displacement, self._state.velocity, np.zeros(self._size))
         self._given_events = tuple(motion.events)
 
     @property
@@ -85,7 +86,32 @@ class MultiPhiBody:
         """The level of closed contacts as the solver has it."""
         return self._stepped(tuple(closed))
 
+    def force_vector(self, stepped: SteppedLevel) -> np.ndarray:
+        """Constant force (s,) of the object in a level, at the present time."""
+        return stepped.drive
+
+    def shown(
+        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, time: np.ndarray
+    ) -> tuple[LoadedLevel, np.ndarray, np.ndarray]:
+        """Level and coordinates (.., k), with their rates, in which configurations and forces are read."""
+        return stepped.loaded, eta, eta_t
+
+    def _plain_rule(self) -> EventRule:
+        """The event rule under static loads."""
+        return self._motion.rule
+
+    def _plain(self, state: State) -> State:
+        """A state of the motion as one of the level under static loads."""
+        return state
+
+    def _own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+        """Modal force (s,) of the body's own varying loads at a time, in a level."""
+        return np.zeros(self._size)
+
     # ------------------------------------------------------------------ a step
+
+    def before_step(self, mbs: Any, t: float) -> None:
+        """Called by Exudyn before a step that ends at t."""
 
     def after_step(self, mbs: Any, t: float) -> None:
         """Called by Exudyn when a step is done, and at the start."""
@@ -163,7 +189,8 @@ class MultiPhiBody:
     def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
         own, start, known = self._in_solver, self._state, len(self.events)
-        force = self._significant((own.force(before) + own.force(after)) / 2, after)
+        given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
+        force = self._significant((own.force(before) + own.force(after) - given) / 2, after)
         state = self._travel(before, begun, force, force)
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
@@ -173,7 +200,8 @@ class MultiPhiBody:
             return
         reaction = own.force(after) - self._applied(mbs)  # of constraints: known from the level before
         self._write(mbs, state, force)
-        present = self._significant(self._applied(mbs) + reaction, after)
+        outside = self._applied(mbs) + reaction - self._own_force(state.closed, self.time)
+        present = self._significant(outside, after)
         if np.any(present != force):
             del self.events[known:]
             self._state = start
@@ -191,17 +219,22 @@ class MultiPhiBody:
             rule = ForcedRule(rule, lambda level: force if level == closed else entered)
         q, q_t, _ = self._split(before)
         loaded = rule.level(closed)
-        r, eta_t = loaded.level.modes, self._stepped(closed).velocity(q, q_t, force)
-        motion.state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
-        motion.rule, motion.time = rule, begun
+        total = force + self._own_force(closed, begun)
+        r, eta_t = loaded.level.modes, self._stepped(closed).velocity(q, q_t, total)
+        state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
+        motion.rule, motion.state, motion.time = *self._set_out(rule, state, begun), begun
         motion.advance(self.time)
         if motion.message:
             raise NumericalFailure(f"body {self.name!r}: {motion.message}")
         motion.segments.pop()  # those that remain end with events: the chatter check counts them
         del motion.segments[: -CHATTER_WINDOW - 1]
-        end = motion.state
+        end = self._plain(motion.state)
         centre = shift(end.level.level, force if end.closed == closed else entered)
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
+
+    def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
+        """Rule and state of an exact motion from a time on."""
+        return rule, state
 
     def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
         """The modal force; zeros where it is what an iterative solver leaves of the accelerations in x, and alone."""
@@ -280,6 +313,7 @@ class MultiPhiBody:
         stepped = self._in_solver
         if state.closed != self._in_solver.closed:
             stepped = self._load_matrices(mbs, state.closed)
+        force = force + self._own_force(state.closed, self.time)
         for view, values in zip(self._views, stepped.state(state.displacement, state.velocity, force), strict=True):
             view[:] = values
         self._keep(state)
@@ -287,7 +321,7 @@ class MultiPhiBody:
     def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
         """Give the solver the matrices of a level."""
         stepped = self._in_solver = self._stepped(closed)
-        for parameter, value in matrices(stepped).items():
+        for parameter, value in matrices(stepped, self.force_vector(stepped)).items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
@@ -328,11 +362,11 @@ def flags(state: State) -> list[float]:
     return closed + [float(PHASES.index(phase)) for phase in state.phases]
 
 
-def matrices(stepped: SteppedLevel) -> dict[str, np.ndarray]:
+def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
     """Parameters of the ObjectGenericODE2."""
     return {
         "massMatrix": stepped.mass,
         "dampingMatrix": stepped.damping,
         "stiffnessMatrix": stepped.stiffness,
-        "forceVector": stepped.drive,
+        "forceVector": force,
     }

@@ -10,19 +10,21 @@ from typing import Any
 import numpy as np
 from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGenericODE2, VObjectGenericODE2
 
+from multiphi_exudyn.driven import DrivenMotion
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
+from multiphi_exudyn.exudyn_plugin.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
-from multiphi_exudyn.loads import ConstantLoad
+from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.motion import Motion
-from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.simulate import started
 from multiphi_exudyn.structure import is_real
 
 __all__ = ["CreateMultiPhiBody"]
 
-SHORTEST = 1e-12  # s: end of the run by which a start is checked and put into its level
+SHORTEST = 1e-12  # s: end of the run that a start belongs to, until the solver tells its own
 
 
 def CreateMultiPhiBody(
@@ -31,14 +33,14 @@ def CreateMultiPhiBody(
     name: str = "",
     displacement: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
-    loads: Sequence[ConstantLoad] = (),
+    loads: Sequence[Load] = (),
     matchedStepSize: float | None = None,
     show: bool = True,
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
 
     mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: constant loads on the structure.
+    displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``.
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
     stepped_level.py. show: as in other Create functions.
@@ -56,12 +58,14 @@ def CreateMultiPhiBody(
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
-    body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), matchedStepSize)
+    body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
     body.items.update(_add_items(mbs, body, show))
     body.items.update(add_sensors(mbs, body))
     bodies[name] = body
-    if model.contacts or matchedStepSize is not None:
+    if model.contacts or matchedStepSize is not None or isinstance(body, DrivenBody):
         bodies.install(mbs)
+    if isinstance(body, DrivenBody):
+        bodies.install_before(mbs)
     return dict(body.items)
 
 
@@ -74,15 +78,20 @@ def _check_step(step: float | None) -> None:
         raise MultiPhiValueError(f"matchedStepSize: got {step!r}, need a step size > 0 s or None")
 
 
+def _body(name: str, motion: Motion, loads: Sequence[Load], step: float | None) -> MultiPhiBody:
+    if isinstance(motion, DrivenMotion):
+        return DrivenBody(name, motion, loads, step)
+    return MultiPhiBody(name, motion, step)
+
+
 def _motion(
     model: MultiPhiModel,
     displacement: np.ndarray | None,
     velocity: np.ndarray | None,
-    loads: Sequence[ConstantLoad],
+    loads: Sequence[Load],
 ) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
-    start = simulate(model, SHORTEST, displacement, velocity, loads, compiled=False)
-    motion = Motion(model, model.rules[start.load.tobytes()], start.start)
+    motion = started(model, SHORTEST, displacement, velocity, loads, compiled=False)
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion
@@ -102,7 +111,10 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
     items = {"nGenericODE2": node}
     items["oGenericODE2"] = mbs.AddObject(
         ObjectGenericODE2(
-            name=body.name, nodeNumbers=[node], **matrices(stepped), visualization=VObjectGenericODE2(show=show)
+            name=body.name,
+            nodeNumbers=[node],
+            **matrices(stepped, body.force_vector(stepped)),
+            visualization=VObjectGenericODE2(show=show),
         )
     )
     if body.model.contacts:

@@ -97,7 +97,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in ("sCoordinates", "sCoordinates_t", "sCoordinates_tt")])
-    values = _rebuilt(body, rows, flags, stored)
+    values = _rebuilt(body, rows, flags, time, stored)
     return BodyHistories(
         time=time,
         points=dict(zip(names, values[0], strict=True)),
@@ -120,7 +120,7 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
 
 
 def _rebuilt(
-    body: MultiPhiBody, rows: np.ndarray, flags: np.ndarray, stored: np.ndarray
+    body: MultiPhiBody, rows: np.ndarray, flags: np.ndarray, time: np.ndarray, stored: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Displacements and velocities of points, gaps and contact forces, each (.., k), level by level."""
     k, contacts = len(stored), flags.shape[1]
@@ -129,14 +129,15 @@ def _rebuilt(
     in_base = rows @ body.model.base.modes.shapes
     for closed in np.unique(flags, axis=0):
         here = np.flatnonzero(np.all(flags == closed, axis=1))
-        loaded = body.stepped_level(np.flatnonzero(closed).tolist())
-        own, rest, r = loaded.loaded.level, loaded.loaded.asymptotic, loaded.loaded.level.modes
-        physical = loaded.physical @ stored[here].T
-        eta, eta_t = physical[:r], physical[loaded.size : loaded.size + r]
-        moved[:, here] = in_base @ (own.vectors @ eta + rest.configuration[:, None])
-        rates[:, here] = in_base @ own.vectors @ eta_t
-        gaps[:, here] = own.gap_rows @ eta + loaded.loaded.gap_constants[:, None]
-        pushed = own.force_rows @ eta + own.force_rate_rows @ eta_t + rest.forces[:, None]
+        stepped = body.stepped_level(np.flatnonzero(closed).tolist())
+        r, physical = stepped.loaded.level.modes, stepped.physical @ stored[here].T
+        eta, eta_t = physical[:r], physical[stepped.size : stepped.size + r]
+        loaded, xi, xi_t = body.shown(stepped, eta, eta_t, time[here])
+        own, rest = loaded.level, loaded.asymptotic
+        moved[:, here] = in_base @ (own.vectors @ xi + rest.configuration[:, None])
+        rates[:, here] = in_base @ own.vectors @ xi_t
+        gaps[:, here] = own.gap_rows @ xi + loaded.gap_constants[:, None]
+        pushed = own.force_rows @ xi + own.force_rate_rows @ xi_t + rest.forces[:, None]
         forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
     return moved, rates, gaps, forces
 

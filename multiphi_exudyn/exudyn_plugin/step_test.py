@@ -23,7 +23,7 @@ from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.first_root import HERMITE
 from multiphi_exudyn.state import Row
 
-__all__ = ["Lookahead", "StepTest"]
+__all__ = ["Lookahead", "StepTest", "energy_norm", "gains"]
 
 KNOTS = 16  # intervals a lookahead is divided into
 SPACING = 0.5  # rad, the phase of the highest mode in one of them
@@ -34,8 +34,7 @@ class StepTest:
 
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
         size, count = stepped.size, len(rows)
-        scaled = np.concatenate([_omega(stepped), np.ones(size)])[:, None] * stepped.physical[size:]
-        norm = np.hstack([scaled, np.zeros((2 * size, 1))])
+        norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1))])
         self._matrix = np.vstack([_conditions(stepped, rows, step), norm])
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
@@ -89,7 +88,7 @@ def _conditions(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarr
     along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
     rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-    scale = HERMITE * step**4 * _bounds(stepped, np.hstack([along, rate])) + np.finfo(float).tiny
+    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3) + np.finfo(float).tiny
     functions = np.vstack([value - third, value, value + third]) @ stepped.physical
     constants = np.tile([row.constant for row in rows], 3)
     return np.hstack([functions, constants[:, None]]) / np.tile(scale, 3)[:, None]
@@ -111,12 +110,18 @@ def _omega(stepped: SteppedLevel) -> np.ndarray:
     return np.asarray(np.sqrt(np.diagonal(stepped.stiffness)))
 
 
-def _bounds(stepped: SteppedLevel, functionals: np.ndarray) -> np.ndarray:
-    """|[P R] A^3 S^-1| of every row [P R] (2 s,)."""
+def energy_norm(stepped: SteppedLevel) -> np.ndarray:
+    """S z' (2 s,) from (q, q', q'')."""
+    scale = np.concatenate([_omega(stepped), np.ones(stepped.size)])
+    return np.asarray(scale[:, None] * stepped.physical[stepped.size :])
+
+
+def gains(stepped: SteppedLevel, functionals: np.ndarray, power: int) -> np.ndarray:
+    """|[P R] A^power S^-1| of every row [P R] (2 s,)."""
     size = stepped.size
     none, identity = np.zeros((size, size)), np.eye(size)
     system = np.block([[none, identity], [-stepped.stiffness, -stepped.own_damping]])
     scaled = np.block(
         [[none, identity], [-np.diag(_omega(stepped)), -stepped.own_damping]]
     )  # A S^-1, also where omega = 0
-    return np.asarray(np.linalg.norm(functionals @ system @ system @ scaled, axis=1))
+    return np.asarray(np.linalg.norm(functionals @ np.linalg.matrix_power(system, power - 1) @ scaled, axis=1))

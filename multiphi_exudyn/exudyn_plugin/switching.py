@@ -26,9 +26,19 @@ StepFunction = Callable[[Any, float], bool]
 
 
 class Switching(dict[str, "MultiPhiBody"]):
-    """Bodies of one system by name, and their common PostStep user function. ``following``: the user's own, or None."""
+    """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
+    preceding, following: the user's own PreStep and PostStep functions, or None.
+    """
+
+    preceding: StepFunction | None = None
     following: StepFunction | None = None
+
+    def before_step(self, mbs: Any, t: float) -> bool:
+        """Called by Exudyn; whether the run goes on."""
+        for body in self.values():
+            body.before_step(mbs, t)
+        return self.preceding is None or self.preceding(mbs, t)
 
     def after_step(self, mbs: Any, t: float) -> bool:
         """Called by Exudyn; whether the run goes on."""
@@ -38,14 +48,24 @@ class Switching(dict[str, "MultiPhiBody"]):
 
     def install(self, mbs: Any) -> None:
         """Become the system's PostStep function, followed by the present one."""
-        present = mbs.GetPostStepUserFunction()
-        function = present["function"] if isinstance(present, dict) else present
-        if function == self.after_step:
-            return
-        if function and not callable(function):
-            raise MultiPhiTypeError(f"PostStepUserFunction: got {function!r}, need a Python function or 0")
-        self.following = function or None
-        mbs.SetPostStepUserFunction(self.after_step)
+        present = _user_function("PostStep", mbs.GetPostStepUserFunction())
+        if present != self.after_step:
+            self.following = present
+            mbs.SetPostStepUserFunction(self.after_step)
+
+    def install_before(self, mbs: Any) -> None:
+        """Become the system's PreStep function, followed by the present one."""
+        present = _user_function("PreStep", mbs.GetPreStepUserFunction())
+        if present != self.before_step:
+            self.preceding = present
+            mbs.SetPreStepUserFunction(self.before_step)
+
+
+def _user_function(name: str, present: Any) -> StepFunction | None:
+    function = present["function"] if isinstance(present, dict) else present
+    if function and not callable(function):
+        raise MultiPhiTypeError(f"{name}UserFunction: got {function!r}, need a Python function or 0")
+    return function or None
 
 
 def bodies_of(mbs: Any) -> Switching:
@@ -69,7 +89,11 @@ def running_solver(mbs: Any, t: float) -> Any:
 
 def nothing_acts_on(mbs: Any, node: Any, body: Any) -> bool:
     """Whether no item of the system refers to a node or its body, and no user function could change them."""
-    if bodies_of(mbs).following or mbs.GetPreStepUserFunction() or mbs.GetPostNewtonUserFunction():
+    bodies = bodies_of(mbs)
+    before = _user_function("PreStep", mbs.GetPreStepUserFunction())
+    if bodies.following or bodies.preceding or before not in (None, bodies.before_step):
+        return False
+    if mbs.GetPostNewtonUserFunction():
         return False
     own = mbs.GetObject(body)
     if any(own[key] for key in own if key.endswith("UserFunction")):
