@@ -116,6 +116,11 @@ class Excitation:
             terms[piece.rate][: len(piece.coefficients), channel] = piece.coefficients
         return Drive(time, min(piece.until for piece in pieces), tuple(terms.items()))
 
+    @property
+    def stop_ways(self) -> np.ndarray:
+        """Bound (c,) [m] of how far every stop moves."""
+        return np.asarray(np.abs(self.stops) @ np.array([history.largest for history in self.histories]))
+
     def values(self, times: np.ndarray) -> np.ndarray:
         """w, w' (k, 2, q) at times (k,)."""
         found = [(history.at(times), history.derivative.at(times)) for history in self.histories]

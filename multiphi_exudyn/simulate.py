@@ -75,13 +75,13 @@ def started(
     """
     excitation = Excitation.of(model, loads, end, finer)
     if not excitation.channels:
-        start = _start(model, displacement, velocity, np.zeros(len(model.contacts)))
+        start = _start(model, displacement, velocity, *np.zeros((2, len(model.contacts))))
         return _motion(model, _rule(model, excitation.static), start, compiled)
     if compiled:
         raise MultiPhiValueError("compiled: got True with loads that vary in time, need None or False")
     rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
     moved = excitation.stops @ rule.drive.values[0]
-    return DrivenMotion(model, rule, _start(model, displacement, velocity, moved))
+    return DrivenMotion(model, rule, _start(model, displacement, velocity, moved, excitation.stop_ways))
 
 
 def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
@@ -115,14 +115,18 @@ def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
 
 
 def _start(
-    model: MultiPhiModel, displacement: np.ndarray | None, velocity: np.ndarray | None, moved: np.ndarray
+    model: MultiPhiModel,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    moved: np.ndarray,
+    ways: np.ndarray,
 ) -> Start:
-    """The start as the contacts see it, whose stops have ``moved`` (c,) [m] along h."""
+    """The start as the contacts see it, whose stops have ``moved`` along h (c,) [m], of ``ways`` they go at most."""
     base = model.base
     y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
     gaps = (y @ base.directions + base.gaps - moved).tolist()
     directions, initial = base.magnitudes
-    scales = (TOUCHING * (initial + np.abs(y) @ directions)).tolist()
+    scales = (TOUCHING * (initial + np.abs(y) @ directions + ways)).tolist()
     penetrating, touching = list[int](), list[int]()
     for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
         if contact.rigid and gap < -scale:
