@@ -29,7 +29,7 @@ __all__ = ["History", "Piece", "translated"]
 DEGREE = 8  # of the polynomials that stand for smooth functions
 MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
 FIRST_PIECES = 64  # into which a smooth function's interval is divided before any comparison
-ROUND_OFF = 1e-14  # of the largest value: no interpolant is asked to come closer
+ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
 
 Function = Callable[[np.ndarray], np.ndarray]
 
