@@ -18,7 +18,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from multiphi_exudyn.beam import Beam, PointMass, Section
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.structure import ModalDamping
@@ -47,6 +47,7 @@ __all__ = [
 PARAMETER_SETS = ("measured-free", "printed-pinned", "as-published")
 HOLES = ("hole1", "hole2", "hole3")
 CONTACT = "support"
+RIGID_CLAMP = Clamp()
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,11 @@ def identified_set(parameter_set: str = "measured-free") -> ParameterSet:
     return ParameterSet(**_set(given.get("shapes_of", parameter_set)))
 
 
-def rig_beam(parameter_set: str = "measured-free") -> Beam:
-    """The beam with its tip mass and the points node1 to node3 and hole1 to hole3 (nearest the tip)."""
+def rig_beam(parameter_set: str = "measured-free", clamp: Clamp = RIGID_CLAMP) -> Beam:
+    """The beam with its tip mass and the points node1 to node3 and hole1 to hole3 (nearest the tip).
+
+    clamp: ideally rigid in the paper, which names its flexibility as the first open point.
+    """
     known, given = rig(), identified_set(parameter_set)
     values = _assumed_values(parameter_set)
     section = Section.rectangle(
@@ -135,7 +139,7 @@ def rig_beam(parameter_set: str = "measured-free") -> Beam:
         poisson_ratio=values["poisson_ratio"],
     )
     points = {**known.points, **{hole: values[hole] for hole in HOLES}}
-    return Beam([section], points, [PointMass(known.tip_mass_position, known.tip_mass, given.tip_inertia)])
+    return Beam([section], points, [PointMass(known.tip_mass_position, known.tip_mass, given.tip_inertia)], clamp)
 
 
 def rig_contact(stiffness: float = math.inf) -> UnilateralContact:
@@ -153,9 +157,9 @@ def initial_displacement() -> float:
     return _assumed_values("measured-free")["initial_displacement"]
 
 
-def assumptions(parameter_set: str = "measured-free") -> tuple[str, ...]:
-    """What a run with this set rests on beyond the paper, one sentence each, for reports."""
-    numbers = _printed(identified_set(parameter_set))
+def assumptions(parameter_set: str = "measured-free", clamp: Clamp = RIGID_CLAMP) -> tuple[str, ...]:
+    """What a run with this set and clamp rests on beyond the paper, one sentence each, for reports."""
+    numbers = _printed(identified_set(parameter_set)) | {"clamp": _clamp_words(clamp)}
     listed = [
         f"{entry['quantity']}: {entry['text'].format(**numbers)} (assumed: {entry['reason']})"
         for entry in _assumed(parameter_set)
@@ -174,7 +178,13 @@ def _set(name: str) -> dict[str, Any]:
     return _data()["sets"][name]
 
 
-def _printed(numbers: ParameterSet) -> dict[str, float]:
+def _clamp_words(clamp: Clamp) -> str:
+    stiffnesses = {"translation": (clamp.translation, "N/m"), "rotation": (clamp.rotation, "N m/rad")}
+    elastic = [f"{value:g} {unit} in {name}" for name, (value, unit) in stiffnesses.items() if math.isfinite(value)]
+    return f"elastic, {' and '.join(elastic)}" if elastic else "ideally rigid"
+
+
+def _printed(numbers: ParameterSet) -> dict[str, Any]:
     millimetres = {f"{name}_mm": 1e3 * getattr(numbers, name) for name in ("width", "height", "length")}
     return {**millimetres, "tip_inertia": numbers.tip_inertia}
 

@@ -83,12 +83,13 @@ def mechanics_of(scene: Scene) -> Mechanics:
 
 def _structure(scene: Scene, spec: StructureSpec) -> Mechanics:
     if isinstance(spec, RigStructure):
+        clamp = Clamp(spec.clamp_translation, spec.clamp_rotation)
         return Mechanics(
             contacts=(rig_contact(spec.support_stiffness),),
             damping=rig_damping(),
-            beam=rig_beam(spec.rig),
+            beam=rig_beam(spec.rig, clamp),
             parameter_set=spec.rig,
-            assumptions=(*assumptions(spec.rig), *_scene_assumptions(scene, spec)),
+            assumptions=(*assumptions(spec.rig, clamp), *_scene_assumptions(scene, spec)),
         )
     if isinstance(spec, MatrixStructure):
         matrices = _at(scene, "structure", lambda: _matrices(scene.path.parent, spec))
@@ -193,9 +194,13 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
 
 
 def _check_published(scene: Scene, mechanics: Mechanics) -> None:
-    """Printed frequencies of a closed level are those of a rigid support, and say nothing of another."""
+    """Printed frequencies are those of a rigid clamp and of a rigid support, and say nothing of others."""
     if mechanics.parameter_set is None or not published_override(mechanics.parameter_set):
         return
+    for name in ("translation", "rotation"):
+        given = getattr(scene.file.structure, f"clamp_{name}")
+        if math.isfinite(given):
+            refuse(scene, f"structure.clamp_{name}", given, "'rigid': the printed frequencies are of a rigid clamp")
     for i, model in enumerate(scene.file.models):
         if isinstance(model, StepwiseModel):
             refuse(scene, f"models[{i}].kind", model.kind, "reduced: the printed frequencies are of a rigid support")

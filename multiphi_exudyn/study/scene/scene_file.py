@@ -6,10 +6,11 @@ refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 __all__ = [
@@ -37,10 +38,14 @@ def _not_zero(value: float) -> float:
     return value
 
 
+def _rigid_is_infinite(value: Any) -> Any:
+    return math.inf if value == "rigid" else value
+
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Stiffness = Annotated[float, Field(gt=0)]  # N/m or N m; infinite is ideally rigid
+Stiffness = Annotated[float, BeforeValidator(_rigid_is_infinite), Field(gt=0)]  # N/m or N m; inf or "rigid"
 NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
 Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
 Modes = Annotated[int, Field(ge=1)] | Literal["all"]
@@ -64,10 +69,12 @@ class Table(BaseModel):
 
 
 class RigStructure(Table):
-    """The paper's rig by one of its parameter sets, with its support and its measured damping."""
+    """The paper's rig by one of its parameter sets, with its support, its clamp and its measured damping."""
 
     rig: Literal["measured-free", "printed-pinned", "as-published"]
     support_stiffness: Stiffness  # N/m
+    clamp_translation: Stiffness = math.inf  # N/m
+    clamp_rotation: Stiffness = math.inf  # N m/rad
 
 
 class RectangleSection(Table):
@@ -106,8 +113,8 @@ class MassSpec(Table):
 class ClampSpec(Table):
     """Stiffness of the beam's first end; infinite is ideally rigid."""
 
-    translation: Annotated[float, Field(ge=0)] = float("inf")
-    rotation: Annotated[float, Field(ge=0)] = float("inf")
+    translation: Annotated[float, Field(ge=0)] = math.inf
+    rotation: Annotated[float, Field(ge=0)] = math.inf
 
 
 SectionSpec = Annotated[
