@@ -113,12 +113,18 @@ def response_frequencies(
     return _told(*_uneven(times, samples), poles[_resolved(poles, step, times[-1])], most)
 
 
-def level_frequencies(run: ModelRun, contacts: Sequence[str]) -> dict[str, list[float]]:
-    """Level's name -> frequencies [Hz], from the longest interval of every level that the run visits."""
+def level_frequencies(
+    run: ModelRun, contacts: Sequence[str], window: tuple[float, float] | None = None
+) -> dict[str, list[float]]:
+    """Level's name -> frequencies [Hz], from the longest interval of every level that the run visits.
+
+    window [s]: only what lies in it; None for the whole run.
+    """
     histories = np.array(list(run.points.values())).reshape(-1, len(run.time))
+    ends = (float(run.time[0]), float(run.time[-1])) if window is None else window
     return {
         level_name(closed): response_frequencies(run.time, histories, interval, MOST_FREQUENCIES).frequencies.tolist()
-        for closed, interval in _longest_intervals(run, contacts).items()
+        for closed, interval in _longest_intervals(run, contacts, ends).items()
     }
 
 
@@ -212,10 +218,15 @@ def _deviations(matrix: np.ndarray) -> np.ndarray:
 # ------------------------------------------------------------------ levels of a run
 
 
-def _longest_intervals(run: ModelRun, contacts: Sequence[str]) -> dict[tuple[str, ...], tuple[float, float]]:
-    """Set of closed contacts -> longest interval [s] in which just these are closed, in order of the first visit."""
+def _longest_intervals(
+    run: ModelRun, contacts: Sequence[str], ends: tuple[float, float]
+) -> dict[tuple[str, ...], tuple[float, float]]:
+    """Set of closed contacts -> longest interval [s] in which just these are closed, in order of the first visit.
+
+    ends [s]: what lies outside them does not count.
+    """
     given = [run.contact_intervals[name] for name in contacts]
-    edges = np.unique(np.concatenate([run.time[:1], run.time[-1:], *(np.ravel(times) for times in given)]))
+    edges = np.unique(np.concatenate([ends, *(np.clip(np.ravel(times), *ends) for times in given)]))
     middles = (edges[:-1] + edges[1:]) / 2
     closed = [np.searchsorted(of[:, 0], middles) > np.searchsorted(of[:, 1], middles) for of in given]
     longest: dict[tuple[str, ...], tuple[float, float]] = {}
