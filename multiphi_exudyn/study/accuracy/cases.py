@@ -62,6 +62,12 @@ class Study:
         return hashlib.sha256(named.read_bytes()).hexdigest() if named.is_file() else ""
 
     @property
+    def _frequencies(self) -> dict[str, Any] | None:
+        """What a run is asked for beyond its measures."""
+        asked = self.file.frequencies
+        return None if asked is None else asked.model_dump(include={"point", "windows"})
+
+    @property
     def points(self) -> list[dict[str, Any]]:
         """Every combination of the values on the scene's axes."""
         return grid(self.file.axes | (self.file.quick.axes if self.quick else {}))
@@ -116,7 +122,9 @@ class Study:
         model = next((given.model for given in self.file.methods if given.name == method), {})
         return {
             "scene": self.file.scene,
-            "content": _hash([self.scene, model, self.file.time_limit_s, self._matrices, _versions()]),
+            "content": _hash(
+                [self.scene, model, self.file.time_limit_s, self._matrices, _versions(), self._frequencies]
+            ),
             "at": dict(at),
             "method": method,
             "setting": dict(setting),
@@ -178,6 +186,28 @@ def _check(study: Study) -> None:
         except MultiPhiValueError as error:
             told = str(error).removeprefix(f"{study.scene_path}: ")
             raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
+    _check_frequencies(study)
+
+
+def _check_frequencies(study: Study) -> None:
+    """One axis, an ideal that is among the runs, windows in order, a point that the scene has."""
+    asked = study.file.frequencies
+    if asked is None:
+        return
+    if len(study.file.axes) != 1 or not study.file.methods:
+        _refuse(study, "frequencies", f"{len(study.file.axes)} axes", "one axis, and a method")
+    if any(len(study._settings(method)) > 1 for method in study.file.methods):
+        _refuse(study, "frequencies", "a method with several settings", "one setting of each method")
+    if asked.ideal is not None and all(asked.ideal not in at.values() for at in study.points):
+        _refuse(study, "frequencies.ideal", asked.ideal, "one of the axis' values")
+    if asked.ideal_method is not None and asked.ideal_method not in [method.name for method in study.file.methods]:
+        _refuse(study, "frequencies.ideal_method", asked.ideal_method, "the name of a method")
+    if list(asked.windows) != sorted(set(asked.windows)):
+        _refuse(study, "frequencies.windows", list(asked.windows), "ends that ascend")
+    scene = study.scene_for(study.reference(study.points[0]))
+    known = scene.file.outputs.points or mechanics_of(scene).points
+    if asked.point not in known:
+        _refuse(study, "frequencies.point", asked.point, f"one of the points: {', '.join(known)}")
 
 
 def _check_size(study: Study) -> None:

@@ -24,9 +24,11 @@ from multiphi_exudyn.study.comparison.findings import seconds
 from multiphi_exudyn.study.comparison.plots import CONTACT, RESOLUTION, WIDTH
 
 __all__ = [
+    "COLOURS",
     "GRID",
     "LINE",
     "NOTE",
+    "WIDE",
     "Style",
     "error_label",
     "gaps",

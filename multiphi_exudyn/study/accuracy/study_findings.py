@@ -24,6 +24,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
+from multiphi_exudyn.study.accuracy.frequency_findings import frequency_asked, frequency_outcome
 from multiphi_exudyn.study.comparison.findings import percent, seconds, times
 
 __all__ = [
@@ -117,6 +118,12 @@ def timing_words(result: StudyResult) -> str:
 def _asked(result: StudyResult) -> str:
     if not result.study.methods:
         return budget_asked(result)
+    if result.study.frequencies is not None:
+        return f"{frequency_asked(result)} {_asked_of_errors(result)}"
+    return _asked_of_errors(result)
+
+
+def _asked_of_errors(result: StudyResult) -> str:
     given, window = settings(result), f"{result.window:g} s"
     axes = result.study.axes
     where = f", at {len(points(result))} points of {' × '.join(axes)}" if axes else ""
@@ -129,7 +136,8 @@ def _asked(result: StudyResult) -> str:
 
 
 def _outcome(result: StudyResult) -> Iterable[str]:
-    """One sentence per tolerance; where there are several points, one line per point. Then the budgets."""
+    """What the response shows; one sentence per tolerance, or with several points one line per point; the budgets."""
+    yield from frequency_outcome(result)
     shown = shown_points(result)
     for at in shown:
         found = list(_outcome_at(result, at))
