@@ -13,7 +13,18 @@ from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
 
-SHIPPED = ("budget", "initial-displacement", "modes", "modes-rigid", "pareto", "sets")
+SHIPPED = (
+    "amplitude",
+    "budget",
+    "clamp",
+    "clamp-translation",
+    "initial-displacement",
+    "modes",
+    "modes-rigid",
+    "pareto",
+    "sets",
+    "support",
+)
 STUDY = {
     "title": "a small study",
     "scene": "small.toml",

@@ -24,30 +24,42 @@ from multiphi_exudyn.study.accuracy.figure_style import (
     percent_axis,
     styles,
 )
-from multiphi_exudyn.study.accuracy.frequency_changes import OPEN, Mode, Shown, asked_of, axis_of, shown_of, values_of
+from multiphi_exudyn.study.accuracy.frequency_changes import (
+    OPEN,
+    Mode,
+    Shown,
+    asked_of,
+    axis_of,
+    rate_uncertainty,
+    shown_of,
+    values_of,
+)
 from multiphi_exudyn.study.accuracy.frequency_findings import SAME, value_words
+from multiphi_exudyn.study.comparison.plots import CONTACT
 
 __all__ = ["frequency_figure"]
 
 BEYOND = 10.0  # times the largest number: where a value that is a word stands on a logarithmic axis
 DARKEST, BRIGHTEST = 0.0, 0.85  # of the colour map: yellow is hard to see on white
+AGAINST = {"rise": "above the run's own free one", "change": "against the ideal run's"}
 DASHES = ("-", "--", "-.", ":")  # of the levels
 
 
 def frequency_figure(result: StudyResult) -> Figure | None:
-    """Shifts of the levels (where there are any), the early rise of the repetition rate, and its course."""
+    """Shifts of the levels, where there are any; of the repetition rate the early rise, the change and the course."""
     everything = shown_of(result)
     own = [shown for shown in everything if shown.method == REFERENCE]
     if not own:
         return None
     moved = any(abs(shift) > SAME for shown in own for shift in shown.shifts.values())
-    figure, panels = panels_of([4.0] * moved + [3.4, 3.8])
+    figure, panels = panels_of([4.0] * moved + [3.2, 2.4, 3.6])
     for axes in panels:
         axes.grid(color=GRID)
         percent_axis(axes)
     if moved:
         _levels(figure, panels[0], result, own)
-    _rises(panels[-2], result, everything)
+    _along(panels[-3], result, everything, "rise")
+    _along(panels[-2], result, own, "change")
     _course(panels[-1], result, own)
     return figure
 
@@ -77,17 +89,18 @@ def _lines(own: Sequence[Shown], places: Mapping[Any, float]) -> dict[Mode, list
     return {mode: sorted(line) for mode, line in lines.items()}
 
 
-def _rises(axes: Axes, result: StudyResult, everything: Sequence[Shown]) -> None:
-    """Mean rise of the first windows along the axis, of the reference and of every method."""
+def _along(axes: Axes, result: StudyResult, everything: Sequence[Shown], quantity: str) -> None:
+    """Mean of the first windows along the axis; grey: no larger than the reference's own uncertainty."""
     early, places = asked_of(result).early, _places(values_of(result))
     for name, style in styles(result).items():
-        known = sorted((places[s.value], s.mean("rise", early)) for s in everything if s.method == name)
-        if known:
-            x, y = zip(*known, strict=True)
+        found = {places[s.value]: s.mean(quantity, early) for s in everything if s.method == name}
+        if found:
+            x, y = zip(*sorted(found.items()), strict=True)
             drawn = marks(style) | ({"marker": "s"} if name == REFERENCE else {})
             axes.plot(x, [math.nan if each is None else 100 * each for each in y], style.line, **drawn, label=name)
-    axes.set_ylabel(f"repetition rate above the run's own\nfree frequency, first {early:g} s")
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    own = 100 * (rate_uncertainty(result) or 0.0)
+    axes.axhspan(-own, own, color=CONTACT, lw=0, zorder=0)
+    axes.set_ylabel(f"repetition rate, first {early:g} s,\n{AGAINST[quantity]}")
     _value_axis(axes, axis_of(result), places)
     _legend(axes)
 
@@ -100,7 +113,7 @@ def _course(axes: Axes, result: StudyResult, own: Sequence[Shown]) -> None:
         heights = [math.nan if w.rise is None else 100 * w.rise for w in shown.windows]
         axes.stairs(heights, edges, baseline=None, color=to_hex(shade), lw=2, label=value_words(shown.value))
     axes.axhline(0.0, color=LINE, lw=1, zorder=1)
-    axes.set_ylabel("repetition rate above the run's own\nfree frequency, reference")
+    axes.set_ylabel(f"repetition rate, reference,\n{AGAINST['rise']}")
     axes.set_xlabel("time [s], window by window")
     axes.set_xlim(left=0.0)
     _legend(axes, axis_of(result).rpartition(".")[-1])

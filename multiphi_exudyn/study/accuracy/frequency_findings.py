@@ -84,9 +84,9 @@ def _by_sign(lowest: float, highest: float, floor: float, early: float) -> str:
     if -floor <= lowest and highest <= floor:
         return f"No, by its size: it changes {rate} by {both}."
     if highest <= floor:
-        return f"No, by its sign: it lowers {rate}, by {both}."
+        return f"No, by its sign: it lowers {rate}: {both}."
     if lowest >= -floor:
-        return f"It can add to such a rise: it raises {rate}, by {both}."
+        return f"It can add to such a rise: it changes {rate} by {both}."
     return f"Not by its sign alone: it changes {rate} by {both}."
 
 

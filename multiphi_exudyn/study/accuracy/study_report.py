@@ -167,7 +167,7 @@ def _frequencies(result: StudyResult) -> Picture | None:
     figure = frequency_figure(result)
     caption = (
         "Repetition rate: how often the point's motion comes round, contacts counted in. Natural frequencies: of the "
-        "levels themselves, which have no amplitude."
+        "levels themselves, which have no amplitude. Grey: no larger than the reference's own uncertainty."
     )
     return None if figure is None else _picture(figure, caption)
 
