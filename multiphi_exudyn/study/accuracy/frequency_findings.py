@@ -87,7 +87,7 @@ def _by_sign(lowest: float, highest: float, floor: float, early: float) -> str:
         return f"No, by its sign: it lowers {rate}: {both}."
     if lowest >= -floor:
         return f"It can add to such a rise: it changes {rate} by {both}."
-    return f"Not by its sign alone: it changes {rate} by {both}."
+    return f"That depends on its value: it changes {rate} by {both}."
 
 
 def _contact(result: StudyResult) -> str:
