@@ -105,11 +105,11 @@ class TestWords:
 
     def test_an_effect_of_both_signs_is_told_as_one(self):
         rows = [
-            run_of(value, [factor * rate for rate in (6.0, 5.0, 4.0)]) for value, factor in ((1.0, 0.9), (2.0, 1.1))
+            run_of(value, [factor * rate for rate in (6.0, 5.0, 4.0)]) for value, factor in ((1.0, 0.88), (2.0, 1.12))
         ]
         first = next(iter(frequency_outcome(study_of([*rows, RIGID]))))
         assert first.startswith(f"{QUESTION} That depends on its value: it changes")
-        assert "-10 % to +10 %" in first
+        assert "-12 % to +12 %" in first
 
     def test_no_rise_is_laid_to_a_contact_that_makes_none(self):
         calm = run_of("rigid", (4.0, 4.0, 4.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ __all__ = ["frequency_figure"]
 
 BEYOND = 10.0  # times the largest number: where a value that is a word stands on a logarithmic axis
 DARKEST, BRIGHTEST = 0.0, 0.85  # of the colour map: yellow is hard to see on white
+BETWEEN = 20  # points of a piece of line that labels keep clear of
 AGAINST = {"rise": "above the run's own free one", "change": "against the ideal run's"}
 DASHES = ("-", "--", "-.", ":")  # of the levels
 
@@ -72,12 +74,19 @@ def _levels(figure: Figure, axes: Axes, result: StudyResult, own: Sequence[Shown
         colour = COLOURS[(number - 1) % len(COLOURS)]
         style = DASHES[list(own[0].natural).index(level) % len(DASHES)]
         axes.plot(*zip(*line, strict=True), style, color=colour, marker="o", ms=4)
-        obstacles += line
+        obstacles += [point for ends in pairwise(line) for point in _between(*ends)]
         if max(abs(y) for _, y in line) > 100 * SAME:
             labels.append(Label(f"{'free' if level == OPEN else level} {number}", colour, line))
     axes.set_ylabel("natural frequencies of the levels\nagainst the ideal ones")
     _value_axis(axes, axis_of(result), places)
     place_labels(figure, axes, labels, obstacles)
+
+
+def _between(one: tuple[float, float], two: tuple[float, float]) -> list[tuple[float, float]]:
+    """Points along a straight piece of a line, in logarithmic steps where it has no zero."""
+    steps = np.linspace(0, 1, BETWEEN)
+    places = one[0] * (two[0] / one[0]) ** steps if one[0] * two[0] > 0 else one[0] + (two[0] - one[0]) * steps
+    return [(float(x), float(y)) for x, y in zip(places, one[1] + (two[1] - one[1]) * steps, strict=True)]
 
 
 def _lines(own: Sequence[Shown], places: Mapping[Any, float]) -> dict[Mode, list[tuple[float, float]]]:
