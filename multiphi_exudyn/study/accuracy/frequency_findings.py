@@ -24,6 +24,7 @@ __all__ = ["frequency_asked", "frequency_outcome", "signed", "value_words"]
 
 SAME = 1e-6  # of a natural frequency: what eigenvalue solvers leave of no shift
 NOTABLE = 0.01  # of a rate: a rise or a change below it answers no question
+SURE = 2.0  # times the uncertainty of a rate: a single coarser copy need not be the worst one
 SEEN = 1e-3  # of a natural frequency: below it lies the reference's own time step
 
 
@@ -73,7 +74,7 @@ def _answer(result: StudyResult, own: Sequence[Shown]) -> Iterable[str]:
     changes = [(s, s.mean("change", asked.early)) for s in own if s.value != asked.ideal]
     known = [change for _, change in changes if change is not None]
     if known:
-        floor = max(NOTABLE, rate_uncertainty(result) or 0.0)
+        floor = max(NOTABLE, SURE * (rate_uncertainty(result) or 0.0))
         sign = _by_sign(min(known), max(known), floor, asked.early)
         yield f"{asked.question} {sign}{_contact(result)}{_own_free(own, asked)}"
 
