@@ -94,7 +94,7 @@ class TestChanges:
 class TestWords:
     @pytest.mark.parametrize(
         ("factor", "answer"),
-        [(0.8, "No, by its sign"), (1.03, "No, by its size"), (1.2, "It can add to such a rise")],
+        [(0.8, "No, by its sign"), (1.05, "No, by its size"), (1.2, "It can add to such a rise")],
     )
     def test_the_answer_follows_sign_and_size_beyond_the_references_uncertainty(self, factor, answer):
         changed_run = run_of(100.0, [factor * rate for rate in (6.0, 5.0, 4.0)])

@@ -24,7 +24,7 @@ __all__ = ["frequency_asked", "frequency_outcome", "signed", "value_words"]
 
 SAME = 1e-6  # of a natural frequency: what eigenvalue solvers leave of no shift
 NOTABLE = 0.01  # of a rate: a rise or a change below it answers no question
-SURE = 2.0  # times the uncertainty of a rate: a single coarser copy need not be the worst one
+SURE = 3.0  # times the uncertainty of a rate: nearby runs scatter, and a single coarser copy is not the worst of them
 SEEN = 1e-3  # of a natural frequency: below it lies the reference's own time step
 
 
