@@ -9,6 +9,7 @@ a closed-form integral of eta'^T D eta') and what loads did; its residual is the
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,8 @@ from multiphi_exudyn.structure import At
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Ledger", "Segment", "Start", "Statistics", "Trajectory"]
+
+MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
 
 
 @dataclass(frozen=True)
@@ -228,16 +231,16 @@ class Trajectory:
         )
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
-        """Smallest gap [m] of a rigid contact while it is open, 0.0 where truncation left none below zero.
+        """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
 
-        Looked for where the event rule let the gap be negative, ``samples`` per such segment.
+        Looked for where the event rule let the gap be negative, ``samples`` in the shortest period of the level and
+        at least as many in a segment.
         """
         i = self.model.index(contact)
         depth = 0.0
         for segment in self.segments:
             if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
-                times = np.linspace(segment.start, segment.start + segment.armed_at or segment.end, samples)
-                depth = min(depth, float(np.min(segment.gaps(i, times))))
+                depth = min(depth, float(np.min(segment.gaps(i, _unarmed_times(segment, samples)))))
         return depth
 
     # ------------------------------------------------------------------ evaluation
@@ -297,3 +300,11 @@ class Trajectory:
             raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
         found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
         return np.maximum(found, 0)
+
+
+def _unarmed_times(segment: Segment, samples: int) -> np.ndarray:
+    """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several."""
+    waiting = sum(phase is not Phase.ARMED for phase in segment.phases)
+    end = segment.start + segment.armed_at if waiting == 1 and segment.armed_at > 0 else segment.end
+    periods = segment.level.level.highest_frequency * (end - segment.start)
+    return np.linspace(segment.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
-from small_structures import chain, oscillator, stop
+from small_structures import chain, oscillator, random_model, stop
 
 from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
 
@@ -163,6 +163,19 @@ class TestContacts:
         assert len(run.events) > 4
         impulses = run.contact_impulse("stop", 0.0, 6.0) + run.contact_impulse("soft", 0.0, 6.0)
         assert_allclose(run.velocity(6.0).sum() + 0.5, impulses - 8.0 * 6.0, rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "contact"), [("mixed", 169, "c1"), ("compliant", 0, "c1"), ("compliant", 18, "c0")]
+)
+def test_the_deepest_gap_is_that_of_a_dense_grid_though_the_contact_is_never_armed_again(kind, seed, contact):
+    model, random = random_model(seed, kind=kind)
+    run = simulate(model, 20.0, velocity=random.normal(size=model.structure.n) * 3)
+    times = np.linspace(0, 20, 200_001)
+    closed = np.any([(a <= times) & (times <= b) for a, b in run.contact_intervals(contact)], axis=0)
+    deepest = np.min(run.gap(contact, times)[~closed])
+    assert deepest < -0.1
+    assert_allclose(run.deepest_gap(contact), deepest, rtol=1e-2)
 
 
 class TestEnergy:
