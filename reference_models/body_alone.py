@@ -9,29 +9,43 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
 from multiphi_exudyn.model import MultiPhiModel
-from reference_models.exudyn_quiet import quiet
+from reference_models.exudyn_quiet import cpu_limit, quiet
 
 __all__ = ["solve_body_alone"]
 
 
 def solve_body_alone(
-    model: MultiPhiModel, start: np.ndarray, t_end: float, steps: int, points: Sequence[str]
+    model: MultiPhiModel,
+    start: np.ndarray | None,
+    t_end: float,
+    steps: int,
+    points: Sequence[str],
+    *,
+    velocity: np.ndarray | None = None,
+    loads: Sequence[Any] = (),
+    matched: bool = True,
+    cpu_limit_s: float | None = None,
 ) -> tuple[BodyHistories, float]:
-    """Histories of the body released from ``start``, x (n,), and the solver's time [s].
+    """Histories of the body released from ``start``, x (n,), with ``velocity``, x' (n,), and the solver's time [s].
 
-    steps: equal trapezoidal steps from 0 to t_end [s]; the body's modes are matched to them. points: names recorded.
+    steps: equal trapezoidal steps from 0 to t_end [s]; the body's modes are ``matched`` to them or left as they are.
+    points: names recorded. Raises NumericalFailure where the CPU limit stops the solver.
     """
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    with quiet():
-        items = CreateMultiPhiBody(mbs, model, name="body", displacement=start, matchedStepSize=t_end / steps)
+    step = t_end / steps if matched else None
+    with quiet(), cpu_limit(cpu_limit_s):
+        items = CreateMultiPhiBody(mbs, model, "body", start, velocity, loads, matchedStepSize=step)
         mbs.Assemble()
         settings = _simulation_settings(t_end, steps)
         started = time.perf_counter()
         mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
         elapsed = time.perf_counter() - started
+        if mbs.sys["dynamicSolver"].output.simulationTimeout:
+            raise NumericalFailure(f"CPU limit of {cpu_limit_s:g} s reached")
     return body_histories(mbs, items, points), elapsed
 
 

@@ -20,7 +20,7 @@ FLOORS = (
     ("study.running",),
     ("study.measures", "study.sweep"),
     ("study.comparison",),
-    ("study.accuracy",),
+    ("study.accuracy", "study.stability"),
     ("cli",),
 )
 HEAVY = {

@@ -1,7 +1,8 @@
-"""Command line: ``multiphi-exudyn compare | budget | study | scenes | studies``.
+"""Command line: ``multiphi-exudyn compare | budget | study | stability | scenes | studies``.
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
+Of stability: 0 if no case is wrong.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import NoReturn
 
 from multiphi_exudyn.cli.budget_command import run_budget
 from multiphi_exudyn.cli.compare_command import run_compare
+from multiphi_exudyn.cli.stability_command import run_stability
 from multiphi_exudyn.cli.study_command import run_study_file
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.study.accuracy.cases import shipped_studies
@@ -59,6 +61,8 @@ def _run(given: argparse.Namespace) -> bool:
         return run_budget(given.scene, given.t_end, given.modes, given.out)
     if given.command == "study":
         return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
+    if given.command == "stability":
+        return run_stability(given.case, given.quick, given.out)
     return _listed(shipped_scenes() if given.command == "scenes" else shipped_studies())
 
 
@@ -72,12 +76,15 @@ class _OneLineParser(argparse.ArgumentParser):
 
 def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="{compare,budget,study,scenes,studies}")
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="{compare,budget,study,stability,scenes,studies}"
+    )
     compare = commands.add_parser("compare", help="run all models of a scene and write a report")
     _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
     budget = commands.add_parser("budget", help="tell where the difference of a scene's reduced and full model is from")
     _scene_options(budget, "the truncated models instead of the scene's")
     _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
+    _stability_options(commands.add_parser("stability", help="run every model through a catalogue of extreme cases"))
     commands.add_parser("scenes", help="list the shipped scenes")
     commands.add_parser("studies", help="list the shipped studies")
     return parser
@@ -101,6 +108,12 @@ def _study_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--workers", type=_count, metavar="N", help="number of processes (default: one per core)")
     _folder_option(parser, "STUDY")
+
+
+def _stability_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--case", metavar="NAME", help="this case alone")
+    parser.add_argument("--quick", action="store_true", help="fewer cases, shorter ones")
+    _folder_option(parser, "stability")
 
 
 def _folder_option(parser: argparse.ArgumentParser, default: str) -> None:

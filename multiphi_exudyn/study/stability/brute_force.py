@@ -1,0 +1,146 @@
+"""Brute force: contacts looked at on a dense grid, against what the events of a trajectory tell.
+
+    g(t) = h.x(t) + gap,   from the displacement and the contact's own definition, not from the event signals
+
+SAMPLES_PER_PERIOD samples per shortest period of the levels visited, over the whole run where that fits the budget.
+Else half the budget is a grid over the whole run, the other half goes into windows of one such period at full
+density, around events spread evenly over the run (around even times where there are none). Up to MOST_EVENTS events are
+samples themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.state import Phase
+from multiphi_exudyn.trajectory import Trajectory
+
+__all__ = ["ContactSamples", "Sampling", "SegmentTable", "highest_frequency", "missed", "sample_contact", "sampling"]
+
+SAMPLES_PER_PERIOD = 10_000
+MOST_EVENTS = 2_000  # at whose instants a contact is looked at
+CHUNK = 20_000  # samples evaluated at once: what their exponentials take of memory
+TIME_ROUND_OFF = 1e-12  # of the run: an event this near to a sample may lie on either side of it
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """times (k,) ascending; per_period: samples in the shortest period; covered: share of the run at that density."""
+
+    times: np.ndarray
+    per_period: float
+    covered: float
+
+
+@dataclass(frozen=True)
+class SegmentTable:
+    """Of every segment: start, end (s,), closed (s, c), and until when the phase excuses s < 0, -inf for never."""
+
+    start: np.ndarray
+    end: np.ndarray
+    closed: np.ndarray
+    excused: np.ndarray
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> SegmentTable:
+        """The table of a trajectory."""
+        segments, count = list(trajectory.segments), len(trajectory.model.contacts)
+        closed = np.zeros((len(segments), count), dtype=bool)
+        excused = np.full((len(segments), count), -np.inf)
+        for row, segment in enumerate(segments):
+            closed[row, list(segment.level.level.indices)] = True
+            until = segment.start + segment.armed_at if segment.armed_at > 0 else segment.end
+            for i, phase in enumerate(segment.phases):
+                if phase is not Phase.ARMED:
+                    excused[row, i] = until
+        return cls(np.array([s.start for s in segments]), np.array([s.end for s in segments]), closed, excused)
+
+    def owners(self, times: np.ndarray) -> np.ndarray:
+        """Positions of the segments at times (k,)."""
+        return np.maximum(np.searchsorted(self.start, times, side="right") - 1, 0)
+
+
+@dataclass(frozen=True)
+class ContactSamples:
+    """Of one contact at times (k,): gap [m], force [N], whether it is closed, whether its phase excuses s < 0."""
+
+    times: np.ndarray
+    gap: np.ndarray
+    force: np.ndarray
+    closed: np.ndarray
+    excused: np.ndarray
+
+
+def sampling(trajectory: Trajectory, budget: int) -> Sampling:
+    """Where to look at a trajectory with about this many samples."""
+    end = trajectory.t_end
+    shortest = 1 / max(highest_frequency(trajectory), 1 / end)
+    whole = math.ceil(SAMPLES_PER_PERIOD * end / shortest)
+    happened = trajectory.events[:: 1 + len(trajectory.events) // MOST_EVENTS]
+    at = np.array([event.time for event in happened])
+    if whole <= budget:
+        return Sampling(np.unique([*np.linspace(0.0, end, whole + 1), *at]), SAMPLES_PER_PERIOD, 1.0)
+    grid = np.linspace(0.0, end, budget // 2)
+    windows = _windows(trajectory, shortest, max(1, budget // 2 // SAMPLES_PER_PERIOD))
+    times = np.unique(np.clip(np.concatenate([grid, at, *windows]), 0.0, end))
+    return Sampling(times, SAMPLES_PER_PERIOD, min(1.0, len(windows) * shortest / end))
+
+
+def highest_frequency(trajectory: Trajectory) -> float:
+    """Of the levels that a trajectory visits [Hz]."""
+    levels = {segment.level.level.indices: segment.level.level for segment in trajectory.segments}
+    return max(level.highest_frequency for level in levels.values())
+
+
+def _windows(trajectory: Trajectory, width: float, count: int) -> list[np.ndarray]:
+    happened = len(trajectory.events)
+    chosen = np.unique(np.linspace(0, happened - 1, count).astype(int)) if happened else ()
+    centres = [trajectory.events[int(i)].time for i in chosen] or np.linspace(0.0, trajectory.t_end, count)
+    return [centre + width * np.linspace(-0.5, 0.5, SAMPLES_PER_PERIOD) for centre in centres]
+
+
+def sample_contact(
+    trajectory: Trajectory, contact: UnilateralContact, table: SegmentTable, times: np.ndarray
+) -> ContactSamples:
+    """One contact at times (k,)."""
+    chunks = np.array_split(times, math.ceil(len(times) / CHUNK))
+    row = trajectory.model.structure.row(contact.direction)
+    gap = np.concatenate([np.asarray(trajectory.at(row, chunk)) for chunk in chunks]) + contact.gap
+    force = np.concatenate([np.asarray(trajectory.contact_force(contact.name, chunk)) for chunk in chunks])
+    owner, i = table.owners(times), trajectory.model.index(contact.name)
+    return ContactSamples(times, gap, force, table.closed[owner, i], times <= table.excused[owner, i])
+
+
+def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable, name: str, tolerance: float) -> int:
+    """Closings and openings of a contact that no event tells: the most that one of three ways to look finds.
+
+    Samples below -tolerance in an open contact that its phase does not excuse (a run of them counts once); changes of
+    the gap's sign; changes of the level between segments.
+    """
+    own = np.array([event.time for event in trajectory.events if event.contact == name])
+    slack = TIME_ROUND_OFF * trajectory.t_end
+    entered = (samples.gap < -tolerance) & ~samples.closed & ~samples.excused
+    inside = int(entered[0]) + int(np.sum(entered[1:] & ~entered[:-1]))
+    i = trajectory.model.index(name)
+    switched = table.start[1:][table.closed[1:, i] != table.closed[:-1, i]]
+    switches = int(np.sum(_events_in(own, switched - slack, switched + slack) == 0))
+    return max(inside, _untold_signs(samples, own, slack, tolerance), switches)
+
+
+def _untold_signs(samples: ContactSamples, own: np.ndarray, slack: float, tolerance: float) -> int:
+    """Changes of the gap's sign between which no event lies and which no phase excuses."""
+    clear = np.flatnonzero(np.abs(samples.gap) > tolerance)
+    before, after = clear[:-1], clear[1:]
+    change = samples.gap[before] * samples.gap[after] < 0
+    change &= ~(samples.excused[before] | samples.excused[after])
+    between = _events_in(own, samples.times[before[change]] - slack, samples.times[after[change]] + slack)
+    return int(np.sum(between == 0))
+
+
+def _events_in(own: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """How many of the ascending times lie in each interval."""
+    return np.searchsorted(own, last, side="right") - np.searchsorted(own, first, side="left")

@@ -1,0 +1,87 @@
+"""A case of the catalogue: one thing that is hard for a contact model, as a problem every model can be given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.beam import Beam
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.trajectory import Trajectory
+
+__all__ = ["Case", "Problem", "Pull"]
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A beam pulled and let go: what the full nonlinear beam needs beside the contacts and the end of the run.
+
+    elements, step [s]: of the full beam. displacement [m] of ``measured_at`` under a static force at ``load_at``.
+    """
+
+    beam: Beam
+    load_at: str
+    measured_at: str
+    displacement: float
+    elements: int
+    step: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a run is given.
+
+    structure, contacts, modes: of the model. displacement, velocity: x, x' (n,) at the start, None for zero.
+    loads: of loads.py. t_end: end of the run in the case's unit of time.
+    pull: the same problem for the full nonlinear beam; without one the full model has the structure's matrices.
+    penalty: stiffness of the full model's contact elements where the contacts are rigid, None: it cannot be run.
+    metre: length units in one metre (1e3 where lengths are in mm).
+    """
+
+    structure: LinearStructure
+    contacts: Sequence[UnilateralContact]
+    t_end: float
+    modes: int | str = "all"
+    displacement: np.ndarray | None = None
+    velocity: np.ndarray | None = None
+    loads: Sequence[Any] = ()
+    pull: Pull | None = None
+    penalty: float | None = None
+    metre: float = 1.0
+
+    def model(self) -> MultiPhiModel:
+        """A model that no run has used yet."""
+        return MultiPhiModel(self.structure, self.contacts, modes=self.modes)
+
+    @property
+    def conservative(self) -> bool:
+        """Whether nothing but contacts may change the energy."""
+        return self.structure.damping is None and not self.loads
+
+    @property
+    def penalty_contacts(self) -> list[UnilateralContact] | None:
+        """The contacts as penalty elements, None where a rigid one has no stand-in."""
+        penalty = self.penalty
+        if penalty is None:
+            return None if any(contact.rigid for contact in self.contacts) else list(self.contacts)
+        return [replace(c, stiffness=penalty) if c.rigid else c for c in self.contacts]
+
+
+@dataclass(frozen=True)
+class Case:
+    """name; hard: what is hard about it, one sentence; build: the problem, shorter for True (the quick catalogue).
+
+    check: what is wrong with a native answer beyond what every case is judged by, "" if nothing. quick: whether the
+    quick catalogue has it.
+    """
+
+    name: str
+    hard: str
+    build: Callable[[bool], Problem]
+    check: Callable[[Problem, Trajectory], str] | None = None
+    quick: bool = True

@@ -1,0 +1,86 @@
+"""Runs the catalogue: every case through every model, in turn."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.study.stability.case import Case, Problem
+from multiphi_exudyn.study.stability.catalogue import CATALOGUE
+from multiphi_exudyn.study.stability.exudyn_runs import (
+    FULL_MODEL,
+    USER_OBJECT,
+    loops_compared,
+    run_full_model,
+    run_user_object,
+)
+from multiphi_exudyn.study.stability.native_run import Native, run_native
+from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
+
+__all__ = ["FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
+
+NUMPY_LOOP, COMPILED_LOOP = "NumPy loop", "compiled loop"
+IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """quick: whether cases are short. limit_s: of one model's run [s]. budget: samples of every contact.
+
+    most_steps: of the user object. values: coordinates that the full model of matrices may store, all steps together.
+    """
+
+    quick: bool
+    limit_s: float
+    budget: int
+    most_steps: int
+    values: int
+
+
+FULL_LENGTH = Limits(quick=False, limit_s=8.0, budget=100_000, most_steps=100_000, values=4_000_000)
+QUICK = Limits(quick=True, limit_s=4.0, budget=40_000, most_steps=8_000, values=500_000)
+
+
+def chosen_cases(name: str | None, quick: bool) -> list[Case]:
+    """The cases of a run: the one with this name, or all, or those of the quick catalogue."""
+    if name is None:
+        return [case for case in CATALOGUE if case.quick or not quick]
+    found = [case for case in CATALOGUE if case.name == name]
+    if not found:
+        known = ", ".join(case.name for case in CATALOGUE)
+        raise MultiPhiValueError(f"--case: got {name!r}, need one of: {known}")
+    return found
+
+
+def warm_up() -> None:
+    """Compile the loop, where numba is installed and has not kept it from an earlier run: half a minute, once."""
+    if importlib.util.find_spec("numba") is not None:
+        problem = chosen_cases("zero-gap-rigid", quick=True)[0].build(True)
+        simulate(problem.model(), problem.t_end, problem.displacement, compiled=True)
+
+
+def run_case(case: Case, limits: Limits) -> CaseResult:
+    """Every model in one case; whatever is not the NumPy loop is compared with the first native answer."""
+    problem = case.build(limits.quick)
+    natives = list(_natives(case, problem, limits))
+    answers = [native.trajectory for native in natives if native.trajectory is not None]
+    outcomes = [native.outcome for native in natives]
+    if len(answers) > 1:
+        outcomes[1] = loops_compared(outcomes[1], problem, *answers)
+    if not answers:
+        cause = "no native answer to be compared with"
+        return CaseResult(case.name, case.hard, (*outcomes, *(Outcome(name, NOT_RUN, cause) for name in IN_EXUDYN)))
+    body = run_user_object(problem, answers[0], limits.most_steps, limits.limit_s)
+    full = run_full_model(problem, answers[0], limits.values, limits.limit_s)
+    return CaseResult(case.name, case.hard, (*outcomes, body, full))
+
+
+def _natives(case: Case, problem: Problem, limits: Limits) -> Iterator[Native]:
+    yield run_native(case, problem, NUMPY_LOOP, False, limits.limit_s, limits.budget)
+    if importlib.util.find_spec("numba") is None:
+        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "numba is not installed"))
+    else:
+        yield run_native(case, problem, COMPILED_LOOP, True, limits.limit_s, limits.budget)

@@ -1,0 +1,191 @@
+"""The models inside Exudyn in a case: the reduced body as a user object, and the full model.
+
+They take steps, so nobody calls them wrong by the native criteria: shown are their drift of energy and their
+difference to the native answer. A run that stops is an outcome with Exudyn's own words.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.loads import ConstantLoad, FunctionLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.study.measures.metrics import agreement_horizon, nrmse
+from multiphi_exudyn.study.scene.workbench import damping_matrix
+from multiphi_exudyn.study.stability.brute_force import highest_frequency
+from multiphi_exudyn.study.stability.case import Problem, Pull
+from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, Outcome
+from multiphi_exudyn.trajectory import Trajectory
+from reference_models.body_alone import solve_body_alone
+from reference_models.full_beam import FullBeam, FullBeamSettings
+from reference_models.full_matrices import run_matrices
+
+__all__ = ["FULL_MODEL", "USER_OBJECT", "loops_compared", "run_full_model", "run_user_object"]
+
+USER_OBJECT, FULL_MODEL = "user object", "full model"
+MATCHED_PER_PERIOD = 3  # steps in the shortest kept period; matched modes need more than two
+STEPS_PER_PERIOD = 60  # of the full model, in the shortest period that its contacts or its structure have
+FEWEST_STEPS = 200
+LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
+GRID = 10_001  # times at which two native answers are compared
+AGREEMENT = 0.01  # NRMSE up to which two answers agree
+STATIC_LOADS = (ConstantLoad, Gravity)
+VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
+MOST_WORDS = 200  # characters of a cause that is not our own
+
+
+def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit_s: float) -> Outcome:
+    """The body alone in Exudyn, its modes matched to the step where ``most_steps`` allow it."""
+    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * MATCHED_PER_PERIOD))
+    steps, matched = min(wanted, most_steps), wanted <= most_steps
+
+    def solve() -> Outcome:
+        found, time_s = solve_body_alone(
+            problem.model(),
+            problem.displacement,
+            problem.t_end,
+            steps,
+            (),
+            velocity=problem.velocity,
+            loads=problem.loads,
+            matched=matched,
+            cpu_limit_s=limit_s,
+        )
+        remark = "" if matched else f"{steps} steps allowed, {wanted} needed to match its modes: plain trapezoidal rule"
+        outcome = Outcome(USER_OBJECT, message=remark, events=len(found.events), steps=steps, time_s=time_s)
+        return _compared(outcome, problem, native, found.time, found.gaps)
+
+    return _guarded(USER_OBJECT, solve)
+
+
+def run_full_model(problem: Problem, native: Trajectory, values: int, limit_s: float) -> Outcome:
+    """The full nonlinear beam where the problem is one, else all coordinates of its matrices.
+
+    values: coordinates that a run may store, all steps together.
+    """
+    contacts = problem.penalty_contacts
+    if contacts is None:
+        return Outcome(FULL_MODEL, NOT_RUN, "Exudyn's contact elements have no rigid law without rebound")
+    pull = problem.pull
+    if pull is not None:
+        return _guarded(FULL_MODEL, lambda: _full_beam(problem, pull, contacts, native, limit_s))
+    if problem.structure.n > LARGEST_FULL:
+        return Outcome(FULL_MODEL, NOT_RUN, f"{problem.structure.n} coordinates, dense up to {LARGEST_FULL}")
+    return _guarded(FULL_MODEL, lambda: _full_matrices(problem, contacts, native, values, limit_s))
+
+
+def _full_matrices(
+    problem: Problem, contacts: Sequence[UnilateralContact], native: Trajectory, values: int, limit_s: float
+) -> Outcome:
+    """All coordinates, in as many steps as ``values`` stored coordinates allow."""
+    if not all(isinstance(load, (*STATIC_LOADS, *VARYING_LOADS)) for load in problem.loads):
+        return Outcome(FULL_MODEL, NOT_RUN, "a base or a stop that moves")
+    structure, highest = problem.structure, highest_frequency(native)
+    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest * STEPS_PER_PERIOD))
+    steps = min(wanted, values // (structure.n + 1))
+    static = [load for load in problem.loads if isinstance(load, STATIC_LOADS)]
+    found = run_matrices(
+        structure,
+        contacts,
+        problem.t_end,
+        steps,
+        displacement=problem.displacement,
+        velocity=problem.velocity,
+        load=sum((load.row(structure) for load in static), np.zeros(structure.n)),
+        varying=_varying(problem),
+        damping=damping_matrix(structure),
+        cpu_limit_s=limit_s,
+    )
+    coarse = f"{steps / (problem.t_end * highest):.2g} steps in the shortest period" if steps < wanted else ""
+    outcome = Outcome(
+        FULL_MODEL,
+        message="; ".join(filter(None, (_stands_in(problem), coarse))),
+        energy=_drift(found.energy, found.work, structure.damping is None),
+        steps=steps,
+        time_s=found.wall_s,
+    )
+    return _compared(outcome, problem, native, found.time, found.gaps)
+
+
+def _varying(problem: Problem) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The loads that change, (n, k) at times (k,); None where there are none."""
+    given = [load for load in problem.loads if isinstance(load, VARYING_LOADS)]
+    if not given:
+        return None
+    rows = np.array([problem.structure.row(load.at) for load in given])
+    histories = [load.course.history(problem.t_end) for load in given]
+    return lambda times: rows.T @ np.array([history.at(times) for history in histories])
+
+
+def _full_beam(
+    problem: Problem, pull: Pull, contacts: Sequence[UnilateralContact], native: Trajectory, limit_s: float
+) -> Outcome:
+    settings = FullBeamSettings(elements=pull.elements, step=pull.step, cpu_limit_s=limit_s)
+    beam = FullBeam(pull.beam, contacts, settings)
+    found = beam.run(
+        problem.t_end,
+        load_at=pull.load_at,
+        measured_at=pull.measured_at,
+        displacement=pull.displacement,
+        damping=damping_matrix(replace(beam.structure, damping=problem.structure.damping)),
+        progress=False,
+    )
+    outcome = Outcome(FULL_MODEL, found.status, found.message or _stands_in(problem), steps=found.steps)
+    if found.status != OK or found.balance is None:
+        return outcome
+    drift = _drift(found.energy, np.zeros(1), problem.structure.damping is None)
+    outcome = replace(outcome, energy=drift, time_s=found.online_s)
+    return _compared(outcome, problem, native, found.time, found.gaps)
+
+
+def _stands_in(problem: Problem) -> str:
+    rigid = any(contact.rigid for contact in problem.contacts)
+    return f"penalty of {problem.penalty:g} for the rigid contact: another law" if rigid else ""
+
+
+def _drift(energy: np.ndarray, work: np.ndarray, conservative: bool) -> float:
+    """Of energies less work (k,): the largest deviation from the first, of a damped system the largest gain.
+
+    Both as a share of the largest energy.
+    """
+    balance = energy - work
+    away = np.abs(balance - balance[0]) if conservative else balance - np.minimum.accumulate(balance)
+    largest = float(np.max(energy))
+    return float(np.max(away)) / largest if largest > 0 else float(np.max(away))
+
+
+def loops_compared(outcome: Outcome, problem: Problem, native: Trajectory, other: Trajectory) -> Outcome:
+    """The outcome of ``other`` with its difference to ``native``, on an even grid."""
+    time = np.linspace(0.0, min(native.t_end, other.t_end), GRID)
+    gaps = {c.name: np.asarray(other.gap(c.name, time)) for c in problem.contacts}
+    return _compared(outcome, problem, native, time, gaps)
+
+
+def _compared(
+    outcome: Outcome, problem: Problem, native: Trajectory, time: np.ndarray, gaps: Mapping[str, np.ndarray]
+) -> Outcome:
+    """The outcome with difference and agreement of the contacts' travel h.x, unless there is no motion."""
+    inside = time <= native.t_end
+    pairs = [
+        (gaps[c.name][inside] - c.gap, np.asarray(native.gap(c.name, time[inside])) - c.gap) for c in problem.contacts
+    ]
+    worst = max((nrmse(*pair, time[inside], native.t_end) for pair in pairs), default=math.nan)
+    if math.isnan(worst):
+        return outcome
+    until = agreement_horizon(pairs, time[inside], AGREEMENT)
+    return replace(outcome, difference=worst, agrees_until=until / native.t_end)
+
+
+def _guarded(name: str, solve: Callable[[], Outcome]) -> Outcome:
+    """The outcome, or a failure with the cause that was given."""
+    try:
+        return solve()
+    except MultiPhiError as error:
+        return Outcome(name, FAILED, " ".join(str(error).split()))
+    except Exception as error:  # Exudyn wraps what a user function raises in errors of its own
+        return Outcome(name, FAILED, f"{type(error).__name__}: {' '.join(str(error).split())[:MOST_WORDS]}")

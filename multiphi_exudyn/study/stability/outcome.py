@@ -1,0 +1,60 @@
+"""What came out of one model in one case: a row of the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FAILED", "NOT_RUN", "OK", "CaseResult", "Outcome"]
+
+OK, FAILED, NOT_RUN = "ok", "failed", "not run"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One row. Quantities a model does not have, or did not come to, are None.
+
+    model: its name. status: "ok" | "failed" | "not run"; message: the cause, or a remark. wrong: what makes an answer
+    that is ok wrong (native models only), one sentence each.
+    energy, residual, missed, beyond [m], excused [m], reported [m]: see judgement.py, beyond being what is judged and
+    excused what truncation leaves. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
+    difference: to the native answer, ||y - native|| / ||native|| of the contacts' travel, the worst of them;
+    agrees_until: the share of the run until which it is below AGREEMENT.
+    steps: of an Exudyn model. samples, covered: of the brute force. time_s: of the run alone [s].
+    """
+
+    model: str
+    status: str = OK
+    message: str = ""
+    wrong: tuple[str, ...] = ()
+    energy: float | None = None
+    residual: float | None = None
+    events: int | None = None
+    missed: int | None = None
+    beyond: float | None = None
+    excused: float | None = None
+    reported: float | None = None
+    difference: float | None = None
+    agrees_until: float | None = None
+    steps: int | None = None
+    samples: int | None = None
+    covered: float | None = None
+    time_s: float | None = None
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """name, hard: of the case; outcomes: one of every model."""
+
+    name: str
+    hard: str
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def wrong(self) -> bool:
+        """Whether one of the answers is."""
+        return any(outcome.wrong for outcome in self.outcomes)
+
+    @property
+    def answered(self) -> bool:
+        """Whether one of the answers is ok."""
+        return any(outcome.status == OK for outcome in self.outcomes)

@@ -1,0 +1,36 @@
+"""The page of a run of the catalogue: one self-contained HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from multiphi_exudyn.study.comparison.findings import percent, seconds
+from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
+from multiphi_exudyn.study.stability.outcome import CaseResult
+from multiphi_exudyn.study.stability.summary import headline, summaries
+from multiphi_exudyn.study.stability.text_table import figure
+
+__all__ = ["render_stability"]
+
+TEMPLATE = "stability.html.j2"
+
+
+def render_stability(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> str:
+    """The page as HTML."""
+    page = Environment(
+        loader=PackageLoader("multiphi_exudyn.study.stability"), autoescape=True, undefined=StrictUndefined
+    )
+    page.filters |= {"figure": figure, "percent": percent, "seconds": seconds}
+    return page.get_template(TEMPLATE).render(
+        results=results,
+        headline=headline(results),
+        summaries=summaries(results),
+        quick=quick,
+        environment=environment,
+        limits=judgement,
+        brute=brute_force,
+        exudyn=exudyn_runs,
+    )

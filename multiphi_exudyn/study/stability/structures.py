@@ -1,0 +1,90 @@
+"""Structures that several cases share: one mass on a spring, chains of masses, the rig's beam pulled and let go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.beam import Beam
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.stability.case import Problem, Pull
+from reference_models.full_beam import FullBeam, FullBeamSettings
+from reference_models.rig import rig_beam, rig_contact
+
+__all__ = ["STOP", "chain", "oscillator", "pulled", "rig_problem", "stop"]
+
+STOP = "stop"
+ELEMENTS = 8  # of the full beam beside a case: few, as its own error is shown
+FINE_STEPS = {1e9: 2e-6, 1e7: 5e-6, 0.0: 2e-5}  # s, from which stiffness [N/m] on: above them it gains energy
+
+
+def stop(at: Any, gap: float, stiffness: float = math.inf, name: str = STOP) -> UnilateralContact:
+    """A stop below a point."""
+    return UnilateralContact(name, at, gap, stiffness)
+
+
+def oscillator(mass: float, stiffness: float, damping: Matrix | RayleighDamping | None = None) -> LinearStructure:
+    """One mass on a spring, point m0."""
+    return LinearStructure([[mass]], [[stiffness]], damping, {"m0": 0})
+
+
+def chain(
+    masses: Sequence[float],
+    springs: Sequence[float],
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+) -> LinearStructure:
+    """Masses in a row, points m0, m1, ...: spring i holds mass i to the one before it, the first to the ground.
+
+    One spring more than masses holds the last mass to the ground.
+    """
+    held = np.array([*springs, 0.0][: len(masses) + 1], dtype=float)
+    stiffness = np.diag(held[:-1] + held[1:]) - np.diag(held[1:-1], 1) - np.diag(held[1:-1], -1)
+    return LinearStructure(np.diag(masses), stiffness, damping, {f"m{i}": i for i in range(len(masses))})
+
+
+def pulled(
+    beam: Beam,
+    contacts: Sequence[UnilateralContact],
+    t_end: float,
+    *,
+    tip: str,
+    displacement: float,
+    modes: int | str = "all",
+    damping: ModalDamping | RayleighDamping | None = None,
+    penalty: float | None = None,
+) -> Problem:
+    """A beam whose ``tip`` is pulled to a displacement [m] and let go; its matrices are those of the full beam."""
+    stiffest = max((penalty or 0.0) if c.rigid else c.stiffness for c in contacts)
+    step = next(step for stiffness, step in FINE_STEPS.items() if stiffest >= stiffness)
+    settings = FullBeamSettings(elements=ELEMENTS, step=step)
+    structure = FullBeam(beam, (), settings).structure
+    given = LinearStructure(structure.mass, structure.stiffness, damping, structure.points)
+    return Problem(
+        given,
+        contacts,
+        t_end,
+        modes,
+        displacement=_deflected(given, tip, displacement),
+        pull=Pull(beam, tip, tip, displacement, ELEMENTS, step),
+        penalty=penalty,
+    )
+
+
+def _deflected(structure: LinearStructure, point: str, displacement: float) -> np.ndarray:
+    """x (n,) under the static force at a point that deflects it so far, no contact in the way."""
+    shape = MultiPhiModel(structure).static_equilibrium({point: 1.0})
+    return np.asarray(shape * (displacement / float(structure.row(point) @ shape)))
+
+
+def rig_problem(stiffness: float, t_end: float, displacement: float = 0.02, **options: Any) -> Problem:
+    """The published rig, its tip pulled away from the support of this stiffness [N/m]."""
+    contact = rig_contact(stiffness)
+    if "gap" in options:
+        contact = replace(contact, gap=options.pop("gap"))
+    return pulled(rig_beam(), [contact], t_end, tip="node3", displacement=displacement, **options)

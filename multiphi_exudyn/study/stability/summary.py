@@ -1,0 +1,84 @@
+"""What a run of the catalogue came to: counts and worst figures, as data for the page, the terminal and the JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from multiphi_exudyn.study.stability.judgement import BEYOND, RESIDUAL
+from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
+
+__all__ = ["ModelSummary", "contents", "headline", "summaries"]
+
+
+@dataclass(frozen=True)
+class ModelSummary:
+    """Of one model in all cases: how many ended how, its worst figures, and the time of all its runs [s]."""
+
+    model: str
+    ok: int
+    failed: int
+    not_run: int
+    wrong: int
+    energy: float | None
+    residual: float | None
+    beyond: float | None
+    missed: int | None
+    difference: float | None
+    time_s: float
+
+
+def summaries(results: Sequence[CaseResult]) -> list[ModelSummary]:
+    """One of every model, in the order of the table."""
+    by_model: dict[str, list[Outcome]] = {}
+    for result in results:
+        for outcome in result.outcomes:
+            by_model.setdefault(outcome.model, []).append(outcome)
+    return [_summary(name, outcomes) for name, outcomes in by_model.items()]
+
+
+def _summary(name: str, outcomes: Sequence[Outcome]) -> ModelSummary:
+    def worst(value: Callable[[Outcome], float | None]) -> float | None:
+        return max((found for o in outcomes if o.status == OK and (found := value(o)) is not None), default=None)
+
+    missed = [o.missed for o in outcomes if o.missed is not None]
+    return ModelSummary(
+        model=name,
+        ok=sum(o.status == OK for o in outcomes),
+        failed=sum(o.status == FAILED for o in outcomes),
+        not_run=sum(o.status == NOT_RUN for o in outcomes),
+        wrong=sum(bool(o.wrong) for o in outcomes),
+        energy=worst(lambda o: o.energy),
+        residual=worst(lambda o: o.residual),
+        beyond=worst(lambda o: o.beyond),
+        missed=sum(missed) if missed else None,
+        difference=worst(lambda o: o.difference),
+        time_s=sum(o.time_s or 0.0 for o in outcomes),
+    )
+
+
+def headline(results: Sequence[CaseResult]) -> str:
+    """The outcome in one sentence."""
+    wrong = [result.name for result in results if result.wrong]
+    silent = [result.name for result in results if not result.answered]
+    told = f"{len(results)} cases, none wrong" if not wrong else f"{len(results)} cases, wrong: {', '.join(wrong)}"
+    return f"{told}; without an answer, with a cause: {', '.join(silent)}." if silent else f"{told}."
+
+
+def contents(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> dict[str, Any]:
+    """Everything, for a JSON file."""
+    return {
+        "environment": environment,
+        "quick": quick,
+        "limits": {"residual": RESIDUAL, "beyond_m": BEYOND},
+        "models": [asdict(summary) for summary in summaries(results)],
+        "cases": {
+            result.name: {
+                "hard": result.hard,
+                "wrong": result.wrong,
+                "models": {outcome.model: asdict(outcome) for outcome in result.outcomes},
+            }
+            for result in results
+        },
+    }

@@ -1,0 +1,50 @@
+"""The table on a terminal: a line for every case and model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from multiphi_exudyn.study.comparison.findings import seconds
+from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
+from multiphi_exudyn.study.stability.summary import headline
+
+__all__ = ["figure", "text_table"]
+
+HEADS = ("status", "energy", "ledger", "events", "missed", "beyond", "differs", "time")
+WIDTHS = (7, 8, 8, 7, 6, 8, 8, 8)
+
+
+def text_table(results: Sequence[CaseResult]) -> str:
+    """All cases, then the outcome in one sentence."""
+    width = max(len(outcome.model) for result in results for outcome in result.outcomes)
+    heads = "  ".join(f"{head:>{size}}" for head, size in zip(HEADS, WIDTHS, strict=True))
+    lines = [f"  {'':{width}}  {heads}", *(line for result in results for line in _case(result, width))]
+    return "\n".join([*lines, "", headline(results)])
+
+
+def figure(value: float | None) -> str:
+    """A figure of which the power of ten counts."""
+    if value is None:
+        return "–"
+    return "0" if value == 0 else f"{value:.1e}"
+
+
+def _case(result: CaseResult, width: int) -> Iterator[str]:
+    yield f"{result.name}{'  WRONG' if result.wrong else ''}"
+    for outcome in result.outcomes:
+        cells = "  ".join(f"{cell:>{size}}" for cell, size in zip(_cells(outcome), WIDTHS, strict=True))
+        said = "; ".join([*(f"WRONG: {sentence}" for sentence in outcome.wrong), *filter(None, [outcome.message])])
+        yield f"  {outcome.model:{width}}  {cells}  {said}".rstrip()
+
+
+def _cells(outcome: Outcome) -> tuple[str, ...]:
+    counts = ("–" if count is None else str(count) for count in (outcome.events, outcome.missed))
+    return (
+        outcome.status,
+        figure(outcome.energy),
+        figure(outcome.residual),
+        *counts,
+        figure(outcome.beyond),
+        figure(outcome.difference),
+        seconds(outcome.time_s),
+    )

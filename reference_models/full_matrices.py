@@ -1,0 +1,185 @@
+"""The full model of a structure that is given by matrices: all its coordinates in Exudyn, with contact elements.
+
+    M q'' + C q' + K q = f + sum h_i lambda_i,   lambda_i = k_i max(0, -g_i)
+
+ObjectGenericODE2 holds M, C, K and static loads, ObjectContactCoordinate every contact; the trapezoidal rule with a
+fixed step integrates. No modes, no levels: what is left against a reduced model is time integration and reduction.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as eii
+import numpy as np
+import scipy.sparse
+from scipy.integrate import cumulative_trapezoid
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.structure import LinearStructure
+from reference_models.exudyn_quiet import cpu_limit, quiet
+from reference_models.full_beam_settings import FullBeamSettings
+from reference_models.solver_settings import simulation_settings
+
+__all__ = ["MatrixRun", "run_matrices"]
+
+NEWTON = 1e-10  # relative and absolute: linear but for the contacts, an iteration ends at round-off
+
+
+@dataclass(frozen=True)
+class MatrixRun:
+    """k samples, one a step: time [s], gaps: contact -> (k,) [m], energy, work (k,) [J].
+
+    energy: kinetic, strain and contact springs; work: of the loads since the start. wall_s: of the solver [s].
+    """
+
+    time: np.ndarray
+    gaps: dict[str, np.ndarray]
+    energy: np.ndarray
+    work: np.ndarray
+    wall_s: float
+
+
+def run_matrices(
+    structure: LinearStructure,
+    contacts: Sequence[UnilateralContact],
+    t_end: float,
+    steps: int,
+    *,
+    displacement: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    load: np.ndarray | None = None,
+    varying: Callable[[np.ndarray], np.ndarray] | None = None,
+    damping: np.ndarray | None = None,
+    cpu_limit_s: float | None = None,
+) -> MatrixRun:
+    """Integrate from x, x' (n,) with ``steps`` equal steps under a static load (n,).
+
+    varying: the load that changes, (n, k) at times (k,) [s], beside the static one.
+    damping: C (n, n), in place of the structure's own description of it.
+
+    Every contact has a finite stiffness and acts on one coordinate, or between two with opposite coefficients.
+    Raises MultiPhiValueError for another contact, NumericalFailure where the solver stops early.
+    """
+    zero = np.zeros(structure.n)
+    x, v, f = (zero if given is None else given for given in (displacement, velocity, load))
+    with quiet(), cpu_limit(cpu_limit_s):
+        container = exu.SystemContainer()  # owns the system
+        mbs = container.AddSystem()
+        sensors = _build(mbs, structure, contacts, (x, v, f), varying, damping)
+        started = time.perf_counter()
+        _solve(mbs, t_end, steps, cpu_limit_s)
+        wall_s = time.perf_counter() - started
+        q, q_t = (np.array(mbs.GetSensorStoredData(sensor)) for sensor in sensors)
+    gaps = {c.name: q[:, 1:] @ structure.row(c.direction) + c.gap for c in contacts}
+    work = (q[:, 1:] - q[0, 1:]) @ f
+    if varying is not None:
+        power = np.sum(varying(q[:, 0]).T * q_t[:, 1:], axis=1)
+        work = work + cumulative_trapezoid(power, q[:, 0], initial=0)
+    return MatrixRun(q[:, 0], gaps, _energy(structure, contacts, gaps, q[:, 1:], q_t[:, 1:]), work, wall_s)
+
+
+def _build(
+    mbs: Any,
+    structure: LinearStructure,
+    contacts: Sequence[UnilateralContact],
+    given: tuple[np.ndarray, np.ndarray, np.ndarray],
+    varying: Callable[[np.ndarray], np.ndarray] | None,
+    damping: np.ndarray | None,
+) -> list[Any]:
+    """Add everything and assemble; the sensors of coordinates and velocities. given: x, x', static load (n,)."""
+    n, (displacement, velocity, load) = structure.n, given
+
+    def force(mbs: Any, t: float, item: Any, q: Any, q_t: Any) -> np.ndarray:
+        assert varying is not None, "set only then"
+        return varying(np.array([t]))[:, 0]
+
+    options = {"dampingMatrix": None if damping is None else _dense(damping), "forceUserFunction": varying and force}
+    node = mbs.AddNode(
+        eii.NodeGenericODE2(
+            referenceCoordinates=np.zeros(n),
+            initialCoordinates=displacement,
+            initialCoordinates_t=velocity,
+            numberOfODE2Coordinates=n,
+        )
+    )
+    mbs.AddObject(
+        eii.ObjectGenericODE2(
+            nodeNumbers=[node],
+            massMatrix=_dense(structure.mass),
+            stiffnessMatrix=_dense(structure.stiffness),
+            forceVector=load,
+            **{name: value for name, value in options.items() if value is not None},
+        )
+    )
+    ground = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
+    for contact in contacts:
+        _add_contact(mbs, contact, structure.row(contact.direction), node, ground)
+    wanted = (exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t)
+    sensors = [
+        mbs.AddSensor(eii.SensorNode(nodeNumber=node, outputVariableType=kind, storeInternal=True, writeToFile=False))
+        for kind in wanted
+    ]
+    mbs.Assemble()
+    return sensors
+
+
+def _add_contact(mbs: Any, contact: UnilateralContact, row: np.ndarray, node: Any, ground: Any) -> None:
+    """Exudyn's gap is q(marker 1) - q(marker 0) - offset: markers by the sign of their coefficient."""
+    places = np.flatnonzero(row)
+    size = abs(float(row[places[0]]))
+    alone = len(places) == 1 or (len(places) == 2 and row[places[0]] == -row[places[1]])
+    if contact.rigid or not alone:
+        raise MultiPhiValueError(
+            f"contact {contact.name!r}: got stiffness {contact.stiffness:g} on {len(places)} coordinates, need a "
+            "finite one on one coordinate, or between two with opposite coefficients"
+        )
+    markers = {-1.0: ground, 1.0: ground}
+    for place in places:
+        coordinate = eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=int(place))
+        markers[float(np.sign(row[place]))] = mbs.AddMarker(coordinate)
+    away = contact.gap / size
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[max(away, 1.0)], numberOfDataCoordinates=1))
+    mbs.AddObject(
+        eii.ObjectContactCoordinate(
+            markerNumbers=[markers[-1.0], markers[1.0]],
+            nodeNumber=data,
+            contactStiffness=contact.stiffness * size**2,
+            offset=-away,
+        )
+    )
+
+
+def _solve(mbs: Any, t_end: float, steps: int, cpu_limit_s: float | None) -> None:
+    settings = simulation_settings(FullBeamSettings(step=t_end / steps, newton_tolerance=NEWTON), t_end)
+    settings.timeIntegration.numberOfSteps = steps
+    settings.solution.sensors.writePeriod = t_end / steps
+    try:
+        mbs.SolveDynamic(settings)
+    except exu.SolverError as error:
+        said = mbs.sys["dynamicSolver"].GetErrorString() or str(error)
+        raise NumericalFailure(" ".join(said.split())) from error
+    if mbs.sys["dynamicSolver"].output.simulationTimeout:
+        raise NumericalFailure(f"CPU limit of {cpu_limit_s:g} s reached")
+
+
+def _energy(
+    structure: LinearStructure,
+    contacts: Sequence[UnilateralContact],
+    gaps: dict[str, np.ndarray],
+    q: np.ndarray,
+    q_t: np.ndarray,
+) -> np.ndarray:
+    kinetic = np.sum(q_t * (structure.mass @ q_t.T).T, axis=1) / 2
+    strain = np.sum(q * (structure.stiffness @ q.T).T, axis=1) / 2
+    springs = [c.stiffness * np.minimum(0.0, gaps[c.name]) ** 2 / 2 for c in contacts]
+    return np.asarray(kinetic + strain + sum(springs))
+
+
+def _dense(matrix: Any) -> np.ndarray:
+    return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
