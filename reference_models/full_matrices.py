@@ -119,7 +119,8 @@ def _build(
     )
     ground = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
     for contact in contacts:
-        _add_contact(mbs, contact, structure.row(contact.direction), node, ground)
+        row = structure.row(contact.direction)
+        _add_contact(mbs, contact, row, float(row @ displacement) + contact.gap, (node, ground))
     wanted = (exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t)
     sensors = [
         mbs.AddSensor(eii.SensorNode(nodeNumber=node, outputVariableType=kind, storeInternal=True, writeToFile=False))
@@ -129,8 +130,13 @@ def _build(
     return sensors
 
 
-def _add_contact(mbs: Any, contact: UnilateralContact, row: np.ndarray, node: Any, ground: Any) -> None:
-    """Exudyn's gap is q(marker 1) - q(marker 0) - offset: markers by the sign of their coefficient."""
+def _add_contact(mbs: Any, contact: UnilateralContact, row: np.ndarray, gap: float, nodes: tuple[Any, Any]) -> None:
+    """Exudyn's gap is q(marker 1) - q(marker 0) - offset: markers by the sign of their coefficient.
+
+    gap: at the start [m], from which Exudyn takes whether the contact is closed. nodes: the structure's, the ground's
+    marker.
+    """
+    node, ground = nodes
     places = np.flatnonzero(row)
     size = abs(float(row[places[0]]))
     alone = len(places) == 1 or (len(places) == 2 and row[places[0]] == -row[places[1]])
@@ -144,7 +150,7 @@ def _add_contact(mbs: Any, contact: UnilateralContact, row: np.ndarray, node: An
         coordinate = eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=int(place))
         markers[float(np.sign(row[place]))] = mbs.AddMarker(coordinate)
     away = contact.gap / size
-    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[max(away, 1.0)], numberOfDataCoordinates=1))
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[gap / size], numberOfDataCoordinates=1))
     mbs.AddObject(
         eii.ObjectContactCoordinate(
             markerNumbers=[markers[-1.0], markers[1.0]],

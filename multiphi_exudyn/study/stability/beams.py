@@ -61,7 +61,8 @@ def _scales(problem: Problem, trajectory: Trajectory) -> str:
     own = _rig_scaled(PULLED, True)
     other = simulate(own.model(), own.t_end, own.displacement, compiled=False)
     times = np.linspace(0.0, own.t_end, 5001)
-    factor = float(trajectory.at("node3", 0.0)) / PULLED
+    assert problem.pull is not None, "beams are pulled"
+    factor = problem.pull.displacement / PULLED
     reference = other.at("node3", times)
     away = float(np.max(np.abs(trajectory.at("node3", times) / factor - reference)) / np.max(np.abs(reference)))
     late = max((abs(a.time - b.time) for a, b in zip(trajectory.events, other.events, strict=False)), default=0.0)

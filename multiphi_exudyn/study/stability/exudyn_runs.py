@@ -29,7 +29,7 @@ __all__ = ["FULL_MODEL", "USER_OBJECT", "loops_compared", "run_full_model", "run
 
 USER_OBJECT, FULL_MODEL = "user object", "full model"
 MATCHED_PER_PERIOD = 3  # steps in the shortest kept period; matched modes need more than two
-STEPS_PER_PERIOD = 60  # of the full model, in the shortest period that its contacts or its structure have
+STEPS_PER_PERIOD = 200  # of the full model, in the shortest period that its contacts or its structure have
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
 GRID = 10_001  # times at which two native answers are compared
