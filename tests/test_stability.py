@@ -193,17 +193,17 @@ class TestOutcomes:
 
 
 class TestFullMatrices:
-    def test_it_converges_to_the_native_answer_with_the_square_of_the_step(self):
+    def test_it_converges_to_the_native_answer_as_the_step_falls(self):
         structure, contact = chain(3, damping=0.02 * np.eye(3)), stop({"m2": -2.0}, 0.3, 7.0)
         start = np.array([0.5, 0.2, -0.5])
         exact = simulate(MultiPhiModel(structure, [contact], "all"), 12.0, start)
         assert len(exact.events) > 1
         errors = []
-        for steps in (2000, 4000, 8000):
+        for steps in (2000, 8000, 32000):
             run = run_matrices(structure, [contact], 12.0, steps, displacement=start, damping=structure.damping)
             errors.append(np.max(np.abs(run.gaps["stop"] - exact.gap("stop", np.minimum(run.time, 12.0)))))
-        assert errors[-1] < 1e-4
-        assert errors[0] / errors[-1] > 8
+        assert errors[-1] < 5e-6
+        assert errors[0] / errors[-1] > 100  # second order but for the instants of contact: 256
 
     def test_a_load_that_varies_does_the_work_that_the_energy_shows(self):
         structure = chain(2)

@@ -28,20 +28,24 @@ IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 
 @dataclass(frozen=True)
 class Limits:
-    """quick: whether cases are short. limit_s: of one model's run [s]. budget: samples of every contact.
+    """quick: whether cases are short. native_limit_s, limit_s: of one run of the native and of another model [s].
 
-    most_steps: of the user object. values: coordinates that the full model of matrices may store, all steps together.
+    budget: samples of every contact. most_steps: of the user object. values: coordinates that the full model of matrices may
+    store, all steps together.
     """
 
     quick: bool
+    native_limit_s: float
     limit_s: float
     budget: int
     most_steps: int
     values: int
 
 
-FULL_LENGTH = Limits(quick=False, limit_s=8.0, budget=100_000, most_steps=100_000, values=4_000_000)
-QUICK = Limits(quick=True, limit_s=4.0, budget=40_000, most_steps=8_000, values=500_000)
+FULL_LENGTH = Limits(
+    quick=False, native_limit_s=30.0, limit_s=8.0, budget=100_000, most_steps=100_000, values=4_000_000
+)
+QUICK = Limits(quick=True, native_limit_s=10.0, limit_s=4.0, budget=40_000, most_steps=8_000, values=500_000)
 
 
 def chosen_cases(name: str | None, quick: bool) -> list[Case]:
@@ -79,8 +83,8 @@ def run_case(case: Case, limits: Limits) -> CaseResult:
 
 
 def _natives(case: Case, problem: Problem, limits: Limits) -> Iterator[Native]:
-    yield run_native(case, problem, NUMPY_LOOP, False, limits.limit_s, limits.budget)
+    yield run_native(case, problem, NUMPY_LOOP, False, limits.native_limit_s, limits.budget)
     if importlib.util.find_spec("numba") is None:
         yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "numba is not installed"))
     else:
-        yield run_native(case, problem, COMPILED_LOOP, True, limits.limit_s, limits.budget)
+        yield run_native(case, problem, COMPILED_LOOP, True, limits.native_limit_s, limits.budget)

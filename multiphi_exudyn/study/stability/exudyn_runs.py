@@ -101,7 +101,7 @@ def _full_matrices(
         damping=damping_matrix(structure),
         cpu_limit_s=limit_s,
     )
-    coarse = f"{steps / (problem.t_end * highest):.2g} steps in the shortest period" if steps < wanted else ""
+    coarse = f"{steps / (problem.t_end * highest):.3g} steps in the shortest period" if steps < wanted else ""
     outcome = Outcome(
         FULL_MODEL,
         message="; ".join(filter(None, (_stands_in(problem), coarse))),
