@@ -11,6 +11,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
+from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
 from reference_models.exudyn_quiet import cpu_limit, quiet
 
@@ -25,7 +26,7 @@ def solve_body_alone(
     points: Sequence[str],
     *,
     velocity: np.ndarray | None = None,
-    loads: Sequence[Any] = (),
+    loads: Sequence[Load] = (),
     matched: bool = True,
     cpu_limit_s: float | None = None,
 ) -> tuple[BodyHistories, float]:

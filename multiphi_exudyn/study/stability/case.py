@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import LinearStructure
 from multiphi_exudyn.trajectory import Trajectory
@@ -49,7 +49,7 @@ class Problem:
     modes: int | str = "all"
     displacement: np.ndarray | None = None
     velocity: np.ndarray | None = None
-    loads: Sequence[Any] = ()
+    loads: Sequence[Load] = ()
     pull: Pull | None = None
     penalty: float | None = None
     metre: float = 1.0

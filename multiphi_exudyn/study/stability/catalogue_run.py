@@ -30,8 +30,8 @@ IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 class Limits:
     """quick: whether cases are short. native_limit_s, limit_s: of one run of the native and of another model [s].
 
-    budget: samples of every contact. most_steps: of the user object. values: coordinates that the full model of matrices may
-    store, all steps together.
+    budget: samples of every contact. most_steps: of the user object. values: coordinates that the full model of matrices
+    may store, all steps together.
     """
 
     quick: bool
