@@ -9,12 +9,14 @@ import numpy as np
 
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.loads import Load
+from multiphi_exudyn.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import LinearStructure
 from multiphi_exudyn.trajectory import Trajectory
 
-__all__ = ["Case", "Problem", "Pull"]
+__all__ = ["STATIC_LOADS", "Case", "Problem", "Pull"]
+
+STATIC_LOADS = (ConstantLoad, Gravity)
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class Problem:
     def conservative(self) -> bool:
         """Whether nothing but contacts may change the energy."""
         return self.structure.damping is None and not self.loads
+
+    @property
+    def driven(self) -> bool:
+        """Whether a load varies in time."""
+        return not all(isinstance(load, STATIC_LOADS) for load in self.loads)
 
     @property
     def penalty_contacts(self) -> list[UnilateralContact] | None:

@@ -30,8 +30,8 @@ IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 class Limits:
     """quick: whether cases are short. native_limit_s, limit_s: of one run of the native and of another model [s].
 
-    budget: samples of every contact. most_steps: of the user object. values: coordinates that the full model of matrices
-    may store, all steps together.
+    budget: samples of every contact. most_steps: of the user object. values: coordinates that the full model of
+    matrices may store, all steps together.
     """
 
     quick: bool
@@ -86,5 +86,7 @@ def _natives(case: Case, problem: Problem, limits: Limits) -> Iterator[Native]:
     yield run_native(case, problem, NUMPY_LOOP, False, limits.native_limit_s, limits.budget)
     if importlib.util.find_spec("numba") is None:
         yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "numba is not installed"))
+    elif problem.driven:
+        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "takes loads that do not vary"))
     else:
         yield run_native(case, problem, COMPILED_LOOP, True, limits.native_limit_s, limits.budget)

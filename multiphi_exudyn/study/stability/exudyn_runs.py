@@ -14,11 +14,11 @@ import numpy as np
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.loads import ConstantLoad, FunctionLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
 from multiphi_exudyn.study.measures.metrics import agreement_horizon, nrmse
 from multiphi_exudyn.study.scene.workbench import damping_matrix
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
-from multiphi_exudyn.study.stability.case import Problem, Pull
+from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, Outcome
 from multiphi_exudyn.trajectory import Trajectory
 from reference_models.body_alone import solve_body_alone
@@ -28,20 +28,20 @@ from reference_models.full_matrices import run_matrices
 __all__ = ["FULL_MODEL", "USER_OBJECT", "loops_compared", "run_full_model", "run_user_object"]
 
 USER_OBJECT, FULL_MODEL = "user object", "full model"
-MATCHED_PER_PERIOD = 3  # steps in the shortest kept period; matched modes need more than two
-STEPS_PER_PERIOD = 200  # of the full model, in the shortest period that its contacts or its structure have
+MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; matched modes need more than two
+STEPS_PER_PERIOD = 200  # of the full model in it, and of the user object where a load varies within a step
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
 GRID = 10_001  # times at which two native answers are compared
 AGREEMENT = 0.01  # NRMSE up to which two answers agree
-STATIC_LOADS = (ConstantLoad, Gravity)
 VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
 MOST_WORDS = 200  # characters of a cause that is not our own
 
 
 def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit_s: float) -> Outcome:
     """The body alone in Exudyn, its modes matched to the step where ``most_steps`` allow it."""
-    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * MATCHED_PER_PERIOD))
+    per_period = STEPS_PER_PERIOD if problem.driven else MATCHED_PER_PERIOD
+    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * per_period))
     steps, matched = min(wanted, most_steps), wanted <= most_steps
 
     def solve() -> Outcome:
