@@ -114,7 +114,7 @@ class DescentFinder:
         derivatives = self._derivatives(signals.coefficients, DERIVATIVES)
         values = (derivatives @ self.basis.at(0.0)).real
         values[0] += signals.constants
-        noise = ZERO * np.abs(derivatives).sum(axis=2)
+        noise = ZERO * (np.abs(derivatives) @ np.abs(self.basis.at(0.0)))  # t^d, d > 0, is zero and has none
         noise[0] += ZERO * np.abs(signals.constants)
         decided = np.abs(values) > noise
         first = np.argmax(decided, axis=0)

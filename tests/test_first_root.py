@@ -192,5 +192,6 @@ class TestSigns:
 
     def test_round_off_is_no_sign(self):
         own = DescentFinder(basis([2j, 3j]))
+        assert DescentFinder(POLYNOMIAL).signs(signals([0.0, -0.2, 0.0, 0.0, 1e30])) == [-1]  # t^4 is zero at t = 0
         assert own.signs(signals([1.0, -1.0 - 1e-15])) == [1]  # by its second derivative, 9 - 4
         assert own.signs(signals([0.0, 0.0])) == [0]
