@@ -15,7 +15,7 @@ import numpy as np
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
-from multiphi_exudyn.study.measures.metrics import agreement_horizon, nrmse
+from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.scene.workbench import damping_matrix
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
 from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull
@@ -33,7 +33,7 @@ STEPS_PER_PERIOD = 200  # of the full model in it, and of the user object where 
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
 GRID = 10_001  # times at which two native answers are compared
-AGREEMENT = 0.01  # NRMSE up to which two answers agree
+AGREEMENT = 0.01  # of the largest travel: two answers that are nearer agree
 VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
 MOST_WORDS = 200  # characters of a cause that is not our own
 
@@ -177,8 +177,9 @@ def _compared(
     worst = max((nrmse(*pair, time[inside], native.t_end) for pair in pairs), default=math.nan)
     if math.isnan(worst):
         return outcome
-    until = agreement_horizon(pairs, time[inside], AGREEMENT)
-    return replace(outcome, difference=worst, agrees_until=until / native.t_end)
+    apart = np.max([np.abs(values - ref) / np.max(np.abs(ref)) for values, ref in pairs], axis=0) > AGREEMENT
+    until = float(time[inside][np.argmax(apart)]) / native.t_end if np.any(apart) else 1.0
+    return replace(outcome, difference=worst, agrees_until=until)
 
 
 def _guarded(name: str, solve: Callable[[], Outcome]) -> Outcome:

@@ -18,7 +18,7 @@ class Outcome:
     energy, residual, missed, beyond [m], excused [m], reported [m]: see judgement.py, beyond being what is judged and
     excused what truncation leaves. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
     difference: to the native answer, ||y - native|| / ||native|| of the contacts' travel, the worst of them;
-    agrees_until: the share of the run until which it is below AGREEMENT.
+    agrees_until: the share of the run up to the first difference above AGREEMENT of the largest travel.
     steps: of an Exudyn model. samples, covered: of the brute force. time_s: of the run alone [s].
     """
 
