@@ -174,9 +174,10 @@ def _compared(
     pairs = [
         (gaps[c.name][inside] - c.gap, np.asarray(native.gap(c.name, time[inside])) - c.gap) for c in problem.contacts
     ]
-    worst = max((nrmse(*pair, time[inside], native.t_end) for pair in pairs), default=math.nan)
-    if math.isnan(worst):
+    pairs = [(values, ref) for values, ref in pairs if np.any(ref)]
+    if not pairs:
         return outcome
+    worst = max(nrmse(*pair, time[inside], native.t_end) for pair in pairs)
     apart = np.max([np.abs(values - ref) / np.max(np.abs(ref)) for values, ref in pairs], axis=0) > AGREEMENT
     until = float(time[inside][np.argmax(apart)]) / native.t_end if np.any(apart) else 1.0
     return replace(outcome, difference=worst, agrees_until=until)
