@@ -4,12 +4,15 @@ Elements are ANCFCable2D or ObjectBeamGeometricallyExact2D, point masses and the
 ObjectGenericODE2 items on the beam's own nodes, contacts are penalty elements on the node at their point.
 The beam's start is always held along its axis; a finite clamp stiffness acts through coordinate springs
 (on the slope y' in the ANCF beam, which is the sine of the rotation).
+
+A viscous contact and a force law are springs with a user function, ObjectConnectorCoordinateSpringDamper: the
+damping of ObjectContactCoordinate pulls at the end of a contact, and no element has a force law of one's own.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -21,12 +24,35 @@ import numpy as np
 from multiphi_exudyn.beam import Beam, Section, beam_nodes
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
+from reference_models.point_law import PointLaw
 
-__all__ = ["DEFLECTION", "BeamSystem", "build_beam_system"]
+__all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "build_beam_system"]
 
 AXIAL, DEFLECTION = 0, 1  # coordinates of a node of either kind
 _ROTATION = {"ancf": 3, "geometrically-exact": 2}  # the slope y', or the angle
 _CIRCLE_SEGMENTS = 3  # straight pieces an element is divided into where it meets a round support
+
+
+@dataclass
+class Stop:
+    """The stop of a contact, which may move: way [m], rate [m/s]. item: its ObjectContactCoordinate, or None."""
+
+    contact: PointContact
+    item: Any = None
+    way: float = 0.0
+    rate: float = 0.0
+
+    def move(self, mbs: Any, way: float, rate: float) -> None:
+        """Put it where it is now."""
+        self.way, self.rate = way, rate
+        if self.item is not None:
+            mbs.SetObjectParameter(self.item, "offset", way / abs(self.contact.coefficient) - self.contact.distance)
+
+    def spring_force(
+        self, mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float
+    ) -> float:
+        """User function of a spring between ground and point."""
+        return self.contact.spring_force(u, v, self.way, self.rate)
 
 
 @dataclass(frozen=True)
@@ -34,7 +60,8 @@ class BeamSystem:
     """An assembled Exudyn system and where its items are.
 
     container owns mbs and must live as long. positions: (nodes,) [m], of nodes and first_coordinates
-    (index of each node's first ODE2 coordinate). load: a LoadCoordinate along +z, zero, or None.
+    (index of each node's first ODE2 coordinate). load: a LoadCoordinate along +z, zero, or None. driver: an
+    ObjectGenericODE2 on all nodes whose forceVector is zero, or None. stops: of the contacts, by name.
     """
 
     container: Any
@@ -43,6 +70,8 @@ class BeamSystem:
     nodes: tuple[Any, ...]
     first_coordinates: np.ndarray
     load: Any
+    driver: Any
+    stops: Mapping[str, Stop]
 
     def node_at(self, x: float) -> int:
         """Number along the beam of the node at x [m]."""
@@ -59,8 +88,13 @@ def build_beam_system(
     contacts: Sequence[PointContact] = (),
     damping: np.ndarray | None = None,
     load_at: float | None = None,
+    laws: Sequence[PointLaw] = (),
+    driven: bool = False,
 ) -> BeamSystem:
-    """Build and assemble; damping: (n_full, n_full) on all coordinates; load_at: position [m] of a load."""
+    """Build and assemble; damping: (n_full, n_full) on all coordinates; load_at: position [m] of a load.
+
+    driven: whether there is a driver.
+    """
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     positions = beam_nodes(beam, settings.elements)
@@ -72,22 +106,28 @@ def build_beam_system(
     ground = _marker(mbs, mbs.AddNode(eii.NodePointGround()), AXIAL)
     _add_point_masses(mbs, beam, settings.kind, positions, nodes)
     _add_clamp(mbs, beam, settings.kind, ground, nodes[0])
+    stops = {contact.name: Stop(contact) for contact in contacts}
     for contact in contacts:
         node = _nearest(positions, beam.points[contact.point])
-        if settings.contact == "coordinate":
-            _add_coordinate_contact(mbs, contact, ground, nodes[node])
-        else:
+        if settings.contact == "circle":
             near = elements[max(node - 1, 0) : node + 1]
             _add_circle_contact(mbs, contact, settings.circle_radius, positions[node], near)
+        elif contact.damping:
+            _add_viscous_contact(mbs, stops[contact.name], ground, nodes[node])
+        else:
+            stops[contact.name].item = _add_coordinate_contact(mbs, contact, ground, nodes[node])
+    for law in laws:
+        _add_law(mbs, law, ground, nodes[_nearest(positions, beam.points[law.point])])
     if damping is not None:
         mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes), dampingMatrix=damping))
+    driver = mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes))) if driven else None
     load = None
     if load_at is not None:
         marker = _marker(mbs, nodes[_nearest(positions, load_at)], DEFLECTION)
         load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
     mbs.Assemble()
     first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
-    return BeamSystem(container, mbs, positions, nodes, first, load)
+    return BeamSystem(container, mbs, positions, nodes, first, load, driver, stops)
 
 
 def _nearest(positions: np.ndarray, x: float) -> int:
@@ -145,10 +185,10 @@ def _add_clamp(mbs: Any, beam: Beam, kind: str, ground: Any, node: Any) -> None:
             mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, stiffness=stiffness))
 
 
-def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: Any) -> None:
+def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: Any) -> Any:
     """Exudyn's gap is q(marker 1) - q(marker 0) - offset, its force acts along +q of marker 1."""
     point = _marker(mbs, node, DEFLECTION)
-    mbs.AddObject(
+    return mbs.AddObject(
         eii.ObjectContactCoordinate(
             markerNumbers=[point, ground] if contact.above else [ground, point],
             nodeNumber=_data_node(mbs, [contact.distance]),
@@ -156,6 +196,23 @@ def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: 
             offset=-contact.distance,
         )
     )
+
+
+def _add_viscous_contact(mbs: Any, stop: Stop, ground: Any, node: Any) -> None:
+    """A spring whose user function is the contact's law."""
+    mbs.AddObject(
+        eii.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=[ground, _marker(mbs, node, DEFLECTION)], springForceUserFunction=stop.spring_force
+        )
+    )
+
+
+def _add_law(mbs: Any, law: PointLaw, ground: Any, node: Any) -> None:
+    def force(mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float) -> float:
+        return law.spring_force(u)
+
+    markers = [ground, _marker(mbs, node, DEFLECTION)]
+    mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=force))
 
 
 def _add_circle_contact(mbs: Any, contact: PointContact, radius: float, x: float, elements: list[Any]) -> None:

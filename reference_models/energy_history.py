@@ -1,6 +1,10 @@
 """Energy of a full beam after its run, from the states that were kept.
 
-E = T + V + sum 1/2 k_i min(0, g_i)^2,   W_d(t) = integral of v.C v
+E = T + V + sum 1/2 k_i min(0, g_i)^2 + sum integral F_j dq_j,   W_d(t) = integral of v.C v
+
+Loads and stops that move do the work   W(t) = sum integral u_j d(p_j.q) + sum integral lambda_i dz_i,   a viscous
+contact dissipates   integral (lambda - k max(0, -g)) d(-g).   From step to step they are sums of mean force times
+way, which is what the trapezoidal rule has.
 """
 
 from __future__ import annotations
@@ -10,17 +14,18 @@ from typing import Any
 
 import numpy as np
 from exudyn.advancedUtilities import SystemEnergy
-from scipy.integrate import cumulative_trapezoid
+from scipy.integrate import cumulative_trapezoid, quad
 
+from reference_models.actions import Actions
 from reference_models.histories import Histories
-from reference_models.point_contact import PointContact
+from reference_models.point_law import PointLaw
 from reference_models.recorder import Recorder
 
-__all__ = ["dissipated_energy", "energy_history"]
+__all__ = ["contact_losses", "dissipated_energy", "energy_history", "work_of"]
 
 
 def energy_history(
-    mbs: Any, recorder: Recorder, contacts: Sequence[PointContact], steps: Histories
+    mbs: Any, recorder: Recorder, laws: Sequence[PointLaw], steps: Histories
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (j,) [s] and energies (j,) [J] of the states kept; the system is left in the last of them."""
     time = np.array(recorder.state_times)
@@ -28,9 +33,43 @@ def energy_history(
     total = SystemEnergy(mbs)
     energy = np.array([_energy(mbs, total, *state) for state in recorder.states[: len(time)]])
     kept = np.searchsorted(steps.time, time)
-    for contact in contacts:
+    for contact in steps.contacts:
         energy += contact.energy(steps.gaps[contact.name][kept])
+    for law in laws:
+        deflection = steps.points[law.point]
+        energy += _energy_of(law, deflection[0]) + _summed(law.forces(deflection), deflection)[kept]
     return time, energy
+
+
+def work_of(actions: Actions, recorder: Recorder, steps: Histories, time: np.ndarray) -> np.ndarray:
+    """Work (j,) [J] of loads and moving stops by the times (j,), which are among the steps'."""
+    total = np.zeros(len(steps.time))
+    moved = np.array(recorder.projections).reshape(len(recorder.times), len(actions.courses))[: len(total)]
+    for value, way in zip(actions.values(steps.time).T, moved.T, strict=True):
+        total += _summed(value, way)
+    for name, way in actions.ways.items():
+        total += _summed(steps.forces[name], way.at(steps.time))
+    return total[np.searchsorted(steps.time, time)]
+
+
+def contact_losses(steps: Histories, time: np.ndarray) -> np.ndarray:
+    """Energy (j,) [J] that viscous contacts have dissipated by the times (j,), which are among the steps'."""
+    total = np.zeros(len(steps.time))
+    for contact in steps.contacts:
+        if contact.damping:
+            gap = steps.gaps[contact.name]
+            total -= _summed(steps.forces[contact.name] - contact.force(gap), gap)
+    return total[np.searchsorted(steps.time, time)]
+
+
+def _summed(force: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Integral (s,) of force (s,) over way (s,)."""
+    return np.asarray(cumulative_trapezoid(force, way, initial=0))
+
+
+def _energy_of(law: PointLaw, deflection: float) -> float:
+    """Integral of the law's force from zero to a deflection [J]."""
+    return float(quad(law.spring_force, 0.0, deflection)[0])
 
 
 def dissipated_energy(recorder: Recorder, damping: np.ndarray | None, time: np.ndarray) -> np.ndarray:

@@ -1,17 +1,21 @@
 """The full nonlinear model: an Exudyn beam with contact elements, from a beam's description.
 
-    M(q) q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq,   lambda_i = k_i max(0, -g_i)
+    M q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq - sum F_j d(q_j)/dq + f(t),   lambda_i = k_i max(0, -g_i)
 
-Large displacements, penalty contacts, implicit time integration. A reduced model of the same scene takes
+Large displacements, penalty contacts, local force laws F_j, loads and moving supports (actions.py), implicit time
+integration. A reduced model of the same scene takes
 its (M, C, K) from ``structure``, so that the two differ in nothing but the reduction, the geometric
 nonlinearity and the time integration.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +23,18 @@ from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
+from multiphi_exudyn.loads import Load
+from reference_models.actions import Actions, actions_of
 from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
-from reference_models.energy_history import dissipated_energy, energy_history
+from reference_models.drive import Drive
+from reference_models.energy_history import contact_losses, dissipated_energy, energy_history, work_of
 from reference_models.exudyn_quiet import quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance, FullRun, closed_intervals
-from reference_models.histories import Histories, watched_coordinates
+from reference_models.histories import Histories, watched
 from reference_models.integration import Integration, integrate
 from reference_models.point_contact import point_contacts
+from reference_models.point_law import Law, point_laws
 from reference_models.recorder import Recorder
 from reference_models.solver_settings import simulation_settings
 from reference_models.static_start import static_start
@@ -41,8 +49,9 @@ WHOLE_STEP = 1e-6  # of a step: how far the last sample of a grid may lie beyond
 class FullBeam:
     """A beam and its contacts as an Exudyn model.
 
-    contacts: each on one point of the beam, with a finite stiffness.
-    structure: the beam without contacts, linearised where it is straight; its points are beam.points.
+    contacts: each on one point of the beam, with a finite stiffness; the force of a viscous one, and every force law,
+    is a Python function that Exudyn calls several times a step (2 to 3 us a step more).
+    structure: the beam without contacts and laws, linearised where it is straight; its points are beam.points.
     """
 
     def __init__(
@@ -50,10 +59,13 @@ class FullBeam:
         beam: Beam,
         contacts: Sequence[UnilateralContact],
         settings: FullBeamSettings = DEFAULT_SETTINGS,
+        force_laws: Sequence[Law] = (),
     ) -> None:
         self.beam = beam
         self.contacts = point_contacts(beam, contacts)
+        self.laws = point_laws(beam, force_laws)
         self.settings = settings
+        self._check_round({contact.name for contact in self.contacts if contact.damping}, "no damping")
         started = time.perf_counter()
         with quiet():
             self.structure = _linearized(beam, settings)
@@ -64,51 +76,83 @@ class FullBeam:
         """Number of free coordinates."""
         return self.structure.n
 
+    @functools.cached_property
+    def transverse(self) -> np.ndarray:
+        """e (n,), the direction of gravity and base motion along +z: M e is the inertia of the whole beam moved by 1.
+
+        M e counts the mass that couples free coordinates to those the clamp holds, which a row of ones on the
+        free deflections leaves out; e is 1 at every point but for a few parts in 1e3 on the elements at the clamp.
+        """
+        with quiet():
+            system = build_beam_system(self.beam, self.settings)
+            mass = system.mbs.ComputeLinearizedSystem()[0]
+        moved = np.zeros(len(mass))
+        moved[system.first_coordinates + DEFLECTION] = 1.0
+        return np.linalg.solve(self.structure.mass, self.structure.coordinates.T @ (mass @ moved))
+
     def run(
         self,
         t_end: float,
         *,
-        load_at: str,
-        measured_at: str,
-        displacement: float,
+        load_at: str | None = None,
+        measured_at: str | None = None,
+        displacement: float | None = None,
         damping: np.ndarray | None = None,
+        loads: Sequence[Load] = (),
         progress: bool = True,
     ) -> FullRun:
         """Pull at ``load_at`` until ``measured_at`` deflects by ``displacement`` [m], let go, integrate.
 
-        damping: C [N s/m], (n, n), in the coordinates of ``structure``. A numerical failure is a status of
-        the result; MultiPhiValueError is for the arguments only.
+        Without these three the beam starts straight and at rest. damping: C [N s/m], (n, n), in the coordinates of
+        ``structure``. loads: set in at t = 0, not before; their rows are in the coordinates of ``structure`` too. A
+        numerical failure is a status of the result; MultiPhiValueError is for the arguments only.
         """
-        self._check_start(t_end, load_at, measured_at, displacement)
-        matrix = None if damping is None else self._full_damping(damping)
-        with quiet():
-            started = time.perf_counter()
-            load = self.beam.points[load_at]
-            system = build_beam_system(self.beam, self.settings, self.contacts, matrix, load)
-            solver = simulation_settings(self.settings, t_end)
-            measured = system.coordinate(self.beam.points[measured_at])
-            guess = displacement / self._flexibility(load_at, measured_at)
-            try:
-                force = static_start(system, measured, displacement, guess, solver)
-            except NumericalFailure as failure:
-                return self._not_started(str(failure), self._building_s + time.perf_counter() - started)
-            offline_s = self._building_s + time.perf_counter() - started
-            watched = watched_coordinates(system, self.beam, self.contacts)
-            recorder = Recorder(system.mbs, watched, self.settings.output_step, t_end, progress)
-            integration = integrate(system.mbs, solver, recorder, self.settings.cpu_limit_s)
-            return self._result(system, recorder, integration, matrix, force, offline_s)
-
-    def _check_start(self, t_end: float, load_at: str, measured_at: str, displacement: float) -> None:
         if not (math.isfinite(t_end) and t_end > 0):
             raise MultiPhiValueError(f"t_end: got {t_end!r}, need a finite time > 0")
-        if not (math.isfinite(displacement) and displacement != 0):
+        start = self._start(load_at, measured_at, displacement)
+        matrix = None if damping is None else self._full_damping(damping)
+        actions = actions_of(self.structure, self.contacts, loads, t_end)
+        self._check_round(set(actions.ways), "a stop that does not move")
+        with quiet():
+            started = time.perf_counter()
+            load = None if start is None else self.beam.points[start.load_at]
+            driven = bool(actions.courses)
+            system = build_beam_system(self.beam, self.settings, self.contacts, matrix, load, self.laws, driven)
+            solver = simulation_settings(self.settings, t_end)
+            try:
+                force = 0.0 if start is None else self._start_force(start, system, solver)
+            except NumericalFailure as failure:
+                return self._not_started(str(failure), self._building_s + time.perf_counter() - started)
+            steps = solver.timeIntegration.numberOfSteps
+            drive = Drive(system, actions, self.structure.coordinates, t_end, steps)
+            offline_s = self._building_s + time.perf_counter() - started
+            kept = watched(system, self.beam, self.contacts, drive.forces)
+            recorder = Recorder(system.mbs, kept, self.settings.output_step, t_end, progress)
+            acting = None if actions.none else drive
+            integration = integrate(system.mbs, solver, recorder, self.settings.cpu_limit_s, acting)
+            return self._result(system, recorder, integration, matrix, actions, force, offline_s)
+
+    def _check_round(self, names: set[str], needed: str) -> None:
+        if self.settings.contact == "circle" and names:
+            raise MultiPhiValueError(f"contact {min(names)!r}: got a circle, need {needed} or contact 'coordinate'")
+
+    def _start_force(self, start: _Start, system: BeamSystem, solver: Any) -> float:
+        measured = system.coordinate(self.beam.points[start.measured_at])
+        guess = start.displacement / self._flexibility(start.load_at, start.measured_at)
+        return static_start(system, measured, start.displacement, guess, solver)
+
+    def _start(self, load_at: str | None, measured_at: str | None, displacement: float | None) -> _Start | None:
+        if load_at is None and measured_at is None and displacement is None:
+            return None
+        if displacement is None or not math.isfinite(displacement) or displacement == 0:
             raise MultiPhiValueError(f"displacement: got {displacement!r}, need a finite value, not zero")
         for name, point in (("load_at", load_at), ("measured_at", measured_at)):
-            if point not in self.beam.points:
+            if point is None or point not in self.beam.points:
                 known = ", ".join(sorted(self.beam.points)) or "none"
                 raise MultiPhiValueError(f"{name}: got {point!r}, need one of: {known}")
             if not np.any(self.structure.row(point)):
                 raise MultiPhiValueError(f"{name}: got {point!r}, held by the clamp; need a point that moves")
+        return _Start(str(load_at), str(measured_at), displacement)
 
     def _full_damping(self, damping: np.ndarray) -> np.ndarray:
         """C in Exudyn's coordinates, (n_full, n_full): S C S^T, as S has orthonormal columns."""
@@ -130,13 +174,16 @@ class FullBeam:
         recorder: Recorder,
         integration: Integration,
         damping: np.ndarray | None,
+        actions: Actions,
         force: float,
         offline_s: float,
     ) -> FullRun:
-        steps = Histories.recorded(recorder, self.beam, self.contacts, self.settings)
+        steps = Histories.recorded(recorder, self.beam, self.contacts, self.settings, actions.ways)
         grid = steps.at(_grid(steps.time[-1], self.settings))
-        energy_time, energy = energy_history(system.mbs, recorder, self.contacts, steps)
-        balance = EnergyBalance.of(energy_time, energy, dissipated_energy(recorder, damping, energy_time))
+        energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
+        lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
+        work = None if actions.none else work_of(actions, recorder, steps, energy_time)
+        balance = EnergyBalance.of(energy_time, energy, lost, work)
         failure = _failure(integration, recorder, steps, balance)
         return FullRun(
             status="failed" if failure else "ok",
@@ -144,7 +191,7 @@ class FullBeam:
             failed_at=failure[1] if failure else None,
             time=grid.time,
             points=grid.points,
-            contact_force={c.name: c.force(grid.gaps[c.name]) for c in self.contacts},
+            contact_force=grid.forces,
             gaps=grid.gaps,
             contact_intervals={name: closed_intervals(steps.time, gap) for name, gap in steps.gaps.items()},
             energy_time=energy_time,
@@ -180,6 +227,13 @@ class FullBeam:
             dofs=self.dofs,
             settings=self.settings,
         )
+
+
+@dataclass(frozen=True)
+class _Start:
+    load_at: str
+    measured_at: str
+    displacement: float
 
 
 def _linearized(beam: Beam, settings: FullBeamSettings) -> LinearizedStructure:

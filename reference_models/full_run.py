@@ -18,8 +18,10 @@ ENERGY_GAIN = 0.01  # of the initial energy; a run that gains more than this is 
 class EnergyBalance:
     """Energy of a run [J].
 
-    dissipated: by the damping matrix, the integral of v.C v, sampled at output_step.
-    worst_gain: largest rise of energy + dissipated above an earlier value of it, relative to initial.
+    dissipated: by the damping matrix, the integral of v.C v, sampled at output_step, and by viscous contacts.
+    work: of loads and of supports that move.
+    worst_gain: largest rise of energy + dissipated - work above an earlier value of it, relative to initial, where
+    something acts to the largest energy of the run.
     worst_gain_at: when that was [s]; gain_at: when the gain first exceeded ENERGY_GAIN, or None.
     """
 
@@ -29,13 +31,21 @@ class EnergyBalance:
     worst_gain: float
     worst_gain_at: float
     gain_at: float | None
+    work: float = 0.0
 
     @classmethod
-    def of(cls, time: np.ndarray, energy: np.ndarray, dissipated: np.ndarray) -> EnergyBalance:
-        """The balance of energies (k,) [J] at times (k,) [s] with what had been dissipated by then."""
-        balance = energy + dissipated
+    def of(
+        cls, time: np.ndarray, energy: np.ndarray, dissipated: np.ndarray, work: np.ndarray | None = None
+    ) -> EnergyBalance:
+        """The balance of energies (k,) [J] at times (k,) [s] with what had been dissipated and done by then.
+
+        work: None where nothing acts.
+        """
+        done = np.zeros(len(energy)) if work is None else work
+        balance = energy + dissipated - done
+        scale = energy[0] if work is None else float(np.max(energy)) or 1.0  # nothing has moved: nothing is gained
         with np.errstate(over="ignore", invalid="ignore"):  # a run that has blown up
-            gain = (balance - np.minimum.accumulate(balance)) / energy[0]
+            gain = (balance - np.minimum.accumulate(balance)) / scale
         beyond = np.flatnonzero(~(gain <= ENERGY_GAIN))
         worst = int(np.argmax(gain))
         return cls(
@@ -45,6 +55,7 @@ class EnergyBalance:
             worst_gain=float(gain[worst]),
             worst_gain_at=float(time[worst]),
             gain_at=float(time[beyond[0]]) if len(beyond) else None,
+            work=float(done[-1]),
         )
 
 
@@ -57,7 +68,7 @@ class FullRun:
     contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> ((t_close, t_open), ...) [s],
     from the gaps of all steps, crossings interpolated linearly.
     energy_time (j,) [s], energy (j,) [J]: kinetic, strain and contact springs; balance: its summary.
-    start_force [N]; steps: accepted time steps; dofs: free coordinates.
+    start_force [N], zero for a start at rest where it is straight; steps: accepted time steps; dofs: free coordinates.
     offline_s: building and static start; online_s: the dynamic solver alone, wall clock [s].
     """
 

@@ -2,32 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from multiphi_exudyn.beam import Beam
+from reference_models.actions import Way
 from reference_models.beam_system import AXIAL, DEFLECTION, BeamSystem
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
-from reference_models.recorder import Recorder
+from reference_models.recorder import Recorder, Watched
 
-__all__ = ["Histories", "watched_coordinates"]
+__all__ = ["Histories", "watched"]
 
 
 @dataclass(frozen=True)
 class Histories:
-    """Deflections [m] of points and gaps [m] of contacts by name, (s,) each, at times (s,) [s]."""
+    """Deflections [m] of points and gaps [m] of contacts by name, (s,) each, at times (s,) [s].
+
+    rates: g' [m/s] of viscous contacts.
+    """
 
     time: np.ndarray
     points: dict[str, np.ndarray]
     gaps: dict[str, np.ndarray]
+    rates: dict[str, np.ndarray]
+    contacts: tuple[PointContact, ...]
+
+    @property
+    def forces(self) -> dict[str, np.ndarray]:
+        """lambda [N] of every contact, (s,) each."""
+        return {c.name: c.force(self.gaps[c.name], self.rates.get(c.name, 0.0)) for c in self.contacts}
 
     @classmethod
     def recorded(
-        cls, recorder: Recorder, beam: Beam, contacts: Sequence[PointContact], settings: FullBeamSettings
+        cls,
+        recorder: Recorder,
+        beam: Beam,
+        contacts: tuple[PointContact, ...],
+        settings: FullBeamSettings,
+        ways: Mapping[str, Way],
     ) -> Histories:
         """The recorded steps, up to the last one at which everything is finite."""
         time, watched = np.array(recorder.times), np.array(recorder.watched)
@@ -39,27 +55,36 @@ class Histories:
             contact.name: contact.of_distance(_distance(contact, settings, *pair))
             for contact, pair in zip(contacts, pairs, strict=True)
         }
-        return cls(time[:count], points, gaps)
+        viscous = [contact for contact in contacts if contact.damping]
+        speeds = np.array(recorder.speeds).reshape(len(time), len(viscous))[:count].T
+        rates = {c.name: c.coefficient * speed for c, speed in zip(viscous, speeds, strict=True)}
+        for name, way in ways.items():
+            gaps[name] = gaps[name] - way.at(time[:count])
+            if name in rates:
+                rates[name] = rates[name] - way.rate(time[:count])
+        return cls(time[:count], points, gaps, rates, contacts)
 
     def at(self, time: np.ndarray) -> Histories:
         """The same at other times (k,), by cubic splines through the steps."""
         if len(self.time) < 2:
             return self
-        return Histories(time, self._splined(self.points, time), self._splined(self.gaps, time))
+        points, gaps, rates = (self._splined(given, time) for given in (self.points, self.gaps, self.rates))
+        return Histories(time, points, gaps, rates, self.contacts)
 
     def _splined(self, given: dict[str, np.ndarray], time: np.ndarray) -> dict[str, np.ndarray]:
         return {name: CubicSpline(self.time, values)(time) for name, values in given.items()}
 
 
-def watched_coordinates(system: BeamSystem, beam: Beam, contacts: Sequence[PointContact]) -> np.ndarray:
-    """Indices of the coordinates a Histories needs: deflections, then (axial, deflection) of contacts."""
+def watched(system: BeamSystem, beam: Beam, contacts: Sequence[PointContact], forces: np.ndarray) -> Watched:
+    """What a Histories needs: deflections, then (axial, deflection) of contacts; speeds of viscous contacts."""
     points = [system.coordinate(x) for x in beam.points.values()]
     touching = [
         system.coordinate(beam.points[contact.point], component)
         for contact in contacts
         for component in (AXIAL, DEFLECTION)
     ]
-    return np.array([*points, *touching], dtype=int)
+    viscous = [system.coordinate(beam.points[contact.point]) for contact in contacts if contact.damping]
+    return Watched(np.array([*points, *touching], dtype=int), np.array(viscous, dtype=int), forces)
 
 
 def _distance(

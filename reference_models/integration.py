@@ -8,6 +8,7 @@ from typing import Any
 
 import exudyn as exu
 
+from reference_models.drive import Drive
 from reference_models.exudyn_quiet import cpu_limit, interruptible
 from reference_models.recorder import Recorder
 
@@ -22,9 +23,14 @@ class Integration:
     wall_s: float
 
 
-def integrate(mbs: Any, simulation_settings: Any, recorder: Recorder, cpu_limit_s: float | None) -> Integration:
+def integrate(
+    mbs: Any, simulation_settings: Any, recorder: Recorder, cpu_limit_s: float | None, drive: Drive | None = None
+) -> Integration:
     """Integrate from the initial state and record; Ctrl-C stops the solver and raises KeyboardInterrupt."""
     mbs.SetPostStepUserFunction(recorder)
+    if drive is not None:
+        drive(mbs, 0.0)
+        mbs.SetPreStepUserFunction(drive)
     started = time.perf_counter()
     try:
         with cpu_limit(cpu_limit_s), interruptible(recorder.stop):
@@ -32,6 +38,9 @@ def integrate(mbs: Any, simulation_settings: Any, recorder: Recorder, cpu_limit_
         return Integration(cause, time.perf_counter() - started)
     finally:
         mbs.SetPostStepUserFunction(0)  # it refers to the system, which would keep both alive
+        if drive is not None:
+            mbs.SetPreStepUserFunction(0)
+            drive.release(mbs)
         recorder.close()
 
 

@@ -1,39 +1,51 @@
 """What is kept while a full beam is integrated, at the least cost per step.
 
-Every step: the time and the watched coordinates. At output_step: all velocities at both ends of a step,
-from which the dissipated energy follows. Every millisecond: all coordinates and velocities, from which the
-energy follows after the run. The cost is 1 to 2 us a step, as that of Exudyn's own sensors.
+Every step: the time, the watched coordinates, and how far loads have moved. At output_step: all velocities at
+both ends of a step, from which the dissipated energy follows. Every millisecond: all coordinates and velocities,
+from which the energy follows after the run. The cost is 1 to 2 us a step, as that of Exudyn's own sensors.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-__all__ = ["ENERGY_STEP", "Recorder"]
+__all__ = ["ENERGY_STEP", "Recorder", "Watched"]
 
 ENERGY_STEP = 1e-3  # s between two energies
 BAR_DELAY = 1.0  # s before a progress bar appears
 EARLY = 1e-6  # of a sampling step: how much before its time a sample may be taken
 
 
+@dataclass(frozen=True)
+class Watched:
+    """Kept at every step: coordinates and speeds, indices of ODE2 coordinates; forces: (n_full, m), of them force.q."""
+
+    coordinates: np.ndarray
+    speeds: np.ndarray
+    forces: np.ndarray
+
+
 class Recorder:
     """A PostStep user function; Exudyn calls it at the start and after every accepted step.
 
-    watched: indices of the ODE2 coordinates kept at every step.
+    watched: what is kept at every step.
     """
 
-    def __init__(self, mbs: Any, watched: np.ndarray, output_step: float, t_end: float, progress: bool) -> None:
+    def __init__(self, mbs: Any, watched: Watched, output_step: float, t_end: float, progress: bool) -> None:
         self.times: list[float] = []
         self.watched: list[np.ndarray] = []
+        self.speeds: list[np.ndarray] = []
+        self.projections: list[np.ndarray] = []
         self.velocity_steps: list[int] = []
         self.velocities: list[np.ndarray] = []
         self.state_times: list[float] = []
         self.states: list[tuple[np.ndarray, np.ndarray]] = []
         self.stopped = False
-        self._indices = np.asarray(watched)
+        self._indices, self._moving, self._forces = watched.coordinates, watched.speeds, watched.forces.T
         self._output_step = output_step
         self._q = mbs.systemData.GetODE2Coordinates(copy=False)
         self._q_t = mbs.systemData.GetODE2Coordinates_t(copy=False)
@@ -52,6 +64,10 @@ class Recorder:
         """Keep the state at time t [s]; False asks the solver to stop."""
         self.times.append(t)
         self.watched.append(self._q[self._indices])
+        if len(self._moving):
+            self.speeds.append(self._q_t[self._moving])
+        if len(self._forces):
+            self.projections.append(self._forces @ self._q)
         due = t >= self._next_output
         if due or self._was_due:
             self.velocity_steps.append(len(self.times) - 1)

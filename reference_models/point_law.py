@@ -1,0 +1,63 @@
+"""A local force law on one point of the beam, in the coordinates of the Exudyn model.
+
+The structure feels the force -F(q) along the row of its point, q = c w:   -c F(c w) on the deflection w.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from multiphi_exudyn.beam import Beam
+from multiphi_exudyn.errors import MultiPhiValueError
+from reference_models.point_contact import point_and_coefficient
+
+__all__ = ["Law", "PointLaw", "point_laws"]
+
+
+class Law(Protocol):
+    """What a force law says of itself: its place, its name, and F [N] of q [m]."""
+
+    @property
+    def at(self) -> Any:
+        """A point name or {point: coefficient}."""
+
+    @property
+    def name(self) -> str:
+        """How results refer to it."""
+
+    def force(self, q: Any) -> Any:
+        """F(q)."""
+
+
+@dataclass(frozen=True)
+class PointLaw:
+    """point of the beam; c; law."""
+
+    point: str
+    coefficient: float
+    law: Law
+
+    def spring_force(self, deflection: float) -> float:
+        """c F(c w) [N], against the deflection w [m]."""
+        return float(self.coefficient * self.law.force(self.coefficient * deflection))
+
+    def forces(self, deflection: np.ndarray) -> np.ndarray:
+        """The same of (k,) deflections."""
+        return np.array([self.spring_force(w) for w in deflection.tolist()])
+
+
+def point_laws(beam: Beam, laws: Sequence[Law]) -> tuple[PointLaw, ...]:
+    """The laws on points; raises MultiPhiValueError where a full beam cannot have them."""
+    return tuple(_point_law(beam, law) for law in laws)
+
+
+def _point_law(beam: Beam, law: Law) -> PointLaw:
+    point, coefficient = point_and_coefficient(f"force law {law.name!r} at", law.at)
+    if point not in beam.points:
+        known = ", ".join(sorted(beam.points)) or "none"
+        raise MultiPhiValueError(f"force law {law.name!r} at: got {point!r}, need one of: {known}")
+    return PointLaw(point, coefficient, law)
