@@ -10,6 +10,7 @@ nonlinearity and the time integration.
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 import time
@@ -75,6 +76,18 @@ class FullBeam:
     def dofs(self) -> int:
         """Number of free coordinates."""
         return self.structure.n
+
+    def with_settings(self, settings: FullBeamSettings) -> FullBeam:
+        """The same beam, discretised as it is, integrated otherwise."""
+        if (settings.kind, settings.elements, settings.contact) != (
+            self.settings.kind,
+            self.settings.elements,
+            self.settings.contact,
+        ):
+            raise MultiPhiValueError(f"settings: got {settings}, need the same kind, elements and contact")
+        other = copy.copy(self)
+        other.settings = settings
+        return other
 
     @functools.cached_property
     def transverse(self) -> np.ndarray:

@@ -25,6 +25,7 @@ class FullBeamSettings:
         (ObjectContactCircleCable2D, a round support of ``circle_radius`` [m]; ancf only).
     newton_tolerance: relative and absolute. Exudyn's defaults of 1e-8 and 1e-10 lie below the round-off of
         an axially stiff beam and let the step collapse.
+    full_newton: the Jacobian is computed in every iteration, not when one converges slowly; four times as dear.
     spectral_radius: of generalised alpha; 1 is the trapezoidal rule, below 1 damps what the step misses.
     output_step: grid [s] of the histories in the result.
     cpu_limit_s: CPU time [s] after which a run stops with a status.
@@ -35,6 +36,7 @@ class FullBeamSettings:
     step: float = 2e-5
     contact: str = "coordinate"
     newton_tolerance: float = 1e-5
+    full_newton: bool = False
     spectral_radius: float = 1.0
     output_step: float = 1e-4
     cpu_limit_s: float | None = None

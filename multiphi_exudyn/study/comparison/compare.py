@@ -107,11 +107,14 @@ def compare(
     progress: bool = True,
     started: Callable[[str], None] = lambda name: None,
 ) -> Comparison:
-    """Run every model of the scene; ``started`` is called with each name before it runs."""
+    """Run every model of the scene; ``started`` is called with each name before it runs.
+
+    A full beam that fails is tried again at gentler settings, and its row says so.
+    """
     runs = {}
     for name in bench.scene.models:
         started(name)
-        runs[name] = run_model(bench, name, progress)
+        runs[name] = run_model(bench, name, progress, retry=True)
     return Comparison(bench, runs, environment)
 
 

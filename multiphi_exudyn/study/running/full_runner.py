@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,19 +14,24 @@ from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel
 from multiphi_exudyn.study.scene.workbench import Workbench, damping_matrix, start_configuration
-from reference_models.full_beam import FullRun
+from reference_models.full_beam import FullBeam, FullRun
+from reference_models.gentler import Attempt, attempts
 
 __all__ = ["run_full"]
 
 
-def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool) -> ModelRun:
-    """Run a full beam with the scene's damping on its own mesh; histories come on the common grid."""
+def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool, retry: bool = False) -> ModelRun:
+    """Run a full beam with the scene's damping on its own mesh; histories come on the common grid.
+
+    retry: a run that fails is tried again at gentler settings (reference_models/gentler.py); its message then says at
+    which, its time is that of all attempts.
+    """
     beam = bench.full_beam(spec)
     damping = damping_matrix(replace(beam.structure, damping=bench.mechanics.damping))
     measured_at, displacement = _start_displacement(bench)
 
-    def solve() -> tuple[FullRun, float]:
-        result = beam.run(
+    def solve(beam: FullBeam) -> FullRun:
+        return beam.run(
             bench.t_end,
             load_at=bench.scene.file.start.load_at,
             measured_at=measured_at,
@@ -32,22 +39,43 @@ def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool) -> M
             damping=damping,
             progress=progress,
         )
-        return result, result.online_s
 
-    result, first, repeats = repeated(solve, bench.repeats)
+    tried = attempts(beam, solve) if retry else [Attempt("as asked", solve(beam))]
+    result, _, repeats = repeated(_after(tried[-1].run, lambda: solve(beam)), bench.repeats if len(tried) == 1 else 0)
     run = ModelRun(
         name=spec.name,
         kind=spec.kind,
         label=label,
         dofs=result.dofs,
         status=result.status,
-        message=result.message,
+        message=_message(tried),
         steps=result.steps,
         offline_s=result.offline_s,
-        first_s=first,
+        first_s=sum(attempt.run.online_s for attempt in tried),
         repeats_s=repeats,
     )
     return replace(run, **_of_full(bench, result)) if run.ok else run
+
+
+def _after(first: FullRun, again: Callable[[], FullRun]) -> Callable[[], tuple[FullRun, float]]:
+    """Gives the run there is already, then further ones, each with its time [s]."""
+    runs = itertools.chain([first], iter(again, None))
+
+    def run() -> tuple[FullRun, float]:
+        result = next(runs)
+        return result, result.online_s
+
+    return run
+
+
+def _message(tried: Sequence[Attempt]) -> str:
+    """Of one attempt its own; of more, what was tried, and what made it run."""
+    last = tried[-1]
+    if len(tried) == 1:
+        return last.run.message
+    if last.run.status == "ok":
+        return f"ran with gentler settings ({last.settings}); {'; '.join(attempt.told for attempt in tried[:-1])}"
+    return f"failed with every setting; {'; '.join(attempt.told for attempt in tried)}"
 
 
 def _of_full(bench: Workbench, result: FullRun) -> dict[str, Any]:

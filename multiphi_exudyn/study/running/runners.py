@@ -27,13 +27,16 @@ from multiphi_exudyn.study.scene.workbench import Workbench
 __all__ = ["label_of", "run_model"]
 
 
-def run_model(bench: Workbench, name: str, progress: bool = True) -> ModelRun:
-    """Run the scene's model ``name``; a failed run has status "failed" and its cause."""
+def run_model(bench: Workbench, name: str, progress: bool = True, retry: bool = False) -> ModelRun:
+    """Run the scene's model ``name``; a failed run has status "failed" and its cause.
+
+    retry: a full beam that fails is tried again at gentler settings; not for a study that judges the settings.
+    """
     spec = bench.scene.models[name]
     label = label_of(bench, spec)
     try:
         if isinstance(spec, FullModel):
-            return run_full(bench, spec, label, progress)
+            return run_full(bench, spec, label, progress, retry)
         if isinstance(spec, UserObjectModel):
             return run_user_object(bench, spec, label)
         if isinstance(spec, CraigBamptonModel):
