@@ -19,7 +19,7 @@ __all__ = ["Law", "PointLaw", "point_laws"]
 
 
 class Law(Protocol):
-    """What a force law says of itself: its place, its name, and F [N] of q [m]."""
+    """What a force law says of itself: its place, its name, and F [N] of q [m], a function or a table (q, F)."""
 
     @property
     def at(self) -> Any:
@@ -29,8 +29,12 @@ class Law(Protocol):
     def name(self) -> str:
         """How results refer to it."""
 
+    @property
+    def law(self) -> Any:
+        """F as it was given."""
+
     def force(self, q: Any) -> Any:
-        """F(q)."""
+        """F(q) by straight segments; of a table, F itself."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,9 @@ class PointLaw:
     law: Law
 
     def spring_force(self, deflection: float) -> float:
-        """c F(c w) [N], against the deflection w [m]."""
-        return float(self.coefficient * self.law.force(self.coefficient * deflection))
+        """c F(c w) [N], against the deflection w [m]: the law itself, not its segments."""
+        exact = self.law.law if callable(self.law.law) else self.law.force
+        return float(self.coefficient * exact(self.coefficient * deflection))
 
     def forces(self, deflection: np.ndarray) -> np.ndarray:
         """The same of (k,) deflections."""
