@@ -20,8 +20,8 @@ class EnergyBalance:
 
     dissipated: by the damping matrix, the integral of v.C v, sampled at output_step, and by viscous contacts.
     work: of loads and of supports that move.
-    worst_gain: largest rise of energy + dissipated - work above an earlier value of it, relative to initial, where
-    something acts to the largest energy of the run.
+    scale: the initial energy; where something acts, the largest one of the run.
+    worst_gain: largest rise of energy + dissipated - work above an earlier value of it, relative to scale.
     worst_gain_at: when that was [s]; gain_at: when the gain first exceeded ENERGY_GAIN, or None.
     """
 
@@ -31,7 +31,8 @@ class EnergyBalance:
     worst_gain: float
     worst_gain_at: float
     gain_at: float | None
-    work: float = 0.0
+    work: float
+    scale: float
 
     @classmethod
     def of(
@@ -56,6 +57,7 @@ class EnergyBalance:
             worst_gain_at=float(time[worst]),
             gain_at=float(time[beyond[0]]) if len(beyond) else None,
             work=float(done[-1]),
+            scale=float(scale),
         )
 
 

@@ -124,7 +124,7 @@ def test_labels_say_what_a_model_is(bench, runs):
 def test_the_loop_is_the_one_asked_for(tmp_path, monkeypatch, kind, loop, compiled):
     asked = set()
 
-    def simulated(model, t_end, displacement, compiled):
+    def simulated(model, t_end, displacement, loads, compiled):
         asked.add(compiled)
         return simulate(model, t_end, displacement, compiled=False)
 

@@ -25,7 +25,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, LoadedStart, ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.scenes import ModelSpec
 from multiphi_exudyn.study.scene.workbench import Workbench
 
@@ -85,7 +85,7 @@ class Budget:
         return {
             "scene": scene.name,
             "parameter_set": self.bench.mechanics.parameter_set,
-            "start": scene.file.start.model_dump(),
+            "start": _start(self.bench).model_dump(),
             "modes": self.modes,
             "dofs": self.bench.structure.n,
             "rungs": {rung.name: _described(rung) for rungs in self.ladders.values() for rung in rungs},
@@ -208,15 +208,22 @@ def _check(bench: Workbench, modes: int, step: float | None) -> None:
         raise MultiPhiValueError(f"modes: got {modes}, need 1 to {most} for this structure")
     if step is not None and not (math.isfinite(step) and step > 0):
         raise MultiPhiValueError(f"step: got {step!r}, need a finite time > 0 s")
+    if bench.scene.file.start is None:
+        raise MultiPhiValueError(f"scene: got {bench.scene.name} without a start, need one, which is disturbed")
     if bench.overrides:
         raise MultiPhiValueError(
             f"scene: got {bench.scene.name} with printed frequencies, need levels of one structure"
         )
 
 
+def _start(bench: Workbench) -> DisplacedStart | LoadedStart:
+    assert bench.scene.file.start is not None, "checked where the budget begins"
+    return bench.scene.file.start
+
+
 def _run(bench: Workbench, spec: ModelSpec, disturbance: float = 0.0, progress: bool = False) -> ModelRun:
     """One model, once, on the bench's scene, its start scaled by 1 + ``disturbance``."""
-    start = bench.scene.file.start
+    start = _start(bench)
     size = "displacement" if isinstance(start, DisplacedStart) else "force"
     scaled = start.model_copy(update={size: getattr(start, size) * (1 + disturbance)})
     file = bench.scene.file.model_copy(update={"start": scaled, "models": (spec,)})

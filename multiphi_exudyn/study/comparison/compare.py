@@ -89,6 +89,17 @@ class Comparison:
         timed = run.ok and self.reference.ok and run.online_s > 0
         return self.reference.online_s / run.online_s if timed else None
 
+    def energy_scale(self, run: ModelRun) -> float:
+        """What energies of a run are shares of [J]: the initial energy; under loads, the largest of the run; or 0."""
+        if self.bench.scene.file.loads:
+            return float(np.max(run.energy, initial=0.0))
+        return float(run.ledger.get("initial", 0.0))
+
+    @property
+    def energy_scale_name(self) -> str:
+        """The same in words."""
+        return "largest energy of the run" if self.bench.scene.file.loads else "initial energy"
+
     def first_phase(self, run: ModelRun, contact: str) -> np.ndarray:
         """Contact intervals (m, 2) [s] of the first contact phase."""
         return metrics.first_phase(run.contact_intervals[contact], self.bench.longest_period)
@@ -165,7 +176,8 @@ def _scene(comparison: Comparison) -> dict[str, Any]:
         "t_end": comparison.bench.t_end,
         "points": list(comparison.bench.points),
         "judged_points": list(comparison.bench.judged_points),
-        "start": scene.file.start.model_dump(),
+        "start": None if scene.file.start is None else scene.file.start.model_dump(),
+        "loads": [load.model_dump(exclude_none=True) for load in scene.file.loads],
         "contacts": {
             contact.name: {"gap": contact.gap, "stiffness": "rigid" if contact.rigid else contact.stiffness}
             for contact in comparison.bench.mechanics.contacts

@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
+from multiphi_exudyn.study.scene.scene_loads import described_loads
 
 __all__ = ["Findings", "findings", "percent", "seconds", "times"]
 
@@ -80,25 +82,39 @@ def first_of(comparison: Comparison, kind: str) -> ModelRun | None:
 def _compared(comparison: Comparison) -> str:
     contacts = comparison.bench.mechanics.contacts
     stops = " and ".join(
-        f"the contact {c.name} (gap {1e3 * c.gap:g} mm, {'rigid' if c.rigid else f'{engineering(c.stiffness)}N/m'})"
+        f"the contact {c.name} (gap {1e3 * c.gap:g} mm, {'rigid' if c.rigid else f'{engineering(c.stiffness)}N/m'}"
+        f"{_damped(c)})"
         for c in contacts
     )
     return (
-        f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}, "
-        f"released from rest{', and meets ' + stops if stops else ''}. "
+        f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}"
+        f"{_driven(comparison)}{', and meets ' + stops if stops else ''}. "
         f"The reference is the {comparison.reference.label}."
     )
+
+
+def _damped(contact: UnilateralContact) -> str:
+    damping = getattr(contact, "damping", 0.0)
+    return f", {engineering(damping)}N s/m" if damping else ""
 
 
 def _start(comparison: Comparison) -> str:
     start = comparison.bench.scene.file.start
     what = "the structure" if comparison.bench.mechanics.beam is None else "the beam"
+    if start is None:
+        return f"{what} starts straight and at rest"
     if isinstance(start, DisplacedStart):
         return (
             f"{what} is bent by a static force at {start.load_at} until {start.measured_at} "
-            f"stands at {1e3 * start.displacement:+g} mm"
+            f"stands at {1e3 * start.displacement:+g} mm, released from rest"
         )
-    return f"{what} is bent by a static force of {start.force:+g} N at {start.load_at}"
+    return f"{what} is bent by a static force of {start.force:+g} N at {start.load_at}, released from rest"
+
+
+def _driven(comparison: Comparison) -> str:
+    """What acts from then on, as a clause; nothing for a structure that is only released."""
+    loads = described_loads(comparison.bench.scene)
+    return f", is driven from t = 0 on by {' and '.join(loads)}" if loads else ""
 
 
 def _outcome(comparison: Comparison) -> str:
@@ -181,15 +197,15 @@ def _sensitivity(comparison: Comparison) -> Iterable[str]:
 
 def _truncation(comparison: Comparison) -> Iterable[str]:
     shares = {
-        run.name: (run.ledger["truncation_kinetic"] + run.ledger["truncation_strain"]) / run.ledger["initial"]
+        run.name: (run.ledger["truncation_kinetic"] + run.ledger["truncation_strain"]) / comparison.energy_scale(run)
         for run in comparison.measured.values()
-        if run.kind == "reduced" and run.ledger.get("initial") and "truncation_kinetic" in run.ledger
+        if run.kind == "reduced" and comparison.energy_scale(run) and "truncation_kinetic" in run.ledger
     }
     if any(share > MUCH for share in shares.values()):
         listed = ", ".join(f"{name} {percent(share)}" for name, share in shares.items())
         yield (
-            "At every transition a reduced model drops what the next level's modes cannot hold. Of the initial "
-            f"energy that is: {listed}. Where it is much, take more modes."
+            "At every transition a reduced model drops what the next level's modes cannot hold. Of the "
+            f"{comparison.energy_scale_name} that is: {listed}. Where it is much, take more modes."
         )
 
 

@@ -37,8 +37,15 @@ class LossTable:
 
 
 def loss_tables(bench: Workbench) -> tuple[LossTable, ...]:
-    """One table per kind of level, of the scene's first contact; none where there is nothing to count."""
-    if not (bench.mechanics.contacts and np.isfinite(bench.longest_period)) or _starts_closed(bench):
+    """One table per kind of level, of the scene's first contact; none where there is nothing to count.
+
+    Nor under loads: the tables are of a start that is scaled.
+    """
+    if (
+        bench.scene.file.loads
+        or not (bench.mechanics.contacts and np.isfinite(bench.longest_period))
+        or _starts_closed(bench)
+    ):
         return ()
     modes = [r for r in MODES if r <= bench.structure.n - len(bench.mechanics.contacts)]
     rigid = {bench.mechanics.contacts[0].rigid, True}
@@ -63,6 +70,7 @@ def _starts(bench: Workbench) -> tuple[str, ...]:
     start = bench.scene.file.start
     if isinstance(start, DisplacedStart):
         return tuple(f"{1e3 * factor * start.displacement:+g} mm" for factor in FACTORS)
+    assert start is not None, "a scene without loads has a start"
     return tuple(f"{factor * start.force:+g} N" for factor in FACTORS)
 
 

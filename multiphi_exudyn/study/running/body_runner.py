@@ -32,7 +32,8 @@ def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> Mode
     """Add the body to an empty system, its modes matched to the step, and solve."""
     task, building = timed(lambda: _task(bench, spec))
     recorded, first, repeats = repeated(
-        lambda: solve_body_alone(task.model, task.start, bench.t_end, task.steps, bench.points), bench.repeats
+        lambda: solve_body_alone(task.model, task.start, bench.t_end, task.steps, bench.points, loads=bench.loads),
+        bench.repeats,
     )
     histories, sampling = timed(lambda: _histories(bench, recorded))
     return ModelRun(

@@ -28,17 +28,10 @@ def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool, retr
     """
     beam = bench.full_beam(spec)
     damping = damping_matrix(replace(beam.structure, damping=bench.mechanics.damping))
-    measured_at, displacement = _start_displacement(bench)
+    start, loads = _start(bench), bench.loads_on(beam)
 
     def solve(beam: FullBeam) -> FullRun:
-        return beam.run(
-            bench.t_end,
-            load_at=bench.scene.file.start.load_at,
-            measured_at=measured_at,
-            displacement=displacement,
-            damping=damping,
-            progress=progress,
-        )
+        return beam.run(bench.t_end, damping=damping, loads=loads, progress=progress, **start)
 
     tried = attempts(beam, solve) if retry else [Attempt("as asked", solve(beam))]
     result, _, repeats = repeated(_after(tried[-1].run, lambda: solve(beam)), bench.repeats if len(tried) == 1 else 0)
@@ -93,18 +86,22 @@ def _of_full(bench: Workbench, result: FullRun) -> dict[str, Any]:
         "energy": result.energy,
         "ledger": {
             "initial": balance.initial,
+            "work_of_loads": balance.work,
             "damping": balance.dissipated,
             "final": balance.final,
-            "residual": balance.initial - balance.dissipated - balance.final,
-            "worst_gain": balance.worst_gain * balance.initial,
+            "residual": balance.initial + balance.work - balance.dissipated - balance.final,
+            "worst_gain": balance.worst_gain * balance.scale,
         },
     }
 
 
-def _start_displacement(bench: Workbench) -> tuple[str, float]:
-    """(point, displacement [m]) that the full model's static load has to reach."""
+def _start(bench: Workbench) -> dict[str, Any]:
+    """Where the full model's static load acts and what it has to reach; nothing for a start at rest."""
     start = bench.scene.file.start
+    if start is None:
+        return {}
     if isinstance(start, DisplacedStart):
-        return start.measured_at, start.displacement
+        return start.model_dump()
     model = MultiPhiModel(bench.structure, bench.contacts(rigid=False))
-    return start.load_at, float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
+    reached = float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
+    return {"load_at": start.load_at, "measured_at": start.load_at, "displacement": reached}

@@ -47,9 +47,11 @@ def _run(
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
     compiled = spec.loop == "compiled"
-    trajectory, first, repeats = repeated(
-        lambda: timed(lambda: simulate(model, bench.t_end, displacement=start, compiled=compiled)), bench.repeats
-    )
+
+    def run_once() -> Trajectory:
+        return simulate(model, bench.t_end, displacement=start, loads=bench.loads, compiled=compiled)
+
+    trajectory, first, repeats = repeated(lambda: timed(run_once), bench.repeats)
     run = ModelRun(
         name=spec.name,
         kind=spec.kind,

@@ -57,7 +57,8 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
         kind = "ANCF" if spec.beam == "ancf" else "geometrically exact"
         return f"full Exudyn beam, {kind}, {spec.elements} elements, step {spec.step * 1e6:g} µs"
     if isinstance(spec, CraigBamptonModel):
-        start = "" if bench.scene.file.start.load_at in bench.interface else ", start projected"
+        given = bench.scene.file.start
+        start = "" if given is None or given.load_at in bench.interface else ", start projected"
         reduced = f"{len(bench.interface)} interface points + {spec.modes} modes"
         return f"Craig-Bampton in Exudyn, {reduced}, step {spec.step * 1e6:g} µs{start}"
     if isinstance(spec, StepwiseModel):

@@ -18,13 +18,16 @@ import numpy as np
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
+from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.scene_file import (
+    BaseMotionSpec,
     BeamSpec,
     CraigBamptonModel,
     DampingSpec,
     DisplacedStart,
     FullModel,
+    GlobalBasisModel,
     MatrixStructure,
     ModalDampingSpec,
     RectangleSection,
@@ -32,9 +35,11 @@ from multiphi_exudyn.study.scene.scene_file import (
     RigStructure,
     SectionSpec,
     StepwiseModel,
+    StopMotionSpec,
     StructureSpec,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 
@@ -70,7 +75,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
     """Build and check what ``scene`` describes; raises MultiPhiValueError naming file and field."""
     mechanics = _structure(scene, scene.file.structure)
     own = tuple(
-        _at(scene, f"contacts[{i}]", partial(UnilateralContact, **spec.model_dump()))
+        _at(scene, f"contacts[{i}]", partial(UnilateralContact, **spec.model_dump(exclude_defaults=True)))
         for i, spec in enumerate(scene.file.contacts)
     )
     mechanics = replace(mechanics, contacts=mechanics.contacts + own)
@@ -78,6 +83,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
         mechanics = replace(mechanics, damping=_damping(scene.file.damping))
     _check_points(scene, mechanics)
     _check_contacts(scene, mechanics)
+    _check_loads(scene, mechanics)
     return mechanics
 
 
@@ -101,15 +107,20 @@ def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
     """What a scene adds to the rig's own assumptions."""
     start = scene.file.start
     if isinstance(start, DisplacedStart):
-        size = f"{1e3 * start.displacement:+g} mm at {start.measured_at}"
-    else:
-        size = f"{start.force:+g} N"
-    yield f"start of this scene: {size} by a static force at {start.load_at} (assumed: no number is printed)"
+        yield _assumed_start(f"{1e3 * start.displacement:+g} mm at {start.measured_at}", start.load_at)
+    elif start is not None:
+        yield _assumed_start(f"{start.force:+g} N", start.load_at)
+    for load in described_loads(scene):
+        yield f"load of this scene: {load} (assumed: the paper's rig is only released)"
     if math.isfinite(spec.support_stiffness):
         yield (
             f"support stiffness: {spec.support_stiffness:g} N/m (assumed: the paper's support is ideally rigid, "
             "a penalty contact element needs a number)"
         )
+
+
+def _assumed_start(size: str, load_at: str) -> str:
+    return f"start of this scene: {size} by a static force at {load_at} (assumed: no number is printed)"
 
 
 def _beam(spec: BeamSpec) -> Beam:
@@ -157,7 +168,7 @@ def _damping(spec: DampingSpec) -> ModalDamping | RayleighDamping:
 def _check_points(scene: Scene, mechanics: Mechanics) -> None:
     """Every point named anywhere in the file is one of the structure's."""
     file = scene.file
-    named = {"start.load_at": file.start.load_at}
+    named = {} if file.start is None else {"start.load_at": file.start.load_at}
     if isinstance(file.start, DisplacedStart):
         named["start.measured_at"] = file.start.measured_at
     for group in ("points", "judged_points"):
@@ -165,9 +176,37 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
     for i, contact in enumerate(file.contacts):
         names = [contact.direction] if isinstance(contact.direction, str) else contact.direction
         named |= {f"contacts[{i}].direction": name for name in names}
+    for i, load in enumerate(file.loads):
+        for part in ("at", "direction"):
+            place = getattr(load, part, None) or ()
+            named |= {f"loads[{i}].{part}": name for name in ([place] if isinstance(place, str) else place)}
     for field_name, name in named.items():
         if name not in mechanics.points:
             refuse(scene, field_name, name, f"one of the points: {', '.join(mechanics.points)}")
+
+
+def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
+    """Loads are what they say, name contacts there are, and every model can take them."""
+    loads = loads_of(scene, None if mechanics.beam is None else "")
+    names = [contact.name for contact in mechanics.contacts]
+    for i, load in enumerate(scene.file.loads):
+        moved = [("contact", load.contact)] if isinstance(load, StopMotionSpec) else []
+        moved += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
+        for part, name in moved:
+            if name not in names:
+                refuse(scene, f"loads[{i}].{part}", name, f"one of the contacts: {', '.join(names) or 'none'}")
+    varying = not all(isinstance(load, (ConstantLoad, Gravity)) for load in loads)
+    for i, model in enumerate(scene.file.models):
+        if loads and isinstance(model, (CraigBamptonModel, StepwiseModel)):
+            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has no loads")
+        along = [load for load in loads if isinstance(load, (Gravity, BaseMotion))]
+        if along and isinstance(model, GlobalBasisModel):
+            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has neither weight nor moving base")
+        if varying and getattr(model, "loop", "numpy") == "compiled":
+            refuse(scene, f"models[{i}].loop", "compiled", "'numpy': loads that vary in time are not compiled")
+        moving = any(isinstance(load, StopMotion) or getattr(load, "fixed_stops", ()) for load in loads)
+        if moving and isinstance(model, FullModel) and model.contact == "circle":
+            refuse(scene, f"models[{i}].contact", "circle", "'coordinate': a round support does not move")
 
 
 def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
@@ -187,6 +226,13 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
     """Penalty models need a finite stiffness, penalty elements on one coordinate a single point."""
     if contact.rigid and isinstance(model, (FullModel, CraigBamptonModel, StepwiseModel)):
         refuse(scene, f"stiffness of contact {contact.name}", "inf", f"a finite one: {model.name} is a penalty model")
+    if getattr(contact, "damping", 0.0):
+        if isinstance(model, (CraigBamptonModel, StepwiseModel)):
+            refuse(scene, field_name, model.kind, f"another kind: its contacts have no damping, {contact.name} has")
+        if isinstance(model, FullModel) and model.contact == "circle":
+            refuse(
+                scene, field_name.replace("kind", "contact"), "circle", "'coordinate': a round support has no damping"
+            )
     points = 1 if isinstance(contact.direction, str) else len(contact.direction)
     if points > 1 and isinstance(model, (FullModel, CraigBamptonModel)):
         needed = f"another kind: its contacts act on single points, {contact.name} on {points}"

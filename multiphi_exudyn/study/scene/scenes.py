@@ -113,8 +113,10 @@ def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check(scene: Scene) -> None:
-    """What no single field can say: names that refer to models, and the size of the histories."""
+    """What no single field can say: a cause of motion, names that refer to models, and the size of the histories."""
     file = scene.file
+    if file.start is None and not file.loads:
+        raise MultiPhiValueError(f"{scene.path}: start: got nothing, need a value, or loads")
     names = list(scene.models)
     parts = {"reference": (file.comparison.reference,), "cheapest": file.comparison.cheapest}
     if file.comparison.coarser is not None:

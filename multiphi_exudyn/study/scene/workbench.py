@@ -19,24 +19,32 @@ from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.level import LevelOverride
+from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.modes import complete_modes
-from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.structure import At, LinearStructure, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.mechanics import Mechanics
 from multiphi_exudyn.study.scene.scene_file import (
+    BaseMotionSpec,
     CraigBamptonModel,
     DisplacedStart,
     FullModel,
+    GravitySpec,
     ReducedModel,
     StepwiseModel,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.scene_loads import loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
 __all__ = ["ROUND_OFF", "Workbench", "damping_matrix", "prepare", "start_configuration"]
+
+_Mesh = tuple[
+    tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp, str | None, int
+]  # what discretised beams are kept by
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
@@ -101,6 +109,23 @@ class Workbench:
         """Points a Craig-Bampton component keeps: of contacts and outputs, those independent of each other."""
         return _interface(self.structure, self.mechanics, self.points)
 
+    @functools.cached_property
+    def loads(self) -> tuple[Load, ...]:
+        """The scene's loads on its structure."""
+        return loads_of(self.scene, self._transverse)
+
+    @property
+    def _transverse(self) -> At | None:
+        """Unit rigid-body motion along +z (n,) of a beam that has a load along it."""
+        along = any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.scene.file.loads)
+        if self.mechanics.beam is None or not along:
+            return None
+        return _transverse(*_mesh(self.scene, self.mechanics))
+
+    def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
+        """The scene's loads on a full beam's own mesh."""
+        return loads_of(self.scene, beam.transverse)
+
     def model(self, spec: ReducedModel | UserObjectModel | StepwiseModel) -> MultiPhiModel:
         """The reduced model of a scene's entry."""
         rigid = not isinstance(spec, StepwiseModel) and spec.contact == "rigid"
@@ -126,8 +151,10 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
 
 
 def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
-    """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed."""
+    """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed; zero without one."""
     start = bench.scene.file.start
+    if start is None:
+        return np.zeros(bench.structure.n)
     if not isinstance(start, DisplacedStart):
         return model.static_equilibrium({start.load_at: start.force})
     row = bench.structure.row(start.measured_at)
@@ -163,13 +190,17 @@ def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, flo
     """M, K and points, and what it took to get them [s]; the same beam is linearised once for all scenes."""
     if mechanics.matrices is not None:
         return mechanics.matrices, 0.0
+    return _discretised(*_mesh(scene, mechanics))
+
+
+def _mesh(scene: Scene, mechanics: Mechanics) -> _Mesh:
+    """The beam, and what discretises it: kind and elements of the reference, or of another full model."""
     full = [model for model in scene.models.values() if isinstance(model, FullModel)]
     named = [model for model in full if model.name == scene.file.comparison.reference]
     kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
     beam = mechanics.beam
     assert beam is not None, "a structure is a beam or matrices"
-    points = tuple(beam.points.items())
-    return _discretised(tuple(beam.sections), points, tuple(beam.masses), beam.clamp, kind, elements)
+    return tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp, kind, elements
 
 
 @functools.lru_cache(maxsize=KEPT_STRUCTURES)
@@ -189,6 +220,25 @@ def _discretised(
     else:
         structure = FullBeam(beam, (), FullBeamSettings(kind=kind, elements=elements)).structure
     return structure, time.perf_counter() - started
+
+
+@functools.lru_cache(maxsize=KEPT_STRUCTURES)
+def _transverse(
+    sections: tuple[Section, ...],
+    points: tuple[tuple[str, float], ...],
+    masses: tuple[PointMass, ...],
+    clamp: Clamp,
+    kind: str | None,
+    elements: int,
+) -> np.ndarray:
+    """e (n,) of a discretised beam; M e is the inertia of the whole beam, see FullBeam.transverse."""
+    beam = Beam(sections, dict(points), masses, clamp)
+    if kind is not None:
+        return FullBeam(beam, (), FullBeamSettings(kind=kind, elements=elements)).transverse
+    free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
+    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations take turns
+    held = [dof for dof, spring in enumerate((clamp.translation, clamp.rotation)) if math.isinf(spring)]
+    return np.asarray(np.linalg.solve(planar_beam(beam, elements).mass, np.delete(inertia, held)))
 
 
 def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:

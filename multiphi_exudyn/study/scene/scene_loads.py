@@ -1,0 +1,124 @@
+"""The loads of a scene file as loads of multiphi_exudyn.loads, and in words.
+
+Weight and base motion act along a unit rigid-body motion of the structure; a beam's is its transverse one, which
+depends on its mesh and is given here by who has the mesh.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
+from multiphi_exudyn.loads import (
+    BaseMotion,
+    ConstantLoad,
+    Course,
+    Gravity,
+    Harmonic,
+    HarmonicLoad,
+    Load,
+    Sampled,
+    SampledLoad,
+    StopMotion,
+    Sweep,
+    SweepLoad,
+)
+from multiphi_exudyn.structure import At
+from multiphi_exudyn.study.scene.scene_file import (
+    BaseMotionSpec,
+    ConstantLoadSpec,
+    CourseSpec,
+    GravitySpec,
+    HarmonicCourse,
+    HarmonicLoadSpec,
+    LoadSpec,
+    SampledCourse,
+    SampledLoadSpec,
+    StopMotionSpec,
+    SweepCourse,
+)
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
+
+__all__ = ["described_loads", "loads_of"]
+
+
+def loads_of(scene: Scene, transverse: At | None) -> tuple[Load, ...]:
+    """The loads, in the file's order; raises MultiPhiValueError naming file and field.
+
+    transverse: unit rigid-body motion along +z, None for a structure that has none.
+    """
+    return tuple(_load(scene, f"loads[{i}]", spec, transverse) for i, spec in enumerate(scene.file.loads))
+
+
+def described_loads(scene: Scene) -> tuple[str, ...]:
+    """Every load in words, as parts of a sentence."""
+    return tuple(_described(spec) for spec in scene.file.loads)
+
+
+def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Load:
+    if isinstance(spec, (GravitySpec, BaseMotionSpec)):
+        direction = transverse if spec.direction is None else spec.direction
+        if direction is None:
+            refuse(scene, f"{field}.direction", None, "one: only a beam knows its transverse motion")
+        if isinstance(spec, GravitySpec):
+            return Gravity(direction, spec.acceleration)
+        return BaseMotion(direction, _smooth(spec.course), spec.fixed_stops)
+    if isinstance(spec, StopMotionSpec):
+        return StopMotion(spec.contact, _course(scene, f"{field}.course", spec.course))
+    if isinstance(spec, ConstantLoadSpec):
+        return ConstantLoad(spec.at, spec.force)
+    if isinstance(spec, SampledLoadSpec):
+        samples = _samples(scene, field, spec)
+        return SampledLoad(spec.at, samples.time, samples.values)
+    if isinstance(spec, HarmonicLoadSpec):
+        return HarmonicLoad(spec.at, spec.amplitude, spec.frequency_hz, spec.phase)
+    return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law)
+
+
+def _course(scene: Scene, field: str, spec: CourseSpec) -> Course:
+    return _samples(scene, field, spec) if isinstance(spec, SampledCourse) else _smooth(spec)
+
+
+def _smooth(spec: HarmonicCourse | SweepCourse) -> Harmonic | Sweep:
+    if isinstance(spec, HarmonicCourse):
+        return Harmonic(spec.amplitude, spec.frequency_hz, spec.phase)
+    return Sweep(spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law)
+
+
+def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
+    try:
+        if spec.csv is not None:
+            return Sampled.from_csv(Path(scene.path).parent / spec.csv, spec.column)
+        return Sampled(spec.time, spec.values)  # type: ignore[arg-type]
+    except MultiPhiError as error:
+        raise MultiPhiValueError(f"{scene.path}: {field}: {' '.join(str(error).split())}") from error
+
+
+def _described(spec: LoadSpec) -> str:
+    if isinstance(spec, GravitySpec):
+        return f"a weight of {spec.acceleration:+g} m/s²"
+    if isinstance(spec, BaseMotionSpec):
+        left = f", which {_listed(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
+        return f"a base that moves by {_in_words(spec.course, 'm')}{left}"
+    if isinstance(spec, StopMotionSpec):
+        return f"a stop of {spec.contact} that moves by {_in_words(spec.course, 'm')}"
+    if isinstance(spec, ConstantLoadSpec):
+        return f"a constant force of {spec.force:+g} N at {_place(spec.at)}"
+    return f"a force at {_place(spec.at)} of {_in_words(spec, 'N')}"
+
+
+def _in_words(spec: CourseSpec, unit: str) -> str:
+    if isinstance(spec, HarmonicCourse):
+        return f"{spec.amplitude:g} {unit}, harmonic at {spec.frequency_hz:g} Hz"
+    if isinstance(spec, SweepCourse):
+        span = f"{spec.start_hz:g} to {spec.end_hz:g} Hz in {spec.duration:g} s"
+        return f"{spec.amplitude:g} {unit}, swept from {span} ({spec.law})"
+    return f"samples from {spec.csv}" if spec.csv else f"{len(spec.time or ())} samples"
+
+
+def _place(at: str | dict[str, float]) -> str:
+    return at if isinstance(at, str) else _listed([f"{factor:+g} {name}" for name, factor in at.items()])
+
+
+def _listed(names: tuple[str, ...] | list[str]) -> str:
+    return " and ".join(names)
