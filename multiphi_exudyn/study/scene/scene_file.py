@@ -215,6 +215,7 @@ class SweepCourse(Table):
     end_hz: Positive
     duration: Positive
     law: Literal["linear", "logarithmic"] = "linear"
+    tolerance: Annotated[float, Field(ge=1e-12, lt=1)] = 1e-6  # of a reduced model's response, of its largest value
 
 
 CourseSpec = Annotated[HarmonicCourse | SampledCourse | SweepCourse, Field(discriminator="kind")]

@@ -72,7 +72,7 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Lo
         return SampledLoad(spec.at, samples.time, samples.values)
     if isinstance(spec, HarmonicLoadSpec):
         return HarmonicLoad(spec.at, spec.amplitude, spec.frequency_hz, spec.phase)
-    return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law)
+    return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
 
 
 def _course(scene: Scene, field: str, spec: CourseSpec) -> Course:
@@ -82,7 +82,7 @@ def _course(scene: Scene, field: str, spec: CourseSpec) -> Course:
 def _smooth(spec: HarmonicCourse | SweepCourse) -> Harmonic | Sweep:
     if isinstance(spec, HarmonicCourse):
         return Harmonic(spec.amplitude, spec.frequency_hz, spec.phase)
-    return Sweep(spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law)
+    return Sweep(spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
 
 
 def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
