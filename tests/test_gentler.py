@@ -9,6 +9,7 @@ from small_scene import changed, write
 from multiphi_exudyn.beam import Clamp
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.comparison.compare import compare, summary
+from multiphi_exudyn.study.running import full_runner
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -45,16 +46,18 @@ def test_a_rung_that_changes_nothing_is_left_out():
     assert words == ["half the step", "half the step, ten times the Newton tolerance"]
 
 
-def test_a_run_that_gains_energy_comes_out_right_at_gentler_settings(tmp_path):
+def test_a_run_that_gains_energy_comes_out_right_at_gentler_settings(tmp_path, monkeypatch):
     bench = bench_of(tmp_path, 1e7, STIFF)
     once = run_model(bench, "full", progress=False)
     assert once.status == "failed"
     assert "gentler" not in once.message
+    tried = []
+    monkeypatch.setattr(full_runner, "attempts", lambda *given: tried.append(attempts(*given)) or tried[-1])
     run = run_model(bench, "full", progress=False, retry=True)
     assert run.ok
     assert run.message.startswith("ran with gentler settings (full Newton")
     assert f"as asked: {once.message}" in run.message
-    assert run.first_s > once.first_s
+    assert run.first_s == sum(attempt.run.online_s for attempt in tried[0])
     assert run.repeats_s == ()
     assert len(run.points["tip"]) == len(run.time) == 121
     assert run.ledger["worst_gain"] < 0.01 * run.ledger["initial"]

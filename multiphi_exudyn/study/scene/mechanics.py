@@ -20,8 +20,8 @@ from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
-    BaseMotionSpec,
     BeamSpec,
     CraigBamptonModel,
     DampingSpec,
@@ -35,7 +35,6 @@ from multiphi_exudyn.study.scene.scene_file import (
     RigStructure,
     SectionSpec,
     StepwiseModel,
-    StopMotionSpec,
     StructureSpec,
     UserObjectModel,
 )

@@ -7,79 +7,44 @@ refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from multiphi_exudyn.study.scene.fields import (
+    Finite,
+    Modes,
+    Name,
+    NotNegative,
+    NotZero,
+    Place,
+    Positive,
+    RelativeTolerance,
+    Stiffness,
+    Table,
+    by_key,
+)
+from multiphi_exudyn.study.scene.load_tables import LoadSpec
+
 __all__ = [
-    "BaseMotionSpec",
     "BeamSpec",
     "BeamStructure",
-    "ConstantLoadSpec",
     "ContactSpec",
-    "CourseSpec",
     "CraigBamptonModel",
     "DisplacedStart",
     "FullModel",
     "GlobalBasisModel",
-    "GravitySpec",
-    "HarmonicCourse",
-    "HarmonicLoadSpec",
-    "LoadSpec",
     "LoadedStart",
     "MatrixStructure",
     "ModalDampingSpec",
     "RectangleSection",
     "ReducedModel",
     "RigStructure",
-    "SampledCourse",
-    "SampledLoadSpec",
     "SceneFile",
-    "SmoothCourse",
     "StepwiseModel",
-    "StopMotionSpec",
-    "SweepCourse",
-    "SweepLoadSpec",
     "UserObjectModel",
 ]
-
-
-def _not_zero(value: float) -> float:
-    if value == 0:
-        raise PydanticCustomError("zero", "a value that is not zero")
-    return value
-
-
-def _rigid_is_infinite(value: Any) -> Any:
-    return math.inf if value == "rigid" else value
-
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Stiffness = Annotated[float, BeforeValidator(_rigid_is_infinite), Field(gt=0)]  # N/m or N m; inf or "rigid"
-NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
-Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
-Modes = Annotated[int, Field(ge=1)] | Literal["all"]
-RelativeTolerance = Annotated[float, Field(ge=1e-13, lt=1)]  # below it lies round-off
-
-
-def _by_key(*keys: str) -> Discriminator:
-    """Choose a table's form by the key that only this form has."""
-
-    def choose(given: Any) -> str | None:
-        return next((f"<{key}>" for key in keys if isinstance(given, Mapping) and key in given), None)
-
-    needed = "a table with the field " + " or ".join(keys)
-    return Discriminator(choose, custom_error_type="form", custom_error_message=needed)
-
-
-class Table(BaseModel):
-    """A table of a scene file: every field typed, none unknown."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class RigStructure(Table):
@@ -133,7 +98,7 @@ class ClampSpec(Table):
 
 SectionSpec = Annotated[
     Annotated[RectangleSection, Tag("<width>")] | Annotated[GeneralSection, Tag("<area>")],
-    _by_key("width", "area"),
+    by_key("width", "area"),
 ]
 
 
@@ -163,7 +128,7 @@ StructureSpec = Annotated[
     Annotated[RigStructure, Tag("<rig>")]
     | Annotated[BeamStructure, Tag("<beam>")]
     | Annotated[MatrixStructure, Tag("<matrices>")],
-    _by_key("rig", "beam", "matrices"),
+    by_key("rig", "beam", "matrices"),
 ]
 
 
@@ -171,118 +136,10 @@ class ContactSpec(Table):
     """One unilateral contact: g = direction . x + gap."""
 
     name: Name
-    direction: Name | Annotated[dict[Name, Finite], Field(min_length=1)]
+    direction: Place
     gap: Finite
     stiffness: Stiffness
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
-
-
-Place = Name | Annotated[dict[Name, Finite], Field(min_length=1)]  # of a load: a point, or coefficients of points
-
-
-class HarmonicCourse(Table):
-    """amplitude cos(2 pi frequency_hz t + phase)."""
-
-    kind: Literal["harmonic"]
-    amplitude: Finite
-    frequency_hz: NotNegative
-    phase: Finite = 0.0  # rad
-
-
-class SampledCourse(Table):
-    """Straight lines between samples, zero outside them; from columns of a CSV file, or as they stand here."""
-
-    kind: Literal["sampled"]
-    csv: str | None = None  # path, relative to the scene file; time [s] is its first column
-    column: Annotated[int, Field(ge=1)] = 1
-    time: tuple[Finite, ...] | None = None  # s
-    values: tuple[Finite, ...] | None = None
-
-    @model_validator(mode="after")
-    def _one_source(self) -> SampledCourse:
-        inline = self.time is not None and self.values is not None
-        if (self.csv is None) != inline or (self.time is None) != (self.values is None):
-            raise PydanticCustomError("samples", "csv, or time and values")
-        return self
-
-
-class SweepCourse(Table):
-    """amplitude cos(phase(t)) whose frequency goes from start_hz to end_hz in ``duration`` [s], then zero."""
-
-    kind: Literal["sweep"]
-    amplitude: Finite
-    start_hz: Positive
-    end_hz: Positive
-    duration: Positive
-    law: Literal["linear", "logarithmic"] = "linear"
-    tolerance: Annotated[float, Field(ge=1e-12, lt=1)] = 1e-6  # of a reduced model's response, of its largest value
-
-
-CourseSpec = Annotated[HarmonicCourse | SampledCourse | SweepCourse, Field(discriminator="kind")]
-SmoothCourse = Annotated[HarmonicCourse | SweepCourse, Field(discriminator="kind")]
-
-
-class ConstantLoadSpec(Table):
-    """A constant force [N] from t = 0 on."""
-
-    kind: Literal["constant"]
-    at: Place
-    force: Finite
-
-
-class HarmonicLoadSpec(HarmonicCourse):
-    """A harmonic force; amplitude in N."""
-
-    at: Place
-
-
-class SampledLoadSpec(SampledCourse):
-    """A sampled force; values in N."""
-
-    at: Place
-
-
-class SweepLoadSpec(SweepCourse):
-    """A swept force; amplitude in N."""
-
-    at: Place
-
-
-class GravitySpec(Table):
-    """Weight of the whole structure along +z, from t = 0 on."""
-
-    kind: Literal["gravity"]
-    acceleration: Finite  # m/s2, negative where it pulls down
-    direction: Place | None = None  # unit rigid-body motion along gravity; a beam knows its own
-
-
-class StopMotionSpec(Table):
-    """A contact whose stop moves: its way [m] is taken from the gap."""
-
-    kind: Literal["stop-motion"]
-    contact: Name
-    course: CourseSpec
-
-
-class BaseMotionSpec(Table):
-    """A base that moves; displacements are then relative to it, stops move with it unless they are named."""
-
-    kind: Literal["base-motion"]
-    course: SmoothCourse
-    fixed_stops: tuple[Name, ...] = ()
-    direction: Place | None = None  # as of gravity
-
-
-LoadSpec = Annotated[
-    ConstantLoadSpec
-    | HarmonicLoadSpec
-    | SampledLoadSpec
-    | SweepLoadSpec
-    | GravitySpec
-    | StopMotionSpec
-    | BaseMotionSpec,
-    Field(discriminator="kind"),
-]
 
 
 class DisplacedStart(Table):
@@ -302,7 +159,7 @@ class LoadedStart(Table):
 
 StartSpec = Annotated[
     Annotated[DisplacedStart, Tag("<displacement>")] | Annotated[LoadedStart, Tag("<force>")],
-    _by_key("displacement", "force"),
+    by_key("displacement", "force"),
 ]
 
 
@@ -322,7 +179,7 @@ class RayleighDampingSpec(Table):
 
 DampingSpec = Annotated[
     Annotated[ModalDampingSpec, Tag("<modal_ratios>")] | Annotated[RayleighDampingSpec, Tag("<alpha>")],
-    _by_key("modal_ratios", "alpha"),
+    by_key("modal_ratios", "alpha"),
 ]
 
 

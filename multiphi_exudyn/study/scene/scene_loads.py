@@ -24,7 +24,7 @@ from multiphi_exudyn.loads import (
     SweepLoad,
 )
 from multiphi_exudyn.structure import At
-from multiphi_exudyn.study.scene.scene_file import (
+from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
     CourseSpec,

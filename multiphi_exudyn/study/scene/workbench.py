@@ -23,13 +23,12 @@ from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.modes import complete_modes
 from multiphi_exudyn.structure import At, LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics
 from multiphi_exudyn.study.scene.scene_file import (
-    BaseMotionSpec,
     CraigBamptonModel,
     DisplacedStart,
     FullModel,
-    GravitySpec,
     ReducedModel,
     StepwiseModel,
     UserObjectModel,

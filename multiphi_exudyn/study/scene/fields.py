@@ -1,0 +1,61 @@
+"""What the tables of a scene file are made of: numbers with bounds, names, places, and the table itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field
+from pydantic_core import PydanticCustomError
+
+__all__ = [
+    "Finite",
+    "Modes",
+    "Name",
+    "NotNegative",
+    "NotZero",
+    "Place",
+    "Positive",
+    "RelativeTolerance",
+    "Stiffness",
+    "Table",
+    "by_key",
+]
+
+
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise PydanticCustomError("zero", "a value that is not zero")
+    return value
+
+
+def _rigid_is_infinite(value: Any) -> Any:
+    return math.inf if value == "rigid" else value
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Stiffness = Annotated[float, BeforeValidator(_rigid_is_infinite), Field(gt=0)]  # N/m or N m; inf or "rigid"
+NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
+Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
+Place = Name | Annotated[dict[Name, Finite], Field(min_length=1)]  # of a load: a point, or coefficients of points
+Modes = Annotated[int, Field(ge=1)] | Literal["all"]
+RelativeTolerance = Annotated[float, Field(ge=1e-13, lt=1)]  # below it lies round-off
+
+
+def by_key(*keys: str) -> Discriminator:
+    """Choose a table's form by the key that only this form has."""
+
+    def choose(given: Any) -> str | None:
+        return next((f"<{key}>" for key in keys if isinstance(given, Mapping) and key in given), None)
+
+    needed = "a table with the field " + " or ".join(keys)
+    return Discriminator(choose, custom_error_type="form", custom_error_message=needed)
+
+
+class Table(BaseModel):
+    """A table of a scene file: every field typed, none unknown."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)

@@ -1,0 +1,130 @@
+"""The tables ``[[loads]]`` of a scene file: courses in time, forces, weight, moving stops and bases; SI units."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from multiphi_exudyn.study.scene.fields import Finite, Name, NotNegative, Place, Positive, Table
+
+__all__ = [
+    "BaseMotionSpec",
+    "ConstantLoadSpec",
+    "CourseSpec",
+    "GravitySpec",
+    "HarmonicCourse",
+    "HarmonicLoadSpec",
+    "LoadSpec",
+    "SampledCourse",
+    "SampledLoadSpec",
+    "StopMotionSpec",
+    "SweepCourse",
+    "SweepLoadSpec",
+]
+
+
+class HarmonicCourse(Table):
+    """amplitude cos(2 pi frequency_hz t + phase)."""
+
+    kind: Literal["harmonic"]
+    amplitude: Finite
+    frequency_hz: NotNegative
+    phase: Finite = 0.0  # rad
+
+
+class SampledCourse(Table):
+    """Straight lines between samples, zero outside them; from columns of a CSV file, or as they stand here."""
+
+    kind: Literal["sampled"]
+    csv: str | None = None  # path, relative to the scene file; time [s] is its first column
+    column: Annotated[int, Field(ge=1)] = 1
+    time: tuple[Finite, ...] | None = None  # s
+    values: tuple[Finite, ...] | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SampledCourse:
+        inline = self.time is not None and self.values is not None
+        if (self.csv is None) != inline or (self.time is None) != (self.values is None):
+            raise PydanticCustomError("samples", "csv, or time and values")
+        return self
+
+
+class SweepCourse(Table):
+    """amplitude cos(phase(t)) whose frequency goes from start_hz to end_hz in ``duration`` [s], then zero."""
+
+    kind: Literal["sweep"]
+    amplitude: Finite
+    start_hz: Positive
+    end_hz: Positive
+    duration: Positive
+    law: Literal["linear", "logarithmic"] = "linear"
+    tolerance: Annotated[float, Field(ge=1e-12, lt=1)] = 1e-6  # of a reduced model's response, of its largest value
+
+
+CourseSpec = Annotated[HarmonicCourse | SampledCourse | SweepCourse, Field(discriminator="kind")]
+SmoothCourse = Annotated[HarmonicCourse | SweepCourse, Field(discriminator="kind")]
+
+
+class ConstantLoadSpec(Table):
+    """A constant force [N] from t = 0 on."""
+
+    kind: Literal["constant"]
+    at: Place
+    force: Finite
+
+
+class HarmonicLoadSpec(HarmonicCourse):
+    """A harmonic force; amplitude in N."""
+
+    at: Place
+
+
+class SampledLoadSpec(SampledCourse):
+    """A sampled force; values in N."""
+
+    at: Place
+
+
+class SweepLoadSpec(SweepCourse):
+    """A swept force; amplitude in N."""
+
+    at: Place
+
+
+class GravitySpec(Table):
+    """Weight of the whole structure along +z, from t = 0 on."""
+
+    kind: Literal["gravity"]
+    acceleration: Finite  # m/s2, negative where it pulls down
+    direction: Place | None = None  # unit rigid-body motion along gravity; a beam knows its own
+
+
+class StopMotionSpec(Table):
+    """A contact whose stop moves: its way [m] is taken from the gap."""
+
+    kind: Literal["stop-motion"]
+    contact: Name
+    course: CourseSpec
+
+
+class BaseMotionSpec(Table):
+    """A base that moves; displacements are then relative to it, stops move with it unless they are named."""
+
+    kind: Literal["base-motion"]
+    course: SmoothCourse
+    fixed_stops: tuple[Name, ...] = ()
+    direction: Place | None = None  # as of gravity
+
+
+LoadSpec = Annotated[
+    ConstantLoadSpec
+    | HarmonicLoadSpec
+    | SampledLoadSpec
+    | SweepLoadSpec
+    | GravitySpec
+    | StopMotionSpec
+    | BaseMotionSpec,
+    Field(discriminator="kind"),
+]
