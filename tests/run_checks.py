@@ -1,0 +1,179 @@
+"""What must hold of every run, whatever the scene: each check gives a complaint, or None.
+
+They know the trajectory's analytic segments and nothing of how events were found. Between samples h apart a signal g
+stays above min(g0, g1) - h^2/8 max|g''|; where that bound may lie below zero, the lowest value is looked for in
+extended precision.
+"""
+
+import numpy as np
+
+from multiphi_exudyn.state import Phase
+
+CLOSES = 1e-10  # of the largest energy: what the ledger may leave open, and what a row may be below zero
+NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
+MISSED = 1e-12  # of a signal's largest possible value: a dip that is no round-off
+LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
+BLOCK = 2**18  # samples held at one time
+POLISH = 41  # samples around a lowest one, ROUNDS times over
+ROUNDS = 4
+
+EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes that are the scene's own
+
+
+def complaints(run, samples=24.0):
+    """Everything that is wrong with a run; samples: per shortest period."""
+    if not run.segments:
+        return []
+    checks = (status(run), ledger(run), energy(run), missed(run, samples))
+    return [complaint for complaint in checks if complaint]
+
+
+def status(run):
+    """"ok", or a failure that names an instant and a cause which lies in the scene."""
+    if run.status == "ok":
+        return None
+    if not run.message.startswith("at t = ") or not any(cause in run.message for cause in EXPECTED_FAILURES):
+        return f"status: {run.message}"
+    return None
+
+
+def largest_energy(run):
+    """What round-off of energies is measured against [J]."""
+    ledger = run.ledger
+    times = np.unique([time for segment in run.segments for time in (segment.start, segment.end)])
+    stored = np.max(np.abs(run.energy(times)))
+    work = np.max(np.abs(_work(run, times)))
+    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), np.finfo(float).tiny)
+
+
+def ledger(run):
+    """It closes; impact, damping and kinetic truncation take energy; without truncation no strain is lost.
+
+    The strain row alone may be negative, and only in a truncated basis: an instant that leaves a gap which is not
+    zero can stretch the spring of the level that it enters.
+    """
+    found, scale = run.ledger, largest_energy(run)
+    rows = {"impact": found.impact, "truncation_kinetic": found.truncation_kinetic, "damping": found.damping}
+    for name, value in rows.items():
+        if not value >= -CLOSES * scale:
+            return f"ledger: {name} {value:g} of {scale:g} J"
+    if not abs(found.residual) <= CLOSES * scale:
+        return f"ledger: residual {found.residual:g} of {scale:g} J"
+    if not abs(found.truncation_strain) + abs(found.truncation_kinetic) <= NO_TRUNCATION * scale and _complete(run):
+        return f"ledger: truncation {found.truncation_strain:g}, {found.truncation_kinetic:g} of {scale:g} J"
+    return None
+
+
+def energy(run, samples=5):
+    """Energy less the work of loads never rises; in a truncated basis within segments alone."""
+    ends = [(segment.start, segment.end) for segment in run.segments if segment.end > segment.start]
+    if not ends:
+        return None
+    inside = np.linspace(0, 1, samples + 2)[1:-1]
+    times = np.array([start + inside * (end - start) for start, end in ends])
+    left = (run.energy(times.ravel()) - _work(run, times.ravel())).reshape(times.shape)
+    allowed = NO_TRUNCATION * largest_energy(run)
+    rises = np.diff(left.ravel()) if _complete(run) else np.diff(left, axis=1).ravel()
+    worst = float(np.max(rises, initial=0.0))
+    return f"energy: rises by {worst:g} J" if worst > allowed else None
+
+
+def missed(run, samples):
+    """No contact leaves its state's admissible range unheard: s >= 0 (event_rule.py) on every segment.
+
+    In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull.
+    """
+    complete = _complete(run)
+    for segment in run.segments:
+        duration = segment.end - segment.start
+        if duration <= 0:
+            continue
+        for contact, phase in enumerate(segment.phases):
+            heard = phase is Phase.ARMED
+            rigid = bool(np.isinf(run.model.base.stiffnesses[contact]))
+            if not (heard or complete or (rigid and contact in segment.level.level.indices)):
+                continue
+            signal = Signal(segment, contact, rigid)
+            lowest, at = signal.lowest(duration, samples)
+            if lowest < -(MISSED if heard else LAW) * signal.size(duration):
+                name = run.model.contacts[contact].name
+                return f"missed: {name} at {segment.start + at:.9g} s, {lowest / signal.size(duration):g} of its size"
+    return None
+
+
+class Signal:
+    """s of a contact on a segment: constant + Re sum a_j t^d_j exp(lambda_j t)."""
+
+    def __init__(self, segment, contact, rigid):
+        level = segment.level
+        own, self.basis = level.level, level.level.response.basis
+        modal = own.response.shapes * segment.coefficients
+        if rigid and contact in own.indices:
+            k = own.indices.index(contact)
+            rates = self.basis.derivative(segment.coefficients)
+            self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ (own.response.shapes * rates)
+            self.constant = float(level.asymptotic.forces[k])
+        else:
+            sign = -1.0 if contact in own.indices else 1.0
+            self.coefficients = sign * (own.gap_rows[contact] @ modal)
+            self.constant = sign * float(level.gap_constants[contact])
+
+    def size(self, duration):
+        """Upper bound of |s| on [0, duration]."""
+        return self._bound(self.coefficients, duration) + abs(self.constant)
+
+    def _bound(self, coefficients, duration):
+        growth = np.exp(np.maximum(self.basis.rates.real, 0) * duration) * duration**self.basis.powers
+        return float(np.abs(coefficients) @ growth)
+
+    def __call__(self, t):
+        return (self.basis.at(t) @ self.coefficients).real + self.constant
+
+    def exactly(self, t):
+        """The same in extended precision."""
+        wide = np.asarray(t, np.longdouble)[:, None]
+        phi = np.exp(wide * self.basis.rates.astype(np.clongdouble)) * wide**self.basis.powers
+        return (phi @ self.coefficients.astype(np.clongdouble)).real + np.longdouble(self.constant)
+
+    def lowest(self, duration, samples):
+        """(lowest value on [0, duration], where); only the values below zero need be right."""
+        fastest = np.max(np.abs(self.basis.rates), initial=0.0)
+        curvature = self._bound(self.basis.derivative(self.basis.derivative(self.coefficients)), duration)
+        if self.constant > self._bound(self.coefficients, duration):
+            return self.constant - self._bound(self.coefficients, duration), 0.0
+        count = int(np.ceil(samples * duration * fastest / (2 * np.pi))) + 8
+        step, best = duration / count, (np.inf, 0.0)
+        for first in range(0, count + 1, BLOCK):
+            t = step * np.arange(first, min(first + BLOCK, count) + 1)
+            g = self(t)
+            doubtful = g < step**2 / 8 * curvature
+            lower = np.r_[True, g[1:] <= g[:-1]] & np.r_[g[:-1] <= g[1:], True]
+            for place in t[doubtful & lower]:
+                best = min(best, self._polished(place, step, duration))
+            best = min(best, (float(np.min(g)), float(t[np.argmin(g)]))) if not np.any(doubtful) else best
+        return best
+
+    def _polished(self, place, step, duration):
+        for _ in range(ROUNDS):
+            t = np.linspace(max(place - step, 0.0), min(place + step, duration), POLISH)
+            g = self.exactly(t)
+            place, step = float(t[np.argmin(g)]), 2 * step / (POLISH - 1)
+        return float(np.min(g)), place
+
+
+def _complete(run):
+    return run.model.modes == "all"
+
+
+def _work(run, times):
+    """Work of the static loads since the start [J]."""
+    starts = np.array([segment.start for segment in run.segments])
+    owner = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
+    work = np.empty(len(times))
+    for k in np.unique(owner):
+        segment, part = run.segments[k], owner == k
+        moved = segment.level.level.vectors @ segment.modal(times[part]) + (
+            segment.level.asymptotic.configuration - run.start.displacement
+        )[:, None]
+        work[part] = run.load @ moved
+    return work
