@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.level import cleared
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
@@ -97,8 +98,13 @@ class EventRule:
         """s that a contact would have after a change of its state, as a function of the present level's state."""
         target = self.level(set(level.level.indices) ^ {contact})
         move, there = self.transition(level, target), self.function(target, contact)
-        constant = there.constant + float(there.position @ move.offset)
-        return Row(there.position @ move.matrix, there.rate @ move.velocity_matrix, constant)
+        terms = there.position * move.offset
+        constant = 0.0 if sign_of(terms, there.constant) == 0 else there.constant + float(np.sum(terms))
+        return Row(
+            cleared(there.position @ move.matrix, np.abs(there.position) @ np.abs(move.matrix)),
+            there.rate @ move.velocity_matrix,
+            constant,
+        )
 
     def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""

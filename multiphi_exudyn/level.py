@@ -34,12 +34,12 @@ import scipy.sparse
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.first_root import DescentFinder
+from multiphi_exudyn.first_root import ZERO, DescentFinder
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import Modes, complete_modes, lowest_modes, right_singular_vectors
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 
-__all__ = ["BASE_MARGIN", "Asymptotic", "Base", "Level", "LevelOverride", "build_base", "build_level"]
+__all__ = ["BASE_MARGIN", "Asymptotic", "Base", "Level", "LevelOverride", "build_base", "build_level", "cleared"]
 
 BASE_MARGIN = 4  # modes of an incomplete base for each mode of a level taken from it
 COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and static shapes
@@ -268,10 +268,18 @@ def build_level(base: Base, indices: tuple[int, ...]) -> Level:
         omega=omega,
         vectors=vectors,
         damping=_projected_damping(base, omega, vectors),
-        gap_rows=base.directions.T @ vectors,
+        gap_rows=cleared(base.directions.T @ vectors, np.abs(base.directions.T) @ np.abs(vectors)),
         force_rows=forces,
         force_rate_rows=rates,
     )
+
+
+def cleared(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Sums with zero where they are round-off of their terms, which add up to ``sizes`` without their signs.
+
+    The gap of a contact that another one holds does not move; what is left of it has no sign.
+    """
+    return np.where(np.abs(sums) <= ZERO * sizes, 0.0, sums)
 
 
 def _dense(matrix: Matrix) -> np.ndarray:
@@ -366,7 +374,8 @@ def _rest(
     given = np.concatenate([-gaps - touching.T @ (compliance * load[elastic]), -carried.T @ load[: base.modes.rigid]])
     solution = np.linalg.solve(matrix, given)
     forces, rigid = solution[: len(gaps)], solution[len(gaps) :]
-    configuration = np.concatenate([carried @ rigid, compliance * (load[elastic] + touching @ forces)])
+    total = cleared(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
+    configuration = np.concatenate([carried @ rigid, compliance * total])
     return forces, configuration
 
 

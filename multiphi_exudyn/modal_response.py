@@ -238,7 +238,7 @@ def _complex_modes(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
     r = len(omega)
     scale = np.where(omega > 0, omega, 1.0)
     system = np.block([[np.zeros((r, r)), np.diag(scale)], [-np.diag(omega**2 / scale), -damping]])
-    rates, vectors = np.linalg.eig(system)
+    rates, vectors = (found.astype(complex) for found in np.linalg.eig(system))  # eig gives real ones where all decay
     if not np.linalg.cond(vectors) < WORST_CONDITION:
         raise NumericalFailure(
             "damping: the damped modes of a level are defective (coupled modes critically damped alike), "

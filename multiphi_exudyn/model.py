@@ -18,6 +18,8 @@ from multiphi_exudyn.structure import LinearStructure, is_real
 
 __all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
 
+INFEASIBLE = 1e-7  # residual of a least distance: below it the distance is some 1e7 of its nearest constraint
+
 
 @dataclass(frozen=True)
 class UpTo:
@@ -113,7 +115,7 @@ class MultiPhiModel:
     @property
     def evaluations(self) -> int:
         """Samples of event signals taken so far, in all levels."""
-        return sum(level.finder.evaluations for level in self._levels.values())
+        return sum(level.finder.evaluations for level in self._levels.values() if "finder" in vars(level))
 
     def index(self, name: str) -> int:
         """Position of a contact."""
@@ -144,9 +146,9 @@ class MultiPhiModel:
     def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
 
-        Contact forces are the solution of the complementarity problem F lambda + g_0 + lambda / k >= 0, lambda >= 0
-        (F the flexibility at the contacts, g_0 the gaps without contact forces), as a non-negative least-squares
-        problem. Needs a structure without rigid-body modes.
+        The configuration that the contacts admit nearest to the one without them, in the energy of structure and
+        contact springs: those that press make the level whose state of rest it is. Needs a structure without
+        rigid-body modes.
         """
         base = self.base
         if base.modes.rigid:
@@ -156,8 +158,8 @@ class MultiPhiModel:
         load = self.base_load(forces)
         compliance = base.modes.omega**-2.0
         gaps = base.directions.T @ (compliance * load) + base.gaps
-        flexibility = base.directions.T @ (compliance[:, None] * base.directions) + np.diag(1 / base.stiffnesses)
-        pressing = _complementary(flexibility, gaps) > 0
+        bending = base.directions.T / base.modes.omega
+        pressing = _pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
         level = build_level(base, tuple(int(i) for i in np.flatnonzero(pressing)))
         return base.modes.shapes @ level.asymptotic(load).configuration
 
@@ -209,9 +211,21 @@ def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -
         raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {name} > 0 and most >= 1")
 
 
-def _complementary(matrix: np.ndarray, constant: np.ndarray) -> np.ndarray:
-    """z >= 0 with matrix z + constant >= 0 and z . (matrix z + constant) = 0, matrix (k, k) positive definite."""
-    if len(constant) == 0:
-        return constant
-    upper = np.linalg.cholesky(matrix).T
-    return scipy.optimize.nnls(upper, -np.linalg.solve(upper.T, constant))[0]
+def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Which of the constraints rows z >= least press on the shortest z; they are independent of each other.
+
+    Least distance programming by non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares
+    Problems, 1974, ch. 23. Raises MultiPhiValueError where no z meets all of them.
+    """
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0] = 1.0
+    wanted = least / lengths
+    if not np.any(wanted > 0):
+        return np.zeros(len(least), bool)
+    system = np.vstack([(rows / lengths[:, None]).T, wanted / np.max(wanted)])
+    target = np.zeros(len(system))
+    target[-1] = 1.0
+    multipliers, residual = scipy.optimize.nnls(system, target)
+    if residual < INFEASIBLE:
+        raise MultiPhiValueError("static equilibrium: got rigid contacts that exclude each other, need a way between")
+    return np.asarray(multipliers > 0)

@@ -88,7 +88,7 @@ def lowest_modes(mass: Any, stiffness: Any, count: int, rows: np.ndarray) -> Mod
     basis = _orthonormal(mass, np.column_stack([vectors, statics]))
     reduced = basis.T @ (stiffness @ basis)
     omega_squared, rotation = scipy.linalg.eigh((reduced + reduced.T) / 2)
-    return _classified(stiffness, omega_squared, basis @ rotation)
+    return _classified(stiffness, omega_squared, basis @ rotation, 0.0)
 
 
 def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,12 +114,15 @@ def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Mod
     product = scipy.linalg.solve_triangular(lower, upper.T, lower=True).T
     singular, vectors = right_singular_vectors(product)
     shapes = scipy.linalg.solve_triangular(lower, vectors, lower=True, trans="T")
-    return _classified(stiffness, singular**2 - shift, shapes)
+    return _classified(stiffness, singular**2 - shift, shapes, shift)
 
 
-def _classified(stiffness: Any, omega_squared: np.ndarray, shapes: np.ndarray) -> Modes:
-    """Modes with those of no strain energy named rigid-body modes and given omega = 0."""
-    rigid = omega_squared <= _round_off_energy(stiffness, shapes)
+def _classified(stiffness: Any, omega_squared: np.ndarray, shapes: np.ndarray, shift: float) -> Modes:
+    """Modes with those of no strain energy named rigid-body modes and given omega = 0.
+
+    shift: what has been subtracted to get omega_squared; its round-off is left in it.
+    """
+    rigid = omega_squared <= _round_off_energy(stiffness, shapes) + ROUND_OFF * shift
     order = np.argsort(np.where(rigid, 0.0, omega_squared), kind="stable")
     omega = np.sqrt(np.where(rigid, 0.0, omega_squared))[order]
     return Modes(omega, np.ascontiguousarray(shapes[:, order]), int(np.sum(rigid)))

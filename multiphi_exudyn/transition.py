@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from multiphi_exudyn.level import Asymptotic, Level
+from multiphi_exudyn.level import Asymptotic, Level, cleared
 
 __all__ = ["LoadedLevel", "Transition", "nearest_admissible"]
 
@@ -44,7 +44,9 @@ class LoadedLevel:
     def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
         """``level`` under a static load (m,) in base coordinates."""
         rest = level.asymptotic(load)
-        return cls(level, rest, level.base.directions.T @ rest.configuration + level.base.gaps)
+        magnitudes, initial = level.base.magnitudes
+        gaps = level.base.directions.T @ rest.configuration + level.base.gaps
+        return cls(level, rest, cleared(gaps, initial + np.abs(rest.configuration) @ magnitudes))
 
     @functools.cached_property
     def driven(self) -> bool:
@@ -124,11 +126,11 @@ def nearest_admissible(rows: np.ndarray, vector: np.ndarray, free: int | None = 
     """
     free = len(vector) if free is None else free
     rows, given = rows[:, :free], rows @ vector
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0] = 1.0  # a contact that no kept mode moves
     if len(rows) == 1:
-        row = rows[0]
-        multipliers = np.array([max(0.0, -float(given[0]) / float(row @ row))])
+        multipliers = np.array([max(0.0, -float(given[0]) / float(lengths[0]) ** 2)])
     else:
-        lengths = np.linalg.norm(rows, axis=1)
         units = rows / lengths[:, None]
         same = vector if free == len(vector) else np.linalg.lstsq(units, given / lengths, rcond=None)[0]
         multipliers = scipy.optimize.nnls(units.T, -same)[0] / lengths

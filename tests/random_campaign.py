@@ -103,7 +103,9 @@ def main(arguments=None):
     parser.add_argument("--out", type=Path, default=Path("random-campaign.jsonl"), help="finished chunks, one a line")
     given = parser.parse_args(arguments)
     done = _finished(given.out)
-    spans = [(k, min(k + CHUNK, given.first + given.count)) for k in range(given.first, given.first + given.count, CHUNK)]
+    spans = [
+        (k, min(k + CHUNK, given.first + given.count)) for k in range(given.first, given.first + given.count, CHUNK)
+    ]
     started = time.perf_counter()
     with given.out.open("a", encoding="utf-8") as file, ProcessPoolExecutor(given.processes) as pool:
         waiting = [pool.submit(chunk, *span) for span in spans if span not in done]

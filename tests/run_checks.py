@@ -11,8 +11,9 @@ from multiphi_exudyn.state import Phase
 
 CLOSES = 1e-10  # of the largest energy: what the ledger may leave open, and what a row may be below zero
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
-MISSED = 1e-12  # of a signal's largest possible value: a dip that is no round-off
+MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
+SMALLEST = 1e-6  # J: less is round-off in cases whose masses, stiffnesses and gaps are about 1
 BLOCK = 2**18  # samples held at one time
 POLISH = 41  # samples around a lowest one, ROUNDS times over
 ROUNDS = 4
@@ -29,7 +30,7 @@ def complaints(run, samples=24.0):
 
 
 def status(run):
-    """"ok", or a failure that names an instant and a cause which lies in the scene."""
+    """ "ok", or a failure that names an instant and a cause which lies in the scene."""
     if run.status == "ok":
         return None
     if not run.message.startswith("at t = ") or not any(cause in run.message for cause in EXPECTED_FAILURES):
@@ -43,7 +44,7 @@ def largest_energy(run):
     times = np.unique([time for segment in run.segments for time in (segment.start, segment.end)])
     stored = np.max(np.abs(run.energy(times)))
     work = np.max(np.abs(_work(run, times)))
-    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), np.finfo(float).tiny)
+    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST)
 
 
 def ledger(run):
@@ -172,8 +173,9 @@ def _work(run, times):
     work = np.empty(len(times))
     for k in np.unique(owner):
         segment, part = run.segments[k], owner == k
-        moved = segment.level.level.vectors @ segment.modal(times[part]) + (
-            segment.level.asymptotic.configuration - run.start.displacement
-        )[:, None]
+        moved = (
+            segment.level.level.vectors @ segment.modal(times[part])
+            + (segment.level.asymptotic.configuration - run.start.displacement)[:, None]
+        )
         work[part] = run.load @ moved
     return work
