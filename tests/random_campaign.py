@@ -75,7 +75,7 @@ def _difference(case, first, second):
 
 
 def _settles(run):
-    level = SETTLED * largest_energy(run)
+    level = SETTLED * largest_energy(run, run.segments)
     return any(0.5 * run.velocity(e.time) @ run.model.structure.mass @ run.velocity(e.time) < level for e in run.events)
 
 

@@ -21,11 +21,13 @@ ROUNDS = 4
 EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes that are the scene's own
 
 
-def complaints(run, samples=24.0):
-    """Everything that is wrong with a run; samples: per shortest period."""
+def complaints(run, samples=24.0, most=200):
+    """Everything that is wrong with a run; samples: per shortest period. most: segments, the first and the last ones."""
     if not run.segments:
-        return []
-    checks = (status(run), ledger(run), energy(run), missed(run, samples))
+        return [complaint for complaint in (status(run),) if complaint]
+    looked_at = [*run.segments[: most // 2], *run.segments[max(most // 2, len(run.segments) - most // 2) :]]
+    scale = largest_energy(run, looked_at)
+    checks = (status(run), ledger(run, scale), energy(run, looked_at, scale), missed(run, looked_at, samples))
     return [complaint for complaint in checks if complaint]
 
 
@@ -38,22 +40,22 @@ def status(run):
     return None
 
 
-def largest_energy(run):
-    """What round-off of energies is measured against [J]."""
+def largest_energy(run, segments):
+    """What round-off of energies is measured against [J]: the largest at the ends of these segments."""
     ledger = run.ledger
-    times = np.unique([time for segment in run.segments for time in (segment.start, segment.end)])
+    times = np.unique([time for segment in segments for time in (segment.start, segment.end)])
     stored = np.max(np.abs(run.energy(times)))
     work = np.max(np.abs(_work(run, times)))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST)
 
 
-def ledger(run):
+def ledger(run, scale):
     """It closes; impact, damping and kinetic truncation take energy; without truncation no strain is lost.
 
     The strain row alone may be negative, and only in a truncated basis: an instant that leaves a gap which is not
     zero can stretch the spring of the level that it enters.
     """
-    found, scale = run.ledger, largest_energy(run)
+    found = run.ledger
     rows = {"impact": found.impact, "truncation_kinetic": found.truncation_kinetic, "damping": found.damping}
     for name, value in rows.items():
         if not value >= -CLOSES * scale:
@@ -65,27 +67,26 @@ def ledger(run):
     return None
 
 
-def energy(run, samples=5):
+def energy(run, segments, scale, samples=5):
     """Energy less the work of loads never rises; in a truncated basis within segments alone."""
-    ends = [(segment.start, segment.end) for segment in run.segments if segment.end > segment.start]
+    ends = [(segment.start, segment.end) for segment in segments if segment.end > segment.start]
     if not ends:
         return None
     inside = np.linspace(0, 1, samples + 2)[1:-1]
     times = np.array([start + inside * (end - start) for start, end in ends])
     left = (run.energy(times.ravel()) - _work(run, times.ravel())).reshape(times.shape)
-    allowed = NO_TRUNCATION * largest_energy(run)
     rises = np.diff(left.ravel()) if _complete(run) else np.diff(left, axis=1).ravel()
     worst = float(np.max(rises, initial=0.0))
-    return f"energy: rises by {worst:g} J" if worst > allowed else None
+    return f"energy: rises by {worst:g} J" if worst > NO_TRUNCATION * scale else None
 
 
-def missed(run, samples):
+def missed(run, segments, samples):
     """No contact leaves its state's admissible range unheard: s >= 0 (event_rule.py) on every segment.
 
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull.
     """
     complete = _complete(run)
-    for segment in run.segments:
+    for segment in segments:
         duration = segment.end - segment.start
         if duration <= 0:
             continue
@@ -149,10 +150,18 @@ class Signal:
             g = self(t)
             doubtful = g < step**2 / 8 * curvature
             lower = np.r_[True, g[1:] <= g[:-1]] & np.r_[g[:-1] <= g[1:], True]
+            best = min(best, (float(np.min(g)), float(t[np.argmin(g)])))
             for place in t[doubtful & lower]:
-                best = min(best, self._polished(place, step, duration))
-            best = min(best, (float(np.min(g)), float(t[np.argmin(g)]))) if not np.any(doubtful) else best
+                if not self._falls_away(place, step * curvature, duration):
+                    best = min(best, self._polished(place, step, duration))
         return best
+
+    def _falls_away(self, place, change, duration):
+        """Whether an end of the interval is the lowest place near it: the slope there cannot turn within a step."""
+        if step_inside := (place <= 0) - (place >= duration):
+            rate = self.basis.at(place) @ self.basis.derivative(self.coefficients)
+            return step_inside * rate.real > change
+        return False
 
     def _polished(self, place, step, duration):
         for _ in range(ROUNDS):

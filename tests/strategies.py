@@ -26,6 +26,8 @@ from multiphi_exudyn import (
 LONGEST = 3.0  # periods of the lowest elastic mode that a run lasts,
 SHORTEST = 100.0  # at most, and of the highest one
 
+CLAMPED = 1e-3  # m: gap of rigid contacts that face each other, which at zero gap would be a clamp and no contacts
+
 CHOICES = {
     "structure": ("chain", "free chain", "dense", "free dense", "repeated", "wide", "unconnected"),
     "size": (1, 2, 3, 4, 5, 6, 7),
@@ -151,7 +153,9 @@ def _contact(recipe, i, n, random):
     stiffness = math.inf if rigid else 10.0 ** random.uniform(1, 9)
     gap = {"zero": 0.0, "small": float(random.uniform(0.01, 0.1)), "preload": float(random.uniform(-0.1, 0.1))}
     chosen = gap.get(recipe.gaps, float(random.choice([0.0, 0.02, 0.5])))
-    return UnilateralContact(f"c{i}", _direction(side, i, n, random), abs(chosen) if rigid else chosen, stiffness)
+    if rigid:
+        chosen = max(abs(chosen), CLAMPED if side == "facing" else 0.0)
+    return UnilateralContact(f"c{i}", _direction(side, i, n, random), chosen, stiffness)
 
 
 def _direction(side, i, n, random):
