@@ -158,7 +158,7 @@ class Signal:
 
     def _falls_away(self, place, change, duration):
         """Whether an end of the interval is the lowest place near it: the slope there cannot turn within a step."""
-        if step_inside := (place <= 0) - (place >= duration):
+        if step_inside := int(place <= 0) - int(place >= duration):
             rate = self.basis.at(place) @ self.basis.derivative(self.coefficients)
             return step_inside * rate.real > change
         return False
