@@ -86,8 +86,11 @@ class PointMass:
 
     def __post_init__(self) -> None:
         _check_numbers("point mass", at=self.at, mass=self.mass, inertia=self.inertia)
-        if not (math.isfinite(self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
-            raise MultiPhiValueError(f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0")
+        if not (math.isfinite(self.at + self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
+            raise MultiPhiValueError(
+                f"point mass: got at {self.at!r}, mass {self.mass!r}, inertia {self.inertia!r}, "
+                "need finite values, mass and inertia >= 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -195,6 +198,8 @@ def planar_beam(
 
     DoFs: (w, theta) of every node from the clamped end, those held by a rigid clamp left out.
     """
+    if not isinstance(beam, Beam):
+        raise MultiPhiTypeError(f"beam: got {type(beam).__name__}, need a Beam")
     nodes = beam_nodes(beam, elements)
     mass = np.zeros((2 * len(nodes), 2 * len(nodes)))
     stiffness = np.zeros_like(mass)

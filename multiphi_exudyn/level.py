@@ -33,11 +33,11 @@ import scipy.linalg
 import scipy.sparse
 
 from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.first_root import ZERO, DescentFinder
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import Modes, complete_modes, lowest_modes, right_singular_vectors
-from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping, real_array
 
 __all__ = ["BASE_MARGIN", "Asymptotic", "Base", "Level", "LevelOverride", "build_base", "build_level", "cleared"]
 
@@ -59,6 +59,14 @@ class LevelOverride:
 
     frequencies: Sequence[float] | None = None
     ratios: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "ratios"):
+            if (given := getattr(self, name)) is not None:
+                values = real_array(f"level override {name}", given, "a list of numbers")
+                if values.ndim != 1:
+                    raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
+                object.__setattr__(self, name, tuple(values.tolist()))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.history import History
-from multiphi_exudyn.structure import At, LinearStructure, is_real
+from multiphi_exudyn.structure import At, LinearStructure, is_real, real_array
 
 __all__ = [
     "BaseMotion",
@@ -161,7 +161,7 @@ class Sweep:
         for name, value in given.items():
             if not value > 0:
                 raise MultiPhiValueError(f"sweep {name}: got {value!r}, need a value > 0")
-        if self.law not in SWEEPS:
+        if not (isinstance(self.law, str) and self.law in SWEEPS):
             raise MultiPhiValueError(f"sweep law: got {self.law!r}, need one of: {', '.join(SWEEPS)}")
         _check_tolerance(self.tolerance)
 
@@ -323,6 +323,7 @@ class StopMotion:
 
     def __post_init__(self) -> None:
         _check_course("stop motion", self.course)
+        _check_contacts("stop motion contact", [self.contact], "the name of a contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,8 +342,7 @@ class BaseMotion:
         _check_course("base motion", self.course)
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
-        if isinstance(self.fixed_stops, str):
-            raise MultiPhiTypeError(f"fixed_stops: got {self.fixed_stops!r}, need a tuple of contact names")
+        _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
 
 
 StaticLoad: TypeAlias = "ConstantLoad | Gravity"
@@ -364,6 +364,13 @@ def _check_tolerance(value: float) -> None:
         raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
 
 
+def _check_contacts(what: str, given: Any, needed: str) -> None:
+    if isinstance(given, str) or not isinstance(given, Sequence) or not all(isinstance(name, str) for name in given):
+        raise MultiPhiTypeError(f"{what}: got {given!r}, need {needed}")
+    if not all(given):
+        raise MultiPhiValueError(f"{what}: got an empty name, need {needed}")
+
+
 def _check_course(what: str, course: Any) -> None:
     if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
         raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
@@ -371,10 +378,7 @@ def _check_course(what: str, course: Any) -> None:
 
 def _samples(name: str, given: Any) -> np.ndarray:
     """A copy (k,) of finite numbers that nobody can change."""
-    try:
-        values = np.array(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise MultiPhiTypeError(f"samples {name}: got {type(given).__name__}, need (k,) numbers") from error
+    values = np.asarray(real_array(f"samples {name}", given, "(k,) real numbers"))
     if values.ndim != 1:
         raise MultiPhiValueError(f"samples {name}: got shape {values.shape}, need (k,)")
     if not np.all(np.isfinite(values)):

@@ -73,7 +73,7 @@ class MultiPhiModel:
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
             raise MultiPhiTypeError(f"structure: got {type(self.structure).__name__}, need a LinearStructure")
-        object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "contacts", _contacts(self.contacts))
         names = [contact.name for contact in self.contacts]
         if len(set(names)) < len(names):
             raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
@@ -81,6 +81,7 @@ class MultiPhiModel:
             if not np.any(self.structure.row(contact.direction)):
                 raise MultiPhiValueError(f"contact {contact.name!r} direction: got a zero row, need a direction")
         self._check_modes()
+        _check_overrides(self.overrides)
         ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
         object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
         if not self._can_share():
@@ -127,9 +128,9 @@ class MultiPhiModel:
 
     def level(self, closed: Iterable[str] = ()) -> Level:
         """The level with these contacts closed, built on first use."""
-        if isinstance(closed, str):
+        if isinstance(closed, str) or not isinstance(closed, Iterable):
             raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names")
-        return self.level_at(tuple(sorted(self.index(name) for name in closed)))
+        return self.level_at(tuple(sorted({self.index(name) for name in closed})))
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
         """The level of closed contacts given by ascending positions."""
@@ -199,8 +200,27 @@ class MultiPhiModel:
             raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
 
 
+def _contacts(given: Any) -> tuple[UnilateralContact, ...]:
+    if not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of UnilateralContact")
+    contacts = tuple(given)
+    for contact in contacts:
+        if not isinstance(contact, UnilateralContact):
+            raise MultiPhiTypeError(f"contacts: got {type(contact).__name__}, need UnilateralContact")
+    return contacts
+
+
+def _check_overrides(given: Any) -> None:
+    needed = "need {(names of closed contacts, ...): LevelOverride}"
+    if not isinstance(given, Mapping):
+        raise MultiPhiTypeError(f"overrides: got {type(given).__name__}, {needed}")
+    for key, value in given.items():
+        if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
+            raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")
+
+
 def _is_count(value: object) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return is_real(value) and isinstance(value, (int, np.integer))
 
 
 def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -> None:

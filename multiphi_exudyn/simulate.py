@@ -48,6 +48,10 @@ def simulate(
     that is ok says where a Tolerance, or that of a smooth load, could not be reached.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
+    if not isinstance(model, MultiPhiModel):
+        raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
+    if compiled is not None and not isinstance(compiled, bool):
+        raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     if isinstance(model.modes, Tolerance):
         return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads, compiled))
     end = _time("t_end", t_end)

@@ -9,6 +9,7 @@ numbers: its value is p.x, and a force F at it acts as p F.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -19,7 +20,7 @@ import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 
-__all__ = ["At", "LinearStructure", "Matrix", "ModalDamping", "RayleighDamping"]
+__all__ = ["At", "LinearStructure", "Matrix", "ModalDamping", "RayleighDamping", "is_real", "real_array"]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
@@ -40,7 +41,7 @@ class ModalDamping:
     beyond: float = 0.0
 
     def __post_init__(self) -> None:
-        values = _real("ratios", self.ratios, "a list of ratios")
+        values = real_array("ratios", self.ratios, "a list of ratios")
         if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values < 0):
             raise MultiPhiValueError(f"ratios: got {self.ratios!r}, need a list of finite ratios >= 0")
         object.__setattr__(self, "ratios", tuple(values.tolist()))
@@ -120,7 +121,7 @@ class LinearStructure:
 
 
 def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
-    matrix = _real(name, given, "an (n, n) array of real numbers")
+    matrix = real_array(name, given, "an (n, n) array of real numbers")
     values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
         raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need (n, n)")
@@ -137,7 +138,7 @@ def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
     return symmetric
 
 
-def _real(name: str, given: Any, needed: str) -> Matrix:
+def real_array(name: str, given: Any, needed: str) -> Matrix:
     """A copy of ``given`` as real numbers, sparse if it is; text and complex numbers are not converted."""
     if scipy.sparse.issparse(given) and given.dtype.kind in REAL_KINDS:
         return scipy.sparse.csr_array(given, dtype=float)
@@ -145,7 +146,7 @@ def _real(name: str, given: Any, needed: str) -> Matrix:
         array = np.array(given)
         if array.dtype.kind in REAL_KINDS:
             return array.astype(float, copy=False)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need {needed}") from error
     raise MultiPhiTypeError(f"{name}: got {type(given).__name__} of {array.dtype}, need {needed}")
 
@@ -198,7 +199,7 @@ def _point_row(name: str, given: int | np.ndarray, n: int) -> np.ndarray:
 
 
 def _vector(name: str, given: Any, n: int) -> np.ndarray:
-    vector = _real(name, given, f"an ({n},) array of real numbers")
+    vector = real_array(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
     if not np.all(np.isfinite(vector)):
@@ -224,5 +225,7 @@ def _check_not_negative(name: str, value: Any) -> None:
 
 
 def is_real(value: Any) -> bool:
-    """True for a Python or numpy number that is neither complex nor a truth value."""
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    """True for a Python or numpy number that a float can hold and that is neither complex nor a truth value."""
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, (float, np.integer, np.floating))

@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.trajectory import Segment, Trajectory
@@ -60,6 +61,8 @@ def defects(trajectory: Trajectory) -> Iterator[Defect]:
 
 def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> float:
     """Estimate of the relative error of displacements that truncation has made from 0 to ``until`` [s] (the end)."""
+    if not isinstance(trajectory, Trajectory):
+        raise MultiPhiTypeError(f"trajectory: got {type(trajectory).__name__}, need a Trajectory")
     end = trajectory.t_end if until is None else until
     lost = sum(defect.size**2 for defect in defects(trajectory) if defect.time <= end)
     amplitude = _amplitude(trajectory, end)

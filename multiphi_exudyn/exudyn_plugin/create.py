@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGenericODE2, VObjectGenericODE2
 
@@ -49,6 +50,10 @@ def CreateMultiPhiBody(
     sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
     and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
     """
+    if not isinstance(mbs, exu.MainSystem):
+        raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an Exudyn MainSystem")
+    if not isinstance(name, str):
+        raise MultiPhiTypeError(f"name: got {name!r}, need a string")
     bodies = bodies_of(mbs)
     name = name or next(f"multiPhi{i}" for i in itertools.count() if f"multiPhi{i}" not in bodies)
     if name in bodies:
