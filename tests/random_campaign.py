@@ -1,7 +1,7 @@
 """A long campaign of random cases: ``python tests/random_campaign.py --count 100000 --processes 2``.
 
 Case by case, each from its number alone (strategies.py): no exception but a named one, what must hold of every run
-(run_checks.py), and the same answer from both loops. Finished chunks stand in a file, so that a campaign that was
+(run_checks.py), and the same motion from both loops; events of a contact on which nothing presses may differ. Finished chunks stand in a file, so that a campaign that was
 stopped goes on where it was; the summary names every failing case with its cause.
 """
 
@@ -15,15 +15,14 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 import numpy as np
-from run_checks import complaints, largest_energy
+from run_checks import complaints
 from strategies import built, recipe_of
 
 from multiphi_exudyn import MultiPhiError, simulate
 
 CHUNK = 100  # cases written at a time
-NEAR = 1e-6  # of the largest displacement: the two loops' answers at the end
+NEAR = 1e-6  # of the largest displacement: the two loops' motions
 NUDGE = 1e-13  # of the start: a run that it changes by more than NEAR is sensitive, not wrong
-SETTLED = 1e-12  # of the largest energy: motion that is round-off, and so are the signs it is decided by
 
 
 def verdicts(number):
@@ -48,39 +47,26 @@ def _verdicts(number):
 
 
 def _run(case, compiled, factor=1.0):
-    start = {"displacement": case.displacement, "velocity": factor * case.velocity}
+    start = {"displacement": factor * case.displacement, "velocity": factor * case.velocity}
     return simulate(case.model, case.t_end, **start, loads=case.loads, compiled=compiled)
 
 
 def _same(first, second):
-    """Same status, same events, same place at the end."""
-    if first.status != second.status or _sequence(first) != _sequence(second):
+    """Same status, same motion."""
+    if first.status != second.status or bool(first.segments) != bool(second.segments):
         return False
     if not first.segments:
         return True
-    end = min(first.t_end, second.t_end)
-    places = [run.displacement(end) for run in (first, second)]
-    size = max(np.max(np.abs(run.displacement(np.linspace(0, end, 20)))) for run in (first, second))
-    return bool(np.max(np.abs(places[0] - places[1])) <= NEAR * size)
+    t = np.linspace(0, min(first.t_end, second.t_end), 40)
+    places = [run.displacement(t) for run in (first, second)]
+    return bool(np.max(np.abs(places[0] - places[1])) <= NEAR * np.max(np.abs(places)))
 
 
 def _difference(case, first, second):
-    """Whether the loops differ where every two runs do: in a sensitive case, or among motions that are round-off."""
-    nudged = [_run(case, False, 1 + sign * NUDGE) for sign in (1, -1)]
-    if not all(_same(first, other) for other in nudged):
+    """Whether the loops differ where every two runs do."""
+    if not all(_same(first, _run(case, False, 1 + sign * NUDGE)) for sign in (1, -1)):
         return "sensitive", "a nudged start changes the answer as much"
-    if first.segments and second.segments and _settles(first):
-        return "settled", "motion that an impact has stopped"
     return "failure: loops", f"{first.status} {len(first.events)} events, {second.status} {len(second.events)}"
-
-
-def _settles(run):
-    level = SETTLED * largest_energy(run, run.segments)
-    return any(0.5 * run.velocity(e.time) @ run.model.structure.mass @ run.velocity(e.time) < level for e in run.events)
-
-
-def _sequence(run):
-    return [(event.contact, event.kind) for event in run.events]
 
 
 def chunk(first, last):

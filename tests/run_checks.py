@@ -22,7 +22,7 @@ EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes
 
 
 def complaints(run, samples=24.0, most=200):
-    """Everything that is wrong with a run; samples: per shortest period. most: segments, the first and the last ones."""
+    """Everything that is wrong with a run; samples: per shortest period; most: segments."""
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
     looked_at = [*run.segments[: most // 2], *run.segments[max(most // 2, len(run.segments) - most // 2) :]]

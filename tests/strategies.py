@@ -138,7 +138,7 @@ def _damping(kind, mass, stiffness, random):
         return RayleighDamping(0.3, 1e-3)
     if kind == "given":
         root = 0.3 * random.normal(size=(n, n))
-        return root @ root.T
+        return root @ root.T + 0.1 * np.eye(n)
     if kind == "dashpot":
         row = random.normal(size=n)
         return np.outer(row, row)
