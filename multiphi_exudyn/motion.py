@@ -127,8 +127,8 @@ class Motion:
             fallen = [waiting[s] for s in ([found.signal] if alone else finder.simultaneous(signals, found))]
             asking = {contact for contact, asks in fallen if asks}
             if not asking:
-                armed, armed_at = {contact for contact, _ in fallen}, reached
-                phases = tuple(Phase.ARMED if i in armed else phase for i, phase in enumerate(phases))
+                armed, armed_at = waiting[found.signal][0], reached  # the next one at its own instant, maybe at once
+                phases = tuple(Phase.ARMED if i == armed else phase for i, phase in enumerate(phases))
         started, self.time = self.time, end if reached == horizon else self.time + reached
         self._keep(self._segment(started, coefficients, armed_at))
         self.state = replace(state.after(coefficients, reached), phases=phases)

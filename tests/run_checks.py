@@ -14,6 +14,7 @@ NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose be
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
 SMALLEST = 1e-6  # J: less is round-off in cases whose masses, stiffnesses and gaps are about 1
+INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 BLOCK = 2**18  # samples held at one time
 POLISH = 41  # samples around a lowest one, ROUNDS times over
 ROUNDS = 4
@@ -69,7 +70,7 @@ def ledger(run, scale):
 
 def energy(run, segments, scale, samples=5):
     """Energy less the work of loads never rises; in a truncated basis within segments alone."""
-    ends = [(segment.start, segment.end) for segment in segments if segment.end > segment.start]
+    ends = [(segment.start, segment.end) for segment in segments if segment.end - segment.start > INSTANT * run.t_end]
     if not ends:
         return None
     inside = np.linspace(0, 1, samples + 2)[1:-1]
@@ -115,14 +116,18 @@ class Signal:
             rates = self.basis.derivative(segment.coefficients)
             self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ (own.response.shapes * rates)
             self.constant = float(level.asymptotic.forces[k])
+            self.terms = 0.0
         else:
             sign = -1.0 if contact in own.indices else 1.0
             self.coefficients = sign * (own.gap_rows[contact] @ modal)
             self.constant = sign * float(level.gap_constants[contact])
+            row = np.abs(own.base.directions[:, contact])
+            self.terms = float(row @ (np.abs(own.vectors) @ np.sum(np.abs(modal), axis=1)))
+            self.terms += float(row @ np.abs(level.asymptotic.configuration)) + abs(float(own.base.gaps[contact]))
 
     def size(self, duration):
-        """Upper bound of |s| on [0, duration]."""
-        return self._bound(self.coefficients, duration) + abs(self.constant)
+        """What round-off of s is measured against on [0, duration]: its bound, and what a gap is the sum of."""
+        return max(self._bound(self.coefficients, duration) + abs(self.constant), self.terms)
 
     def _bound(self, coefficients, duration):
         growth = np.exp(np.maximum(self.basis.rates.real, 0) * duration) * duration**self.basis.powers
