@@ -1,8 +1,9 @@
 """A long campaign of random cases: ``python tests/random_campaign.py --count 100000 --processes 2``.
 
 Case by case, each from its number alone (strategies.py): no exception but a named one, what must hold of every run
-(run_checks.py), and the same motion from both loops; events of a contact on which nothing presses may differ. Finished chunks stand in a file, so that a campaign that was
-stopped goes on where it was; the summary names every failing case with its cause.
+(run_checks.py), and the same motion from both loops; events of a contact on which nothing presses may differ. Finished
+chunks stand in a file, so that a campaign that was stopped goes on where it was; the summary names every failing case
+with its cause.
 """
 
 import argparse

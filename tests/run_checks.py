@@ -84,24 +84,31 @@ def energy(run, segments, scale, samples=5):
 def missed(run, segments, samples):
     """No contact leaves its state's admissible range unheard: s >= 0 (event_rule.py) on every segment.
 
-    In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull.
+    In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
+    of the whole run: an impact that stops all motion leaves a state that is round-off of the one before.
     """
-    complete = _complete(run)
-    for segment in segments:
-        duration = segment.end - segment.start
-        if duration <= 0:
-            continue
-        for contact, phase in enumerate(segment.phases):
-            heard = phase is Phase.ARMED
-            rigid = bool(np.isinf(run.model.base.stiffnesses[contact]))
-            if not (heard or complete or (rigid and contact in segment.level.level.indices)):
-                continue
-            signal = Signal(segment, contact, rigid)
-            lowest, at = signal.lowest(duration, samples)
-            if lowest < -(MISSED if heard else LAW) * signal.size(duration):
-                name = run.model.contacts[contact].name
-                return f"missed: {name} at {segment.start + at:.9g} s, {lowest / signal.size(duration):g} of its size"
+    complete, largest = _complete(run), {}
+    looked_at = list(_signals(segments, run, complete))
+    for segment, contact, _, signal in looked_at:
+        key = contact, contact in segment.level.level.indices
+        largest[key] = max(largest.get(key, 0.0), signal.size(segment.end - segment.start))
+    for segment, contact, heard, signal in looked_at:
+        size = largest[contact, contact in segment.level.level.indices]
+        lowest, at = signal.lowest(segment.end - segment.start, samples)
+        if lowest < -(MISSED if heard else LAW) * size:
+            name = run.model.contacts[contact].name
+            return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
     return None
+
+
+def _signals(segments, run, complete):
+    """(segment, contact, whether it is armed, its signal) of all that is to be looked at."""
+    rigid = np.isinf(run.model.base.stiffnesses)
+    for segment in segments:
+        for contact, phase in enumerate(segment.phases):
+            held = rigid[contact] and contact in segment.level.level.indices
+            if segment.end > segment.start and (phase is Phase.ARMED or complete or held):
+                yield segment, contact, phase is Phase.ARMED, Signal(segment, contact, bool(rigid[contact]))
 
 
 class Signal:

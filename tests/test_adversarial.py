@@ -1,0 +1,299 @@
+"""Hard random cases: what must hold of every run, laws of contact, and equivalences of two routes to one answer.
+
+The cases are those of strategies.py. An equivalence is asked for until the two runs' events part, which in a sensitive
+case they do: a start nudged by round-off then parts from both.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_campaign import main, recipe_of, verdicts
+from run_checks import Signal, complaints, missed
+from strategies import CHOICES, Recipe, built, cases, recipes
+
+from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn.first_root import Descent, DescentFinder
+
+DENSE = 1e4  # samples of the shortest period
+FEW_EVENTS = 30  # up to which two routes are compared: later round-off has grown
+CLOSE = 1e-7  # of the largest displacement: two routes after FEW_EVENTS events
+
+FOUND = {
+    "a contact that leaves is armed while another one is": Recipe(
+        402, "wide", 2, "none", 4, "mixed", "zero", "rows", "all", "touching", "gravity"
+    ),
+    "two walls at rest": Recipe(49, "chain", 3, "heavy", 3, "rigid", "small", "facing", "few", "static", "point"),
+    "every mode overdamped and coupled": Recipe(
+        12, "free dense", 2, "given", 3, "rigid", "preload", "above", "all", "rest", "point"
+    ),
+    "a contact that no kept mode moves": Recipe(
+        197, "unconnected", 7, "heavy", 4, "mixed", "preload", "between", "half", "striking", "none"
+    ),
+    "no stiffness at all": Recipe(
+        88, "free dense", 2, "heavy", 3, "mixed", "mixed", "mixed", "few", "striking", "point"
+    ),
+    "a held contact beside another one": Recipe(
+        286, "dense", 3, "modal", 4, "mixed", "zero", "mixed", "all", "striking", "point"
+    ),
+}
+
+
+def run_of(case, *, compiled=False, **changed):
+    given_case = dataclasses.replace(case, **changed)
+    start = {"displacement": given_case.displacement, "velocity": given_case.velocity}
+    return simulate(given_case.model, given_case.t_end, **start, loads=given_case.loads, compiled=compiled)
+
+
+def comparable(run):
+    """Whether a run is one that round-off does not change."""
+    return run.status == "ok" and len(run.events) <= FEW_EVENTS
+
+
+def assert_near(found, expected, size=None):
+    size = np.max(np.abs(expected)) if size is None else size
+    assert np.max(np.abs(np.asarray(found) - expected)) <= CLOSE * max(float(size), 1e-9)
+
+
+def sensitive(case, t, factor=1e-12):
+    """Whether a start nudged by round-off gives another answer at t."""
+    runs = [
+        run_of(case, displacement=(1 + s) * case.displacement, velocity=(1 + s) * case.velocity) for s in (0, factor)
+    ]
+    if {run.status for run in runs} != {"ok"}:
+        return True
+    x, y = (run.displacement(t) for run in runs)
+    return bool(np.max(np.abs(x - y)) > 1e-2 * CLOSE * np.max(np.abs(x)))
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_what_went_wrong_once_stays_right(name):
+    assert complaints(run_of(built(FOUND[name]))) == []
+
+
+@settings(max_examples=60)
+@given(cases())
+def test_every_run_keeps_energy_ledger_and_events(case):
+    """No exception, energy never gained, the ledger closed, no contact passed unheard."""
+    assert complaints(run_of(case)) == []
+
+
+@settings(max_examples=12)
+@given(cases(size=(2, 3, 4), contacts=(1, 2), structure=("chain", "dense", "repeated", "wide")))
+def test_no_event_is_missed_among_ten_thousand_samples_of_the_shortest_period(case):
+    run = run_of(case)
+    assert missed(run, run.segments[:8], DENSE) is None
+
+
+@settings(max_examples=40)
+@given(cases(law=("compliant", "mixed"), modes="all"))
+def test_the_force_of_a_spring_follows_its_law(case):
+    run = run_of(case)
+    t = np.linspace(0, run.t_end, 2001)
+    for contact in run.model.contacts:
+        if not contact.rigid:
+            law = contact.stiffness * np.maximum(0.0, -run.gap(contact.name, t))
+            size = contact.stiffness * (abs(contact.gap) + np.max(np.abs(run.displacement(t))))
+            assert np.max(np.abs(run.contact_force(contact.name, t) - law)) <= 1e-9 * size
+
+
+class TestTwoRoutesOneAnswer:
+    @settings(max_examples=25)
+    @given(cases(modes="all"), st.floats(0.1, 0.9))
+    def test_two_half_runs_are_one_run(self, case, share):
+        whole = run_of(case)
+        if not comparable(whole) or sensitive(case, whole.t_end):
+            return
+        first = run_of(case, t_end=share * case.t_end)
+        state = {"displacement": first.displacement(first.t_end), "velocity": first.velocity(first.t_end)}
+        second = run_of(case, t_end=case.t_end - first.t_end, **state)
+        assert_near(second.displacement(second.t_end), whole.displacement(whole.t_end))
+
+    @settings(max_examples=25)
+    @given(recipes())
+    def test_density_of_samples_changes_nothing(self, recipe):
+        plain, refined = run_of(built(recipe)), self._refined(built(recipe), 7.0)
+        if comparable(plain) and not sensitive(built(recipe), plain.t_end):
+            assert refined.status == "ok"
+            assert_near(refined.displacement(plain.t_end), plain.displacement(plain.t_end))
+
+    @staticmethod
+    def _refined(case, refine):
+        with pytest.MonkeyPatch.context() as patch:
+            made = DescentFinder.__init__
+            patch.setattr(DescentFinder, "__init__", lambda self, basis: made(self, basis, refine))
+            return run_of(case)
+
+    @settings(max_examples=25)
+    @given(cases())
+    def test_a_mirrored_case_gives_the_mirrored_answer(self, case):
+        plain = run_of(case)
+        rows = [case.model.structure.row(contact.direction) for contact in case.model.contacts]
+        contacts = [dataclasses.replace(c, direction=-row) for c, row in zip(case.model.contacts, rows, strict=True)]
+        loads = [dataclasses.replace(load, force=-load.force) for load in case.loads]
+        model = dataclasses.replace(case.model, contacts=contacts)
+        turned = {"displacement": -case.displacement, "velocity": -case.velocity}
+        mirrored = run_of(case, model=model, loads=loads, **turned)
+        if comparable(plain) and not sensitive(case, plain.t_end):
+            assert_near(-mirrored.displacement(plain.t_end), plain.displacement(plain.t_end))
+
+    @settings(max_examples=25)
+    @given(cases(damping="none", law="compliant", modes="all", structure=("chain", "dense", "wide", "repeated")))
+    def test_an_undamped_run_between_springs_runs_back_to_its_start(self, case):
+        forth = run_of(case)
+        if not comparable(forth) or sensitive(case, forth.t_end):
+            return
+        end = {"displacement": forth.displacement(forth.t_end), "velocity": -forth.velocity(forth.t_end)}
+        if sensitive(dataclasses.replace(case, **end), forth.t_end):
+            return
+        back = run_of(case, **end)
+        size = np.max(np.abs(forth.displacement(np.linspace(0, forth.t_end, 50))))
+        assert_near(back.displacement(back.t_end), case.displacement, size)
+
+    @settings(max_examples=25)
+    @given(cases(damping=("none", "given", "rayleigh")), st.integers(0, 2**31))
+    def test_permuted_coordinates_give_the_permuted_answer(self, case, seed):
+        plain = run_of(case)
+        order = np.random.default_rng(seed).permutation(case.model.structure.n)
+        permuted = run_of(_permuted(case, order))
+        if comparable(plain) and not sensitive(case, plain.t_end):
+            assert_near(permuted.displacement(plain.t_end), plain.displacement(plain.t_end)[order])
+
+    @settings(max_examples=25)
+    @given(cases(damping=("none", "given")), st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-3, 1e6]))
+    def test_other_units_give_the_scaled_answer(self, case, length, mass):
+        """Masses in another unit, lengths in another one: forces scale with both, times with neither."""
+        plain = run_of(case)
+        scaled = run_of(_scaled(case, length, mass))
+        if comparable(plain) and not sensitive(case, plain.t_end):
+            assert_near(scaled.displacement(plain.t_end) / length, plain.displacement(plain.t_end))
+
+    @settings(max_examples=25)
+    @given(cases(structure=("chain", "dense", "wide", "repeated"), load="none", modes="all"), st.floats(-3, 3))
+    def test_a_constant_load_is_a_shifted_rest(self, case, force):
+        """x = x_s + z: z moves freely where K x_s = f and every gap is larger by h.x_s."""
+        structure = case.model.structure
+        shift = np.linalg.solve(structure.stiffness, force * structure.row("m0"))
+        contacts = [
+            dataclasses.replace(c, gap=c.gap - float(structure.row(c.direction) @ shift)) for c in case.model.contacts
+        ]
+        model = dataclasses.replace(case.model, contacts=contacts)
+        loaded_start = case.displacement + shift
+        free = run_of(case)
+        if comparable(free) and not sensitive(case, free.t_end):
+            loads = (ConstantLoad("m0", force),)
+            loaded = run_of(case, model=model, displacement=loaded_start, loads=loads)
+            size = np.max(np.abs(shift)) + np.max(np.abs(free.displacement(free.t_end)))
+            assert_near(loaded.displacement(free.t_end) - shift, free.displacement(free.t_end), size)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**31), st.integers(2, 6))
+def test_a_rigid_stop_that_is_pressed_is_the_limit_of_stiffness(seed, n):
+    """Without an impact the difference falls as 1 / k; after one it does not, of which the rigid stop keeps nothing."""
+    case = built(Recipe(seed, "chain", n, "none", 1, "rigid", "small", "rows", "all", "rest", "none"))
+    press = {"m0": -1e3}
+    (contact,) = (dataclasses.replace(c, direction="m0") for c in case.model.contacts)
+    speed = np.where(np.arange(n) == 0, 0.0, case.model.structure.row("m0") @ np.ones(n) + np.arange(n) / n)
+    ends, t = [], np.linspace(0, 1, 50)
+    for stiffness in (math.inf, 1e6, 1e8):
+        model = dataclasses.replace(case.model, contacts=[dataclasses.replace(contact, stiffness=stiffness)])
+        start, loads = model.static_equilibrium(press), (ConstantLoad("m0", press["m0"]),)
+        run = run_of(case, model=model, t_end=1.0, displacement=start, velocity=speed, loads=loads)
+        assert [event.kind for event in run.events if event.time > 0] == []
+        ends.append(run.displacement(t))
+    soft, hard = (np.max(np.abs(end - ends[0])) for end in ends[1:])
+    assert 0 < hard < 0.02 * soft
+
+
+class TestTheChecksSee:
+    """A check that cannot fail is none: each of them is shown a wrong run."""
+
+    CASE = Recipe(5, "chain", 3, "none", 1, "compliant", "small", "below", "all", "moving", "none")
+
+    def test_a_missed_event(self, monkeypatch):
+        monkeypatch.setattr(DescentFinder, "first", lambda self, signals, horizon, start=0.0: None)
+        run = run_of(built(self.CASE))
+        assert any(text.startswith("missed: c0") for text in complaints(run))
+        assert missed(run, run.segments, 24.0) is not None
+
+    def test_an_event_that_comes_late(self, monkeypatch):
+        first = DescentFinder.first
+
+        def late(self, signals, horizon, start=0.0):
+            found = first(self, signals, horizon, start)
+            return None if found is None else Descent(found.time + 1e-6, found.signal)
+
+        monkeypatch.setattr(DescentFinder, "first", late)
+        assert any(text.startswith("missed: c0") for text in complaints(run_of(built(self.CASE))))
+
+    def test_energy_out_of_nothing(self):
+        run = run_of(built(self.CASE))
+        for changed, complaint in ((0, "energy: rises"), (-1, "ledger: residual")):
+            segments = list(run.segments)
+            weaker = dataclasses.replace(segments[changed], coefficients=0.9 * segments[changed].coefficients)
+            segments[changed] = weaker
+            found = complaints(dataclasses.replace(run, segments=segments))
+            assert any(text.startswith(complaint) for text in found), found
+
+    def test_the_lowest_value_between_samples(self):
+        """1 - 1e-9 + cos(omega t) dips 1e-9 below zero for an instant that 24 samples a period do not meet."""
+        run = run_of(built(self.CASE), t_end=0.01)
+        signal = Signal(run.segments[0], 0, False)
+        signal.basis = dataclasses.replace(signal.basis, rates=np.array([1j]), powers=np.zeros(1, int))
+        signal.coefficients, signal.constant = np.ones(1, complex), 1 - 1e-9
+        assert signal.lowest(5.0, 24.0) == pytest.approx((-1e-9, math.pi), rel=1e-4)
+
+
+class TestCampaign:
+    def test_a_case_is_its_number(self):
+        assert recipe_of(7) == recipe_of(7) != recipe_of(8)
+        pair = [built(recipe_of(7)) for _ in range(2)]
+        assert np.array_equal(pair[0].velocity, pair[1].velocity)
+        assert {recipe_of(k).structure for k in range(100)} == set(CHOICES["structure"])
+
+    def test_goes_on_where_it_was(self, tmp_path, capsys):
+        arguments = ["--processes", "1", "--out", str(tmp_path / "chunks"), "--count"]
+        assert main([*arguments, "2"]) == 0
+        assert main([*arguments, "2"]) == 0
+        assert capsys.readouterr().out.count("2 cases") == 2
+        assert len((tmp_path / "chunks").read_text("utf-8").splitlines()) == 1
+
+    def test_names_an_exception(self, monkeypatch):
+        def broken(*given, **named):
+            raise ZeroDivisionError("float division by zero")
+
+        monkeypatch.setattr("random_campaign.simulate", broken)
+        assert verdicts(3) == [("failure: exception", "ZeroDivisionError: float division by zero")]
+
+
+def _permuted(case, order):
+    old = case.model.structure
+    damping = old.damping if not isinstance(old.damping, np.ndarray) else old.damping[np.ix_(order, order)]
+    points = {name: row[order] for name, row in old.points.items()}
+    structure = LinearStructure(old.mass[np.ix_(order, order)], old.stiffness[np.ix_(order, order)], damping, points)
+    contacts = [dataclasses.replace(c, direction=old.row(c.direction)[order]) for c in case.model.contacts]
+    return dataclasses.replace(
+        case,
+        model=MultiPhiModel(structure, contacts, case.model.modes),
+        displacement=case.displacement[order],
+        velocity=case.velocity[order],
+        loads=[ConstantLoad(old.row(load.at)[order], load.force) for load in case.loads],
+    )
+
+
+def _scaled(case, length, mass):
+    old = case.model.structure
+    damping = old.damping if old.damping is None else mass * old.damping
+    structure = LinearStructure(mass * old.mass, mass * old.stiffness, damping, old.points)
+    contacts = [UnilateralContact(c.name, c.direction, length * c.gap, mass * c.stiffness) for c in case.model.contacts]
+    return dataclasses.replace(
+        case,
+        model=MultiPhiModel(structure, contacts, case.model.modes),
+        displacement=length * case.displacement,
+        velocity=length * case.velocity,
+        loads=[dataclasses.replace(load, force=mass * length * load.force) for load in case.loads],
+    )
