@@ -7,7 +7,7 @@ distance or facing each other at one place, starts exactly on a stop, soft conta
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import scipy.linalg
@@ -24,7 +24,8 @@ from multiphi_exudyn import (
 )
 
 LONGEST = 3.0  # periods of the lowest elastic mode that a run lasts,
-SHORTEST = 100.0  # at most, and of the highest one
+SHORTEST = 100.0  # at most, and of the highest one,
+BOUNCES = 1000.0  # and of the stiffest contact on the lightest part
 
 CLAMPED = 1e-3  # m: gap of rigid contacts that face each other, which at zero gap would be a clamp and no contacts
 
@@ -90,11 +91,11 @@ def built(recipe):
     n = len(mass)
     damping = _damping(recipe.damping, mass, stiffness, random)
     structure = LinearStructure(mass, stiffness, damping, {f"m{i}": i for i in range(n)})
-    contacts = [_contact(recipe, i, n, random) for i in range(recipe.contacts)]
+    contacts = _no_clamps(structure, [_contact(recipe, i, n, random) for i in range(recipe.contacts)])
     model = MultiPhiModel(structure, contacts, modes=_modes(recipe.modes, n - len(contacts), random))
     loads = _loads(recipe.load, mass, random)
     displacement, velocity = _start(recipe.start, model, random)
-    return Case(model, _duration(mass, stiffness), displacement, velocity, loads)
+    return Case(model, _duration(mass, stiffness, contacts), displacement, velocity, loads)
 
 
 def cases(**fixed):
@@ -153,9 +154,17 @@ def _contact(recipe, i, n, random):
     stiffness = math.inf if rigid else 10.0 ** random.uniform(1, 9)
     gap = {"zero": 0.0, "small": float(random.uniform(0.01, 0.1)), "preload": float(random.uniform(-0.1, 0.1))}
     chosen = gap.get(recipe.gaps, float(random.choice([0.0, 0.02, 0.5])))
-    if rigid:
-        chosen = max(abs(chosen), CLAMPED if side == "facing" else 0.0)
-    return UnilateralContact(f"c{i}", _direction(side, i, n, random), chosen, stiffness)
+    return UnilateralContact(f"c{i}", _direction(side, i, n, random), abs(chosen) if rigid else chosen, stiffness)
+
+
+def _no_clamps(structure, contacts):
+    """Rigid contacts that face each other at one place stand apart."""
+    rows = [structure.row(contact.direction) for contact in contacts]
+    for i, contact in enumerate(contacts):
+        facing = [k for k, other in enumerate(contacts) if other.rigid and np.array_equal(rows[k], -rows[i])]
+        if contact.rigid and facing:
+            contacts[i] = replace(contact, gap=max(contact.gap, CLAMPED))
+    return contacts
 
 
 def _direction(side, i, n, random):
@@ -222,9 +231,11 @@ def _static(model, random):
         return np.zeros(model.structure.n)
 
 
-def _duration(mass, stiffness):
+def _duration(mass, stiffness, contacts):
     omega = np.sqrt(np.maximum(scipy.linalg.eigh(stiffness, mass, eigvals_only=True), 0.0))
     elastic = omega[omega > 1e-6 * np.max(omega)]
-    if len(elastic) == 0:
-        return LONGEST
-    return 2 * math.pi * float(min(LONGEST / elastic[0], SHORTEST / elastic[-1]))
+    springs = [contact.stiffness for contact in contacts if not contact.rigid]
+    bounce = math.sqrt(max(springs, default=0.0) / float(np.min(np.diagonal(mass))))
+    longest = LONGEST / elastic[0] if len(elastic) else LONGEST / (2 * math.pi)
+    shortest = SHORTEST / elastic[-1] if len(elastic) else math.inf
+    return 2 * math.pi * float(min(longest, shortest, BOUNCES / bounce if bounce else math.inf))

@@ -74,7 +74,7 @@ def test_what_went_wrong_once_stays_right(name):
     assert complaints(run_of(built(FOUND[name]))) == []
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(cases())
 def test_every_run_keeps_energy_ledger_and_events(case):
     """No exception, energy never gained, the ledger closed, no contact passed unheard."""
@@ -88,7 +88,7 @@ def test_no_event_is_missed_among_ten_thousand_samples_of_the_shortest_period(ca
     assert missed(run, run.segments[:8], DENSE) is None
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(cases(law=("compliant", "mixed"), modes="all"))
 def test_the_force_of_a_spring_follows_its_law(case):
     run = run_of(case)
@@ -101,7 +101,7 @@ def test_the_force_of_a_spring_follows_its_law(case):
 
 
 class TestTwoRoutesOneAnswer:
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases(modes="all"), st.floats(0.1, 0.9))
     def test_two_half_runs_are_one_run(self, case, share):
         whole = run_of(case)
@@ -112,7 +112,7 @@ class TestTwoRoutesOneAnswer:
         second = run_of(case, t_end=case.t_end - first.t_end, **state)
         assert_near(second.displacement(second.t_end), whole.displacement(whole.t_end))
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(recipes())
     def test_density_of_samples_changes_nothing(self, recipe):
         plain, refined = run_of(built(recipe)), self._refined(built(recipe), 7.0)
@@ -127,7 +127,7 @@ class TestTwoRoutesOneAnswer:
             patch.setattr(DescentFinder, "__init__", lambda self, basis: made(self, basis, refine))
             return run_of(case)
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases())
     def test_a_mirrored_case_gives_the_mirrored_answer(self, case):
         plain = run_of(case)
@@ -140,7 +140,7 @@ class TestTwoRoutesOneAnswer:
         if comparable(plain) and not sensitive(case, plain.t_end):
             assert_near(-mirrored.displacement(plain.t_end), plain.displacement(plain.t_end))
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases(damping="none", law="compliant", modes="all", structure=("chain", "dense", "wide", "repeated")))
     def test_an_undamped_run_between_springs_runs_back_to_its_start(self, case):
         forth = run_of(case)
@@ -153,7 +153,7 @@ class TestTwoRoutesOneAnswer:
         size = np.max(np.abs(forth.displacement(np.linspace(0, forth.t_end, 50))))
         assert_near(back.displacement(back.t_end), case.displacement, size)
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases(damping=("none", "given", "rayleigh")), st.integers(0, 2**31))
     def test_permuted_coordinates_give_the_permuted_answer(self, case, seed):
         plain = run_of(case)
@@ -162,7 +162,7 @@ class TestTwoRoutesOneAnswer:
         if comparable(plain) and not sensitive(case, plain.t_end):
             assert_near(permuted.displacement(plain.t_end), plain.displacement(plain.t_end)[order])
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases(damping=("none", "given")), st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-3, 1e6]))
     def test_other_units_give_the_scaled_answer(self, case, length, mass):
         """Masses in another unit, lengths in another one: forces scale with both, times with neither."""
@@ -171,7 +171,7 @@ class TestTwoRoutesOneAnswer:
         if comparable(plain) and not sensitive(case, plain.t_end):
             assert_near(scaled.displacement(plain.t_end) / length, plain.displacement(plain.t_end))
 
-    @settings(max_examples=25)
+    @settings(max_examples=12)
     @given(cases(structure=("chain", "dense", "wide", "repeated"), load="none", modes="all"), st.floats(-3, 3))
     def test_a_constant_load_is_a_shifted_rest(self, case, force):
         """x = x_s + z: z moves freely where K x_s = f and every gap is larger by h.x_s."""
@@ -190,7 +190,7 @@ class TestTwoRoutesOneAnswer:
             assert_near(loaded.displacement(free.t_end) - shift, free.displacement(free.t_end), size)
 
 
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(st.integers(0, 2**31), st.integers(2, 6))
 def test_a_rigid_stop_that_is_pressed_is_the_limit_of_stiffness(seed, n):
     """Without an impact the difference falls as 1 / k; after one it does not, of which the rigid stop keeps nothing."""
