@@ -22,7 +22,7 @@ levels under static loads, with q more columns.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,6 +93,8 @@ class Excitation:
     @classmethod
     def of(cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0) -> Excitation:
         """The loads of a run of ``model`` until ``end`` [s], smooth courses to their tolerance / finer."""
+        if not isinstance(loads, Iterable):
+            raise MultiPhiTypeError(f"loads: got {type(loads).__name__}, need a sequence of loads")
         base, channels = model.base, _Channels(model, end, finer)
         for load in loads:
             channels.add(load)

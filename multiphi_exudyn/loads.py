@@ -16,6 +16,7 @@ Every other course is a history (history.py), to which the response is known in 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,13 +93,18 @@ class Sampled:
     @classmethod
     def from_csv(cls, path: str | Path, column: int = 1) -> Sampled:
         """Two or more columns of numbers, time [s] first; lines that begin with # are skipped."""
+        if not is_real(column) or int(column) != column:
+            raise MultiPhiTypeError(f"samples: got column {column!r} of {path}, need a whole number >= 1")
         try:
-            table = np.loadtxt(path, delimiter=",", ndmin=2)
-        except (OSError, ValueError) as error:
-            raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {error}") from error
-        if not 1 <= column < table.shape[1]:
-            raise MultiPhiValueError(f"samples: got column {column} of {path}, need 1 to {table.shape[1] - 1}")
-        return cls(table[:, 0], table[:, column])
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of an empty file
+                table = np.loadtxt(path, delimiter=",", ndmin=2)
+            if not 1 <= column < table.shape[1]:
+                raise MultiPhiValueError(f"got column {column}, need 1 to {table.shape[1] - 1}")
+            return cls(table[:, 0], table[:, int(column)])
+        except (OSError, TypeError, ValueError) as error:
+            cause = " ".join(str(error).split())
+            raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {cause}") from error
 
     def history(self, end: float, finer: float = 1.0) -> History:
         """The course up to ``end`` [s]."""
@@ -126,16 +132,34 @@ class Smooth:
         return History.smooth(self._values, end, self.tolerance / finer * largest)
 
     def _values(self, times: np.ndarray) -> np.ndarray:
-        try:
-            values = np.asarray(self.function(times))
-            if values.shape != times.shape:
-                values = np.array([float(self.function(t)) for t in times.tolist()])
-        except (TypeError, ValueError):  # math.sin and branches take one time only
-            values = np.array([float(self.function(t)) for t in times.tolist()])
+        values = self._together(times)
+        if values is None:
+            values = np.array([self._value(t) for t in times.tolist()])
         if not np.all(np.isfinite(values)):
             worst = float(times[int(np.argmin(np.isfinite(values)))])
-            raise MultiPhiValueError(f"function: gives a value that is not finite at t = {worst:g} s")
+            raise MultiPhiValueError(f"function: gives a value that is not finite at t = {worst:g} s, need finite ones")
         return values.astype(float)
+
+    def _together(self, times: np.ndarray) -> np.ndarray | None:
+        """All values by one call, None for a function that takes one time only, as math.sin and branches do."""
+        try:
+            values = np.asarray(self.function(times))
+        except Exception:
+            return None  # whatever is wrong shows again with a single time
+        return values if values.shape == times.shape and values.dtype.kind in "biuf" else None
+
+    def _value(self, time: float) -> float:
+        """The value at one time [s]."""
+        try:
+            value = self.function(time)
+        except Exception as error:
+            cause = " ".join(f"{type(error).__name__} {error}".split())
+            raise MultiPhiValueError(f"function: got {cause} at t = {time:g} s, need a number") from error
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
+        if not is_real(value):
+            raise MultiPhiTypeError(f"function: got {type(value).__name__} at t = {time:g} s, need a number")
+        return float(value)
 
 
 @dataclass(frozen=True)

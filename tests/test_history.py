@@ -58,7 +58,7 @@ class TestEveryKind:
         history, _ = shapes()[kind]
         for t in (0.0, 0.4, 0.7321, 1.1, 2.999):
             piece = history.local(t)
-            s = np.linspace(0, min(piece.duration, 1.0), 57, endpoint=False)
+            s = np.linspace(0, min(piece.until - t, 1.0), 57, endpoint=False)
             assert_allclose(of_piece(piece, s), history.at(t + s), rtol=0, atol=1e-13)
 
     def test_the_derivative_is_the_limit_of_differences(self, kind):
@@ -73,11 +73,11 @@ class TestEveryKind:
     def test_is_zero_before_its_first_and_after_its_last_break(self, kind):
         history, _ = shapes()[kind]
         assert history.at(np.array([-1e-9, -5.0])).tolist() == [0.0, 0.0]
-        assert history.local(-2.0).duration == 2.0
+        assert history.local(-2.0).until == history.breaks[0]
         assert np.all(history.local(-2.0).coefficients == 0)
         if math.isfinite(end := float(history.breaks[-1])):
             assert history.at(np.array([end, end + 1])).tolist() == [0.0, 0.0]
-            assert history.local(end).duration == math.inf
+            assert history.local(end).until == math.inf
             assert np.all(history.local(end).coefficients == 0)
 
 

@@ -132,7 +132,7 @@ class TestFiles:
         assert "wrong.csv" in str(caught.value)
         assert "\n" not in str(caught.value)
 
-    @pytest.mark.parametrize("column", [0, -1, 2, 1.0, "1", True])
+    @pytest.mark.parametrize("column", [0, -1, 2, 1.5, "1", True, None])
     def test_a_column_that_is_not_there_is_refused(self, tmp_path, column):
         (tmp_path / "a.csv").write_text("0, 1\n1, 2\n")
         with pytest.raises(MultiPhiError, match="column"):
