@@ -22,7 +22,7 @@ ROUNDS = 4
 EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes that are the scene's own
 
 
-def complaints(run, samples=24.0, most=200):
+def complaints(run, samples=24.0, most=60):
     """Everything that is wrong with a run; samples: per shortest period; most: segments."""
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]

@@ -23,9 +23,9 @@ from multiphi_exudyn import (
     UnilateralContact,
 )
 
-LONGEST = 3.0  # periods of the lowest elastic mode that a run lasts,
-SHORTEST = 100.0  # at most, and of the highest one,
-BOUNCES = 1000.0  # and of the stiffest contact on the lightest part
+LONGEST = 2.0  # periods of the lowest elastic mode that a run lasts,
+SHORTEST = 50.0  # at most, and of the highest one,
+BOUNCES = 200.0  # and of the stiffest contact on the lightest part
 
 CLAMPED = 1e-3  # m: gap of rigid contacts that face each other, which at zero gap would be a clamp and no contacts
 

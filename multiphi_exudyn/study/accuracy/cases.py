@@ -146,6 +146,19 @@ def load_study(source: str, *, quick: bool = False) -> Study:
     path = _find(source)
     file = validated(StudyFile, path, read_toml(path))
     scene_path, data = scene_data(file.scene, path.parent)
+    try:
+        _change(data, file, quick)
+        scene_of(scene_path, data)
+    except MultiPhiValueError as error:
+        told = str(error).removeprefix(f"{scene_path}: ")
+        raise MultiPhiValueError(f"{path}: scene {file.scene} as the study changes it: {told}") from error
+    study = Study(path.stem, path, file, scene_path, data, quick)
+    _check(study)
+    return study
+
+
+def _change(data: dict[str, Any], file: StudyFile, quick: bool) -> None:
+    """What a study says in place of its scene."""
     for field, value in (file.change | (file.quick.change if quick else {})).items():
         _put(data, field, value)
     _put(data, "outputs.tolerances", list(file.tolerances))
@@ -153,10 +166,6 @@ def load_study(source: str, *, quick: bool = False) -> Study:
         _put_reference(data, file)
     if file.window is not None:
         _put(data, "outputs.windows", [file.window])
-    scene_of(scene_path, data)
-    study = Study(path.stem, path, file, scene_path, data, quick)
-    _check(study)
-    return study
 
 
 def _check(study: Study) -> None:
