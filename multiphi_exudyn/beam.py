@@ -86,11 +86,10 @@ class PointMass:
 
     def __post_init__(self) -> None:
         _check_numbers("point mass", at=self.at, mass=self.mass, inertia=self.inertia)
-        if not (math.isfinite(self.at + self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
-            raise MultiPhiValueError(
-                f"point mass: got at {self.at!r}, mass {self.mass!r}, inertia {self.inertia!r}, "
-                "need finite values, mass and inertia >= 0"
-            )
+        if not (math.isfinite(self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
+            raise MultiPhiValueError(f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0")
+        if not math.isfinite(self.at):
+            raise MultiPhiValueError(f"point mass: got at {self.at!r}, need a place on the beam in m")
 
 
 @dataclass(frozen=True)
