@@ -358,12 +358,11 @@ def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> T
     level. What a course's interpolation leaves, times |P| and the length of the run, is compared with the largest |z|.
     Sensitivity to events is not in this bound: it separates any two motions that are not the same.
     """
+    trajectory, finer = run(1.0), 1.0
     courses = [getattr(load, "course", None) for load in loads]
     wanted = [course.tolerance for course in courses if isinstance(course, (Smooth, Sweep))]
-    trajectory, finer = run(1.0), 1.0
     for _ in range(REFINEMENTS if wanted else 0):
-        error = _interpolation_error(trajectory)
-        if trajectory.status != "ok" or error <= min(wanted):
+        if trajectory.status != "ok" or (error := _interpolation_error(trajectory)) <= min(wanted):
             return trajectory
         finer *= SAFETY * error / min(wanted)
         trajectory = run(finer)

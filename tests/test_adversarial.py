@@ -18,9 +18,11 @@ from strategies import CHOICES, Recipe, built, cases, recipes
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.first_root import Descent, DescentFinder
 
+DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
 DENSE = 1e4  # samples of the shortest period
 FEW_EVENTS = 30  # up to which two routes are compared: later round-off has grown
 CLOSE = 1e-7  # of the largest displacement: two routes after FEW_EVENTS events
+SMALLEST = 1e-6  # m: displacements that are less are round-off in cases whose sizes are about 1
 
 FOUND = {
     "a contact that leaves is armed while another one is": Recipe(
@@ -55,7 +57,7 @@ def comparable(run):
 
 def assert_near(found, expected, size=None):
     size = np.max(np.abs(expected)) if size is None else size
-    assert np.max(np.abs(np.asarray(found) - expected)) <= CLOSE * max(float(size), 1e-9)
+    assert np.max(np.abs(np.asarray(found) - expected)) <= CLOSE * max(float(size), SMALLEST)
 
 
 def sensitive(case, t, factor=1e-12):
@@ -155,11 +157,10 @@ class TestTwoRoutesOneAnswer:
 
     @settings(max_examples=12)
     @given(
-        cases(structure=("chain", "free chain", "dense", "wide"), damping=("none", "given", "rayleigh")),
+        cases(structure=DISTINCT, damping=("none", "given", "rayleigh")),
         st.integers(0, 2**31),
     )
     def test_permuted_coordinates_give_the_permuted_answer(self, case, seed):
-        """Frequencies all different: which of repeated modes a truncated basis keeps is not defined."""
         plain = run_of(case)
         order = np.random.default_rng(seed).permutation(case.model.structure.n)
         permuted = run_of(_permuted(case, order))
@@ -167,7 +168,9 @@ class TestTwoRoutesOneAnswer:
             assert_near(permuted.displacement(plain.t_end), plain.displacement(plain.t_end)[order])
 
     @settings(max_examples=12)
-    @given(cases(damping=("none", "given")), st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-3, 1e6]))
+    @given(
+        cases(structure=DISTINCT, damping=("none", "given")), st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-3, 1e6])
+    )
     def test_other_units_give_the_scaled_answer(self, case, length, mass):
         """Masses in another unit, lengths in another one: forces scale with both, times with neither."""
         plain = run_of(case)

@@ -12,12 +12,13 @@ from small_structures import chain, oscillator, random_model, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.state import Phase
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
 DAMPINGS = ("none", "modal", "rayleigh", "given")
 KINDS = ("mixed", "rigid", "compliant")
-SIMULATE = sys.modules[mp.simulate.__module__]
+MOTION = sys.modules[Motion.__module__]
 
 
 def rig(stiffness, modes, elements=57, damping=rig_damping):
@@ -176,13 +177,13 @@ class TestHandBack:
 
 class TestFailures:
     def test_chatter_has_the_same_message(self, monkeypatch):
-        monkeypatch.setattr(SIMULATE, "EVENTS_PER_PERIOD", 1.5)
+        monkeypatch.setattr(MOTION, "EVENTS_PER_PERIOD", 1.5)
         expected, found = both(oscillator(gap=0.0, contact=8.0), 1000.0, displacement=[1.0])
         assert "chatter: 200 events in" in found.message
         assert_same(expected, found, 1e-10)
 
     def test_chatter_that_the_numpy_loop_meets(self, monkeypatch):
-        monkeypatch.setattr(SIMULATE, "EVENTS_PER_PERIOD", 1.5)
+        monkeypatch.setattr(MOTION, "EVENTS_PER_PERIOD", 1.5)
         walls = [stop("m0", 0.0, 8.0, "a"), stop("m0", 0.0, 8.0, "b")]
         structure = mp.LinearStructure([[2.0]], [[8.0]], points={"m0": 0})
         expected, found = both(mp.MultiPhiModel(structure, walls, "all"), 1000.0, displacement=[1.0])

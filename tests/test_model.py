@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
 import multiphi_exudyn.model
-from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn import ConstantLoad, LevelOverride, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 
 
 class TestMultiPhiModel:
@@ -28,7 +28,7 @@ class TestMultiPhiModel:
             (ValueError, {"contacts": [stop(), stop("m1")]}, "contacts: got the names"),
             (ValueError, {"contacts": [stop("m9")]}, "point: got 'm9'"),
             (ValueError, {"contacts": [stop({"m0": 0.0})]}, "contact 'stop' direction: got a zero row"),
-            (ValueError, {"overrides": {("elsewhere",): None}}, "contact: got 'elsewhere'"),
+            (ValueError, {"overrides": {("elsewhere",): LevelOverride()}}, "contact: got 'elsewhere'"),
         ],
     )
     def test_refuses(self, refused, kind, changes, begins):
