@@ -164,7 +164,7 @@ class _Channels:
         structure = self._model.structure
         moved = structure.row(load.direction)
         inertia = -(self._model.base.modes.shapes.T @ (structure.mass @ moved))
-        self._append(inertia, self._no_stop(), self._history(load.course).derivative.derivative)
+        self._append(inertia, self._no_stop(), load.course.acceleration(self._end, self._finer))
         fixed = self._no_stop()
         for name in load.fixed_stops:
             i = self._model.index(name)

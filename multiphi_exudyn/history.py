@@ -78,9 +78,9 @@ class History:
         return cls._interpolated(function, lambda t: np.zeros_like(t), end, tolerance)
 
     @classmethod
-    def modulated(cls, amplitude: float, phase: Function, omega: Function, end: float, tolerance: float) -> History:
-        """u = amplitude cos(phase(t)) on [0, end], omega its rate: pieces ride on the frequency in their middle."""
-        return cls._interpolated(lambda t: amplitude * np.exp(1j * phase(t)), omega, end, tolerance)
+    def modulated(cls, amplitude: Function, phase: Function, omega: Function, end: float, tolerance: float) -> History:
+        """u = Re(amplitude(t) exp(i phase(t))) on [0, end], omega the phase's rate, by which the pieces ride."""
+        return cls._interpolated(lambda t: amplitude(t) * np.exp(1j * phase(t)), omega, end, tolerance)
 
     @classmethod
     def _interpolated(cls, function: Function, omega: Function, end: float, tolerance: float) -> History:

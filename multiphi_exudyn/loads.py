@@ -68,6 +68,10 @@ class Harmonic:
         """The course up to ``end`` [s]."""
         return History.harmonic(self.amplitude, 2 * math.pi * self.frequency_hz, self.phase)
 
+    def acceleration(self, end: float, finer: float = 1.0) -> History:
+        """u'' up to ``end`` [s]."""
+        return self.history(end).derivative.derivative
+
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
@@ -130,6 +134,10 @@ class Smooth:
         """The course up to ``end`` [s], to tolerance / finer of its largest value."""
         largest = float(np.max(np.abs(self._values(np.linspace(0.0, end, 257)))))
         return History.smooth(self._values, end, self.tolerance / finer * largest)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> History:
+        """u'' up to ``end`` [s], of the polynomials that stand for u: less certain than they are."""
+        return self.history(end, finer).derivative.derivative
 
     def _values(self, times: np.ndarray) -> np.ndarray:
         values = self._together(times)
@@ -209,9 +217,26 @@ class Sweep:
 
     def history(self, end: float, finer: float = 1.0) -> History:
         """The course up to ``end`` [s], to tolerance / finer of its amplitude."""
-        allowed = self.tolerance / finer * abs(self.amplitude)
-        last = min(end, self.duration)
-        return History.modulated(self.amplitude, self.phase, lambda t: 2 * math.pi * self.frequency(t), last, allowed)
+        return self._modulated(lambda t: np.full_like(t, self.amplitude), abs(self.amplitude), end, finer)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> History:
+        """u'' up to ``end`` [s], to tolerance / finer of its largest value: (i phi'' - phi'^2) of exp(i phi)."""
+
+        def factor(t: np.ndarray) -> np.ndarray:
+            omega = 2 * math.pi * self.frequency(t)
+            linear = self.law == "linear"
+            rising = 2 * math.pi * (self.end_hz - self.start_hz) if linear else omega * self._octaves
+            rate = rising / self.duration
+            return np.asarray(self.amplitude * (1j * rate - omega**2))
+
+        largest = float(np.max(np.abs(factor(np.array([0.0, self.duration])))))
+        return self._modulated(factor, largest, end, finer)
+
+    def _modulated(
+        self, amplitude: Callable[[np.ndarray], np.ndarray], largest: float, end: float, finer: float
+    ) -> History:
+        allowed, last = self.tolerance / finer * largest, min(end, self.duration)
+        return History.modulated(amplitude, self.phase, lambda t: 2 * math.pi * self.frequency(t), last, allowed)
 
 
 Course: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"

@@ -101,6 +101,23 @@ class TestContactsUnderLoads:
             lambda t, i: -0.1 * math.sin(rate * t) if i == 0 else 0.0,
         )
 
+    @pytest.mark.parametrize("law", ["linear", "logarithmic"])
+    def test_base_that_sweeps(self, law):
+        course = mp.Sweep(0.05, 0.2, 1.5, 10.5, law)
+
+        def acceleration(t):
+            step = 1e-4
+            near = np.cos(course.phase(np.array([t - step, t, t + step])))
+            return 0.05 * (near[0] - 2 * near[1] + near[2]) / step**2
+
+        structure, times = chain(3, damping=DAMPING, stiffness=10.0), TIMES[:51]
+        run = mp.simulate(mp.MultiPhiModel(structure, [], modes="all"), 10.0, loads=[mp.BaseMotion(np.ones(3), course)])
+        exact = course.acceleration(10.5)
+        assert_allclose(exact.at(times), [acceleration(t) for t in times], rtol=1e-5, atol=1e-5)
+        expected, _ = integrated(structure, times, lambda t: -np.ones(3) * exact.at(np.array([t]))[0])
+        assert not run.message
+        assert relative(run.displacement(times), expected) < 1e-9
+
     def test_a_load_that_jumps_lets_a_contact_open_at_once(self):
         """A rigid contact pressed by 5 N on it alone opens at the instant at which that load ends."""
         structure = chain(2, stiffness=10.0)

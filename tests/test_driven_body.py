@@ -25,6 +25,7 @@ CASES = {
     "moving stop": (SOFT, "all", [SHAKEN, DRIVEN]),
     "rigid moving stop": (RIGID, "all", [SHAKEN, mp.ConstantLoad("m2", -1.0), mp.HarmonicLoad("m1", 0.5, 0.3, 0.4)]),
     "moving base": (SOFT, "all", [mp.BaseMotion(np.ones(3), mp.Harmonic(0.1, 0.7, -math.pi / 2), ("below",))]),
+    "swept base": (SOFT, "all", [mp.BaseMotion(np.ones(3), mp.Sweep(0.1, 0.3, 1.0, T_END))]),
     "one mode": (SOFT, 1, [DRIVEN]),
     "sweep": (SOFT, "all", [mp.SweepLoad("m1", 1.0, 0.1, 2.0, T_END)]),
 }

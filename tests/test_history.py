@@ -40,7 +40,10 @@ def shapes():
             History.smooth(lambda t: np.exp(-t) * np.sin(9 * t), 3.0, 1e-12),
             lambda t: np.exp(-t) * np.sin(9 * t),
         ),
-        "modulated": (History.modulated(1.5, phase, omega, 3.0, 1e-11), lambda t: 1.5 * np.cos(phase(t))),
+        "modulated": (
+            History.modulated(lambda t: np.full_like(t, 1.5), phase, omega, 3.0, 1e-11),
+            lambda t: 1.5 * np.cos(phase(t)),
+        ),
     }
 
 
@@ -103,14 +106,16 @@ class TestExactness:
 @pytest.mark.parametrize("law", ["linear", "logarithmic"])
 def test_a_sweep_is_within_its_tolerance_everywhere(law, tolerance):
     phase, omega = chirp(law)
-    history = History.modulated(2.0, phase, omega, 3.0, tolerance)
+    history = History.modulated(lambda t: np.full_like(t, 2.0), phase, omega, 3.0, tolerance)
     t = np.linspace(0, 3, 100_003)[:-1]
     assert np.max(np.abs(history.at(t) - 2 * np.cos(phase(t)))) <= tolerance + 1e-13 * 200 * 3
 
 
 def test_pieces_of_a_sweep_follow_its_change_of_frequency_not_its_frequency():
     """From 1e5 to 1.1e5 rad/s: 50000 periods on a few hundred polynomials."""
-    history = History.modulated(1.0, lambda t: 1e5 * t + 5e3 * t**2 / 3, lambda t: 1e5 + 1e4 * t / 3, 3.0, 1e-6)
+    history = History.modulated(
+        np.ones_like, lambda t: 1e5 * t + 5e3 * t**2 / 3, lambda t: 1e5 + 1e4 * t / 3, 3.0, 1e-6
+    )
     assert history.pieces <= 512
 
 

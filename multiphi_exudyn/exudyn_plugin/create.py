@@ -25,7 +25,7 @@ from multiphi_exudyn.structure import is_real
 
 __all__ = ["CreateMultiPhiBody"]
 
-SHORTEST = 1e-12  # s: end of the run that a start belongs to, until the solver tells its own
+PROVISIONAL = 1.0  # s: end of the run that a start belongs to, until the solver tells its own
 
 
 def CreateMultiPhiBody(
@@ -96,7 +96,7 @@ def _motion(
     loads: Sequence[Load],
 ) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
-    motion = started(model, SHORTEST, displacement, velocity, loads, compiled=False)
+    motion = started(model, PROVISIONAL, displacement, velocity, loads, compiled=False)
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion
