@@ -7,6 +7,7 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import Level, LevelOverride
 from multiphi_exudyn.loads import (
     BaseMotion,
@@ -35,6 +36,7 @@ __all__ = [
     "Clamp",
     "ConstantLoad",
     "Event",
+    "ForceLaw",
     "FunctionLoad",
     "Gravity",
     "Harmonic",

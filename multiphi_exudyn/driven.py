@@ -65,7 +65,7 @@ class Flow:
             forces = given @ level.force.T
             if np.any(level.force_rate):
                 forces = forces + _rate_of(rate, given) @ level.force_rate.T
-            x = particular(own.omega**2, own.damping, response, rate, forces, horizon)
+            x = particular(own.squares, own.damping, response, rate, forces, horizon)
             block = np.zeros((max(len(x), len(given)), own.modes + q), complex)
             block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
             blocks.append(block)
@@ -189,10 +189,9 @@ class DrivenRule(EventRule):
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the loads [J] at the start of a configuration y (m,)."""
-        base, values, index = self.model.base, self.drive.values[0], list(penetrating)
-        gaps = base.gaps[index] + base.directions[:, index].T @ displacement - self.excitation.stops[index] @ values
-        strain = 0.5 * (np.sum((base.modes.omega * displacement) ** 2) + base.stiffnesses[index] @ gaps**2)
-        return float(strain - self.excitation.load(values) @ displacement)
+        base, values = self.model.base, self.drive.values[0]
+        strain = base.strain(displacement, penetrating, base.gaps - self.excitation.stops @ values)
+        return strain - float(self.excitation.load(values) @ displacement)
 
     def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
         assert isinstance(level, DrivenLevel)
@@ -242,7 +241,7 @@ class DrivenSegment(Segment):
 
     def damping_work(self) -> float:
         """Integral of y'^T C y' [J]."""
-        if not np.any(self._driven.level.base.damping):
+        if not np.any(self._resistance):
             return 0.0
         return sum(float(weights @ self._dissipation(t)) for t, weights in self._quadrature(self.start, self.end))
 
@@ -258,7 +257,11 @@ class DrivenSegment(Segment):
 
     def _dissipation(self, times: np.ndarray) -> np.ndarray:
         moved = self._driven.motion(self.modal(times, 1))
-        return np.asarray(np.sum(moved * (self._driven.level.base.damping @ moved), axis=0))
+        return np.asarray(np.sum(moved * (self._resistance @ moved), axis=0))
+
+    @property
+    def _resistance(self) -> np.ndarray:
+        return self.level.level.base.resistance(self.level.level.indices)
 
     def _power(self, times: np.ndarray) -> np.ndarray:
         """Power (k,) [W] of the channels."""
@@ -275,8 +278,8 @@ class DrivenSegment(Segment):
         if np.any(level.carried):
             moved, accelerated = level.motion(xi_t), level.motion(self.modal(times, 2))
             y = level.configuration(xi)
-            load = level.excitation.static[:, None] + varying
-            residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
+            load = (level.excitation.static + base.preload)[:, None] + varying
+            residual = accelerated + self._resistance @ moved + (base.modes.omega**2 * y.T).T - load
             residual += base.directions[:, index] @ springs
             power += np.sum((level.carried @ w_t) * residual, axis=0)
         return np.asarray(power)

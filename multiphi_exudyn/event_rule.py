@@ -5,6 +5,7 @@ Every contact has one function that says whether its present state is admissible
     open                 s = g         gap
     closed, compliant    s = -g        penetration
     closed, rigid        s = lambda    reaction
+    closed, viscous      s = lambda    force of spring and damper
 
 With all modes the states exclude each other: where one stops being admissible the other begins to be. The truncated
 bases of two levels need not agree, so the rule says what happens then:
@@ -19,6 +20,13 @@ bases of two levels need not agree, so the rule says what happens then:
    armed when s reaches zero, and asks again if s turns down before.
 6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
    armed), or until s in the level it would enter has (then it changes).
+
+7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero; then,
+   open with g < 0, it is refused as in 6: armed when g has risen to zero, closed when its force in the level with it
+   closed has. It may stay closed only with a force >= 0, and may open where its force would be negative.
+8. The springs of a force law are compliant contacts whose closed sets are nested. While all of them are armed only
+   the ends of its chains can ask, the last closed and the first open spring, and only they are looked at. The two that
+   meet at the law's centre have the same gap with opposite sign and exchange at one instant.
 
 A sign is that of the first derivative that is not round-off. All instants are roots of analytic signals, so nothing
 depends on sampling. Negative gaps that truncation leaves are measured and reported. An endless exchange at one
@@ -54,6 +62,9 @@ class EventRule:
         self.transitions = 0
         self.compiled: Any = None  # what the compiled loop keeps for later runs
         self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
+        self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
+        self._armed = (Phase.ARMED,) * len(self._rigid)
+        self._ends: dict[tuple[int, ...], tuple[int, ...]] = {}
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
         self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
@@ -89,7 +100,7 @@ class EventRule:
         own = level.level
         if contact not in own.indices:
             return Row(own.gap_rows[contact], np.zeros(own.modes), float(level.gap_constants[contact]))
-        if not self._rigid[contact]:
+        if not self._never_pulls(contact):
             return Row(-own.gap_rows[contact], np.zeros(own.modes), -float(level.gap_constants[contact]))
         k = own.indices.index(contact)
         return Row(own.force_rows[k], own.force_rate_rows[k], float(level.asymptotic.forces[k]))
@@ -106,9 +117,31 @@ class EventRule:
             constant,
         )
 
+    def _never_pulls(self, contact: int) -> bool:
+        """Whether a contact's s is its force while it is closed."""
+        return self._rigid[contact] or contact in self._viscous
+
+    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
+        """Contacts that can ask first while all are armed: of a force law the ends of its chains."""
+        if closed not in self._ends:
+            chains, held = self.model.chains, set(closed)
+            linked = {i for chain in chains for i in chain}
+            found = {i for i in range(len(self._rigid)) if i not in linked}
+            for chain in chains:
+                found.update(_ends(chain, held))
+            self._ends[closed] = tuple(sorted(found))
+        return self._ends[closed]
+
+    def candidates(self, closed: tuple[int, ...], phases: tuple[Phase, ...]) -> tuple[int, ...]:
+        """The ``ends``, and all of a chain that is not armed."""
+        ends = self.ends(closed)
+        unsettled = [chain for chain in self.model.chains if any(phases[i] is not Phase.ARMED for i in chain)]
+        return tuple(sorted({*ends, *(i for chain in unsettled for i in chain)})) if unsettled else ends
+
     def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
-        key = (state.closed, phases)
+        settled = phases is self._armed  # the hash of many phases takes its time
+        key = (state.closed, () if settled else phases)
         if key not in self._tables:
             waiting, rows, rates = self.watched(state.level, phases)
             self._tables[key] = waiting, SignalTable(state.basis, state.shapes, rows, rates)
@@ -120,8 +153,8 @@ class EventRule:
         """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
         found = [
             (contact, *wait)
-            for contact, phase in enumerate(phases)
-            for wait in self._waiting_for(level, contact, phase)
+            for contact in self.candidates(level.level.indices, phases)
+            for wait in self._waiting_for(level, contact, phases[contact])
         ]
         return [(item[0], item[1]) for item in found], [item[2] for item in found], [item[3] for item in found]
 
@@ -172,11 +205,7 @@ class EventRule:
 
     def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
         """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
-        base = self.model.base
-        if penetrating:
-            return base.strain(displacement, penetrating) - float(self.load @ displacement)
-        stretched = base.modes.omega * displacement
-        return 0.5 * float(stretched.dot(stretched)) - float(self.load @ displacement)
+        return self.model.base.strain(displacement, penetrating) - float(self.load @ displacement)
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""
@@ -202,7 +231,15 @@ class EventRule:
 
     def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
         """The state with the phase in which every contact stands; ``refused``: those that asked in vain."""
-        phases = [self._standing(state, contact) for contact in range(len(self._rigid))]
+        ends = self.ends(state.closed)
+        standing = [self._standing(state, contact) for contact in ends]
+        if all(phase is Phase.ARMED for phase in standing):
+            return replace(state, phases=self._armed)
+        phases = list(self._armed)
+        for contact, phase in zip(ends, standing, strict=True):
+            phases[contact] = phase
+        for contact in set(self.candidates(state.closed, tuple(phases))) - set(ends):
+            phases[contact] = self._standing(state, contact)
         for contact in refused:
             phases[contact] = Phase.ARMED if phases[contact] is Phase.ARMED else Phase.REFUSED
         return replace(state, phases=tuple(phases))
@@ -219,8 +256,19 @@ class EventRule:
             value, rate = state.finder.signs(table.signals(state.coefficients()))
         if value >= 0:
             return Phase.ARMED
-        pulls = self._rigid[contact] and contact in state.closed
-        return Phase.RECOVERING if rate > 0 and not pulls else Phase.REFUSED
+        stays = contact in self._viscous or (self._rigid[contact] and contact in state.closed)
+        return Phase.RECOVERING if rate > 0 and not stays else Phase.REFUSED
+
+    def _relaxing(self, state: State, contact: int) -> bool:
+        """Whether a viscous contact is open where closed it would pull."""
+        if contact not in self._viscous or contact in state.closed:
+            return False
+        force = self.entered_function(state.level, contact)
+        sign = force.sign(state.displacement, state.velocity)
+        if sign == 0:
+            table = SignalTable(state.basis, state.shapes, [force], [False])
+            (sign,) = state.finder.signs(table.signals(state.coefficients()))
+        return sign <= 0
 
     def _held(self, state: State, contacts: Iterable[int]) -> set[int]:
         """Those of these contacts that are rigid and closed."""
@@ -257,7 +305,11 @@ class EventRule:
         while asking:
             entered, loss = self._moved(state, self.level(asking.symmetric_difference(state.closed)))
             entered = self._with_phases(entered)
-            denied = {i for i in asking if entered.phases[i] is Phase.REFUSED and not self._rigid[i]}
+            denied = {
+                i
+                for i in asking
+                if entered.phases[i] is Phase.REFUSED and not self._rigid[i] and not self._relaxing(entered, i)
+            }
             if not denied:
                 break
             asking = asking - denied
@@ -287,7 +339,7 @@ class EventRule:
             after = self._at_rest_on(state, struck, compliant | closed)
             pulling = {i for i in closed if self._reaction_sign(state, struck, after.level, i) < (i in freed)}
             if not pulling:
-                dropped = self._loss(state, after, released, struck, plastic)
+                dropped = self._loss(state, after, released.kinetic - struck.kinetic, plastic)
                 break
             closed = closed - pulling
             after = struck
@@ -314,11 +366,24 @@ class EventRule:
         velocity = self.transition(struck.level, level).velocity(struck.velocity)
         return replace(state, level=level, displacement=displacement, velocity=velocity)
 
-    @staticmethod
-    def _loss(state: State, after: State, released: State, struck: State, plastic: Loss) -> Loss:
-        collided = released.kinetic - struck.kinetic
-        kinetic, strain = state.kinetic - after.kinetic - collided, state.potential - after.potential
-        return replace(plastic, truncation_kinetic=kinetic, truncation_strain=strain)
+    def _loss(self, state: State, after: State, collided: float = 0.0, plastic: Loss | None = None) -> Loss:
+        """What was lost between two states of one instant, the energy ``collided`` in an impact with its own loss."""
+        relaxed = self._relaxed(state, after) if self._viscous else 0.0
+        return replace(
+            plastic or Loss(),
+            truncation_kinetic=state.kinetic - after.kinetic - collided,
+            truncation_strain=state.potential - after.potential - relaxed,
+            damping=relaxed,
+        )
+
+    def _relaxed(self, state: State, after: State) -> float:
+        """Strain energy [J] of viscous contacts that opened inside their stop, less that of those that closed there."""
+        total = 0.0
+        for i in self._viscous:
+            opened = (i in state.closed) - (i in after.closed)
+            gap = state.level.gap(i, state.displacement) if opened else 0.0
+            total += opened * 0.5 * float(self.model.base.stiffnesses[i]) * gap**2
+        return total
 
     def _changes(
         self, state: State, striking: set[int], after: State, compliant: set[int], pushed: dict[int, float]
@@ -372,10 +437,18 @@ class EventRule:
         move = self.transition(state.level, level)
         displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
         after = replace(state, level=level, displacement=displacement, velocity=velocity)
-        return after, Loss(0.0, state.kinetic - after.kinetic, state.potential - after.potential)
+        return after, self._loss(state, after)
 
     def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
         """A state given in base coordinates, in a level's modes."""
         vectors = level.level.vectors.T
         eta = vectors @ (displacement - level.asymptotic.configuration)
         return State(level, eta, vectors @ velocity, (Phase.ARMED,) * len(self._rigid))
+
+
+def _ends(chain: tuple[int, ...], closed: set[int]) -> tuple[int, ...]:
+    """Last closed and first open spring of a chain; the whole chain where its closed springs are not the first ones."""
+    count = sum(i in closed for i in chain)
+    if not all(i in closed for i in chain[:count]):
+        return chain
+    return chain[max(count - 1, 0) : count + 1]

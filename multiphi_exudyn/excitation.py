@@ -28,7 +28,8 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.force_law import LawSpring
 from multiphi_exudyn.history import History, translated
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.loads import (
@@ -148,6 +149,7 @@ class _Channels:
         if isinstance(load, (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)):
             self._append(self._row(load.at), self._no_stop(), self._history(load.course))
         elif isinstance(load, StopMotion):
+            self._check_stop(load.contact)
             stop = self._no_stop()
             stop[self._model.index(load.contact)] = 1.0
             self._move(stop, load.course)
@@ -167,10 +169,18 @@ class _Channels:
         self._append(inertia, self._no_stop(), load.course.acceleration(self._end, self._finer))
         fixed = self._no_stop()
         for name in load.fixed_stops:
+            self._check_stop(name)
             i = self._model.index(name)
             fixed[i] = -float(structure.row(self._model.contacts[i].direction) @ moved)
         if np.any(fixed):
             self._move(fixed, load.course)
+
+    def _check_stop(self, name: str) -> None:
+        contact = self._model.contacts[self._model.index(name)]
+        if isinstance(contact, LawSpring):
+            raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
+        if contact.damping:
+            raise MultiPhiValueError(f"stop motion of {name!r}: got a viscous contact, need one without damping")
 
     def _move(self, stop: np.ndarray, course: Course) -> None:
         """Stops that move by their entries of (c,) times the course."""
@@ -215,7 +225,7 @@ def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:
 class ExtendedLevel(Level):
     """A level in the coordinates xi = (eta, w) (r + q): its rows and vectors have q more columns.
 
-    speeds: gap velocities (c, r + q) without the quasi-static part. omega and damping are zero on w.
+    speeds: gap velocities (c, r + q) without the quasi-static part. squares and damping are zero on w.
     """
 
     speeds: np.ndarray
@@ -253,12 +263,13 @@ class DrivenLevel(LoadedLevel):
             closed=own.closed,
             indices=own.indices,
             base=own.base,
-            omega=np.concatenate([own.omega, none]),
+            squares=np.concatenate([own.squares, none]),
             vectors=np.hstack([own.vectors, parts.shapes]),
             damping=np.pad(own.damping, (0, excitation.channels)),
             gap_rows=np.hstack([own.gap_rows, gap_columns]),
             force_rows=np.hstack([own.force_rows, parts.contact_force]),
             force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
+            neutral=own.neutral,
             speeds=np.hstack([own.gap_rows, speeds]),
         )
         return cls(
@@ -290,13 +301,14 @@ class DrivenLevel(LoadedLevel):
         return np.asarray(0.5 * np.sum(self.motion(velocity) ** 2, axis=0))
 
     def strain(self, displacement: np.ndarray) -> np.ndarray:
-        """Strain energy [J] of the structure and of its closed compliant contacts, for (r + q,) or every column."""
+        """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column."""
         base, index = self.level.base, list(self.level.indices)
         y = self.configuration(displacement)
         springs = base.stiffnesses[index]
         springs = np.where(np.isinf(springs), 0.0, springs)
         gaps = (self.level.gap_rows[index] @ displacement).T + self.gap_constants[index]
-        return np.asarray(0.5 * (np.sum((base.modes.omega * y.T) ** 2, axis=-1) + gaps**2 @ springs))
+        bent = 0.5 * (np.sum((base.modes.omega * y.T) ** 2, axis=-1) + gaps**2 @ springs)
+        return np.asarray(bent - y.T @ base.preload + base.datum)
 
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the loads [J] at their present values."""
@@ -369,7 +381,8 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     springs = np.where(rigid, 0.0, base.stiffnesses[index])
     stop_force = level.vectors.T @ (directions @ (springs[:, None] * stops))
     force = level.vectors.T @ excitation.patterns + stop_force
-    centre = np.divide(force, level.omega[:, None] ** 2, out=np.zeros_like(force), where=level.omega[:, None] > 0)
+    squares = level.squares[:, None]
+    centre = np.divide(force, squares, out=np.zeros_like(force), where=squares != 0)
     at_rest = [level.rest(excitation.patterns[:, k], -stops[:, k]) for k in range(excitation.channels)]
     held = [level.rest(np.zeros(base.modes.count), np.where(rigid, -stops[:, k], 0.0)) for k in range(len(at_rest))]
     carried = _columns([y for _, y in held], base.modes.count)
@@ -380,9 +393,12 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     pinned = directions[:, rigid]
     for k, derivative in enumerate(excitation.rate_of):
         if derivative >= 0 and np.any(carried[:, k]):
-            damped = base.damping @ carried[:, k]
+            damped = base.resistance(index) @ carried[:, k]
             force[:, derivative] -= level.vectors.T @ damped
             rate[:, derivative] -= level.vectors.T @ carried[:, k]
+            contact_force[~rigid, derivative] -= base.dampings[index][~rigid] * (
+                directions[:, ~rigid].T @ carried[:, k]
+            )
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
     return _Prescribed(shapes, carried, force, rate, stop_force, contact_force, contact_rate)

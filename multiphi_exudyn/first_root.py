@@ -38,6 +38,7 @@ RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's ty
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
 HERMITE = 1 / 384
 LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
+WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold no longer than twice this
 TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal this near to zero at another's root has its root there too
 
@@ -72,6 +73,7 @@ class DescentFinder:
         self._decay = np.minimum(basis.rates.real, 0.0)
         self._growth = np.maximum(basis.rates.real, 0.0)
         self._eternal = basis.pure and not np.any(self._growth)
+        self._window = WINDOW / np.max(self._growth) if np.any(self._growth) else math.inf
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
         self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
         self._tables: dict[float, _Table] = {}
@@ -82,14 +84,16 @@ class DescentFinder:
             return None
         constants: list[float] = signals.constants.tolist()
         while start < horizon:
-            bounds = self._bounds(signals.coefficients, start, 2 * horizon - start)  # a block may end behind it
+            until = min(horizon, start + self._window)
+            latest = 2 * until - start  # a block may end behind
+            bounds = self._bounds(signals.coefficients, start, latest)
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
             if not math.isfinite(bounds[0][0]):
                 raise NumericalFailure("the motion is not finite")
-            if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds)) is not None:
+            if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds, latest)) is not None:
                 return near if near.time <= horizon else None
-            step = self._step(constants, bounds, horizon - start)
+            step = self._step(constants, bounds, until - start)
             found = self._search_block(signals.coefficients, constants, bounds, start, step, horizon)
             if found is not None:
                 return found
@@ -141,8 +145,12 @@ class DescentFinder:
         bounds: list[list[float]] = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
         return bounds
 
-    def _near(self, coefficients: np.ndarray, constants: list[float], bounds: list[list[float]]) -> Descent | None:
+    def _near(
+        self, coefficients: np.ndarray, constants: list[float], bounds: list[list[float]], valid: float
+    ) -> Descent | None:
         """A first descent near t = 0 that Taylor's theorem certifies at once, None if it is not that plain.
+
+        valid: how long the bounds hold, for ever where nothing grows.
 
         2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
         """
@@ -155,6 +163,8 @@ class DescentFinder:
             if not (value > 0 and slope < 0 and 2 * value * bound[2] < slope**2):
                 continue
             latest = -2 * value / slope
+            if latest > valid and not self._eternal:
+                continue
             if all(
                 o == s or values[o] + constants[o] > bounds[o][1] * latest or slopes[o] > bounds[o][2] * latest
                 for o in range(len(constants))

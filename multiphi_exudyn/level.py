@@ -7,18 +7,26 @@ Every level lives in one :class:`Base`: coordinates y of the open structure's ow
 mass is the identity and the stiffness diag(Omega^2). A level is then a small dense problem whatever n is:
 
     closed rigid contacts      H_r^T y = -gap           modes in the null space of H_r^T
-    closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T
+    closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
 
-Its omega are singular values of [diag(Omega) Z; sqrt(k) H_c^T Z], Z an orthonormal null space: as accurate as the
-base's own (see modes.py). The asymptotic configuration x_inf,l holds gaps and static loads (38.5, completed by
-the static force), with the contact forces lambda_inf:
+Closed springs of one direction p, the chain of a force law, are one spring K q + G, q = p.y. Its total stiffness may
+be negative, and the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ exp(+-|omega| t)).
 
-    y_e = Omega_e^-2 (f_e + H_e lambda),   H^T y + lambda / k = -gap,   H_0 lambda + f_0 = 0
+The omega of springs K > 0 are singular values of [diag(Omega) Z; sqrt(K) P^T Z], Z an orthonormal null space: as
+accurate as the base's own (see modes.py). Springs K < 0 follow on these modes, w = sqrt|K| Phi^T p, as
+
+    omega^2 + mu - W W^T = (R B)^T R B,   B = diag(omega^2 + mu)^1/2,   R^T R = I - (B^-1 W)(B^-1 W)^T
+
+again by singular values; mu = 0 unless the level is indefinite or nearly so. The asymptotic configuration x_inf,l
+holds gaps and static loads (38.5, completed by the static force), with the forces f along the directions:
+
+    y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
 
 (e elastic, 0 rigid-body coordinates). Where no closed contact resists a rigid-body motion, the load on it drives
 the level's zero-frequency modes.
 
-Each added contact interlaces: omega_i(open) <= omega_i(level) <= omega_i+c(open); asserted when a level is built.
+Each direction of positive stiffness added interlaces: omega_i(open) <= omega_i(level) <= omega_i+c(open), one of
+negative stiffness downwards; asserted when a level is built.
 """
 
 from __future__ import annotations
@@ -32,14 +40,26 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.first_root import ZERO, DescentFinder
+from multiphi_exudyn.force_law import Contact, ForceLaw, LawSpring
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import Modes, complete_modes, lowest_modes, right_singular_vectors
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping, real_array
 
-__all__ = ["BASE_MARGIN", "Asymptotic", "Base", "Level", "LevelOverride", "build_base", "build_level", "cleared"]
+__all__ = [
+    "BASE_MARGIN",
+    "Asymptotic",
+    "Base",
+    "Level",
+    "LevelOverride",
+    "Supports",
+    "build_base",
+    "build_level",
+    "cleared",
+    "rays_of",
+    "rest",
+]
 
 BASE_MARGIN = 4  # modes of an incomplete base for each mode of a level taken from it
 COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and static shapes
@@ -47,6 +67,9 @@ ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 INDEPENDENT = 1e-10  # of the largest: singular values of contact directions below it are dependent contacts
+CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
+NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
+NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
 
 
 @dataclass(frozen=True)
@@ -80,7 +103,7 @@ class Base:
     modes: Modes
     damping: np.ndarray
     directions: np.ndarray
-    contacts: tuple[UnilateralContact, ...]
+    contacts: tuple[Contact, ...]
     complete: bool
     weights: np.ndarray
 
@@ -99,12 +122,108 @@ class Base:
         """Contact stiffnesses (c,) [N/m], inf where rigid."""
         return np.array([contact.stiffness for contact in self.contacts])
 
-    def strain(self, configuration: np.ndarray, closed: Sequence[int]) -> float:
-        """Strain energy [J] of y (m,) and of the compliant ones among these closed contacts."""
+    @functools.cached_property
+    def dampings(self) -> np.ndarray:
+        """Contact dampings (c,) [N s/m]."""
+        return np.array([contact.damping for contact in self.contacts])
+
+    @functools.cached_property
+    def rays(self) -> list[int]:
+        """``rays_of`` the contacts."""
+        return rays_of(self.contacts)
+
+    @functools.cached_property
+    def signs(self) -> np.ndarray:
+        """Sign (c,) of every contact's direction to the one of its ray."""
+        sides = [c.side if isinstance(c, LawSpring) else 1 for c in self.contacts]
+        return np.array([side * sides[ray] for side, ray in zip(sides, self.rays, strict=True)])
+
+    @functools.cached_property
+    def laws(self) -> dict[int, ForceLaw]:
+        """Every force law by the position of its first spring."""
+        given = ((i, self.contacts[i]) for i in sorted(set(self.rays)))
+        return {i: contact.law for i, contact in given if isinstance(contact, LawSpring)}
+
+    @functools.cached_property
+    def preload(self) -> np.ndarray:
+        """Load (m,) of the constant forces of all force laws."""
+        total = np.zeros(self.modes.count)
+        for i, law in self.laws.items():
+            total += law.constant * law.springs[0].side * self.directions[:, i]
+        return total
+
+    @functools.cached_property
+    def datum(self) -> float:
+        """Strain energy [J] of the constant forces of all force laws at q = 0: a law has none at its centre."""
+        return -sum(law.constant * law.centre for law in self.laws.values())
+
+    def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray | None = None) -> float:
+        """Strain energy [J] of y (m,), of the compliant ones among these closed contacts, and of constant forces.
+
+        gaps: (c,) of all contacts, None for their own.
+        """
         index = list(closed)
-        closing = self.gaps[index] + self.directions[:, index].T @ configuration
+        closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
         springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
-        return 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
+        bent = 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
+        return bent - float(self.preload @ configuration) + self.datum
+
+    def resistance(self, closed: Sequence[int]) -> np.ndarray:
+        """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""
+        viscous = [i for i in closed if self.dampings[i]]
+        if not viscous:
+            return self.damping
+        directions = self.directions[:, viscous]
+        return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
+
+    def supports(self, closed: Sequence[int], gaps: np.ndarray) -> Supports:
+        """Closed contacts with their gaps (k,), those of one direction taken together."""
+        rays: dict[int, list[int]] = {}
+        given = dict(zip(closed, gaps.tolist(), strict=True))
+        for i in closed:
+            rays.setdefault(self.rays[i], []).append(i)
+        stiffness, offsets = np.zeros((2, len(rays)))
+        for j, members in enumerate(rays.values()):
+            k, signed = self.stiffnesses[members], self.signs[members] * [given[i] for i in members]
+            stiffness[j] = np.sum(k)
+            if len(members) == 1:
+                offsets[j] = signed[0]
+                continue
+            if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
+                stiffness[j] = 0.0
+            offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
+        together = tuple(tuple(members) for members in rays.values())
+        return Supports(together, self.directions[:, list(rays)], stiffness, offsets)
+
+
+@dataclass(frozen=True)
+class Supports:
+    """What closed contacts are along each of their d directions p.
+
+    members: the contacts of each. directions: (m, d). stiffness: K (d,) [N/m], inf where rigid.
+    offsets: (d,) G / K [m], the gap of a single contact; G [N] where K is zero.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    directions: np.ndarray
+    stiffness: np.ndarray
+    offsets: np.ndarray
+
+    @property
+    def rigid(self) -> np.ndarray:
+        """(d,) bool."""
+        return np.isinf(self.stiffness)
+
+    @property
+    def resisting(self) -> np.ndarray:
+        """Directions (m, .) in which there is a stiffness."""
+        return self.directions[:, self.stiffness != 0]
+
+    @property
+    def constants(self) -> np.ndarray:
+        """G (d,) [N], zero where rigid."""
+        finite = np.where(self.rigid | (self.stiffness == 0), 1.0, self.stiffness)
+        return np.where(self.rigid, 0.0, finite * self.offsets)
 
 
 @dataclass(frozen=True)
@@ -129,30 +248,38 @@ class Level:
     """One level; see the module's docstring. Built by ``MultiPhiModel.level``.
 
     closed: names of its closed contacts. indices: the same as positions in the base. base: its coordinates.
-    omega: (r,) rad/s. vectors: modes in base coordinates (m, r), orthonormal. damping: (r, r) [1/s].
+    squares: omega^2 (r,) [rad2/s2], ascending, negative for growing modes. vectors: modes in base coordinates (m, r),
+    orthonormal. damping: (r, r) [1/s].
     gap_rows: (c, r), gap_i = gap_rows[i].eta + ... for every contact of the model.
     force_rows, force_rate_rows: (k, r), contact force of the closed contacts from eta and eta'.
+    neutral: (m, z), the zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
     """
 
     closed: tuple[str, ...]
     indices: tuple[int, ...]
     base: Base
-    omega: np.ndarray
+    squares: np.ndarray
     vectors: np.ndarray
     damping: np.ndarray
     gap_rows: np.ndarray
     force_rows: np.ndarray
     force_rate_rows: np.ndarray
+    neutral: np.ndarray
 
     @property
     def modes(self) -> int:
         """Number of modes r."""
-        return len(self.omega)
+        return len(self.squares)
+
+    @functools.cached_property
+    def omega(self) -> np.ndarray:
+        """Rates (r,) [rad/s] of oscillation, or of growth where ``squares`` is negative."""
+        return np.sqrt(np.abs(self.squares))
 
     @property
     def frequencies(self) -> np.ndarray:
-        """Undamped natural frequencies (r,) [Hz]."""
-        return self.omega / (2 * math.pi)
+        """Undamped natural frequencies (r,) [Hz]; for a growing mode minus its rate of growth over 2 pi."""
+        return np.sign(self.squares) * self.omega / (2 * math.pi)
 
     @functools.cached_property
     def highest_frequency(self) -> float:
@@ -161,7 +288,7 @@ class Level:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Damping ratios (r,), diagonal of the projected damping over 2 omega; zero for rigid-body modes."""
+        """Damping ratios (r,), diagonal of the projected damping over 2 |omega|; zero for rigid-body modes."""
         doubled = np.where(self.omega > 0, 2 * self.omega, np.inf)
         return np.diagonal(self.damping) / doubled
 
@@ -184,7 +311,7 @@ class Level:
     @functools.cached_property
     def response(self) -> ModalResponse:
         """Closed form of the level's motion."""
-        return modal_response(self.omega, self.damping)
+        return modal_response(self.squares, self.damping)
 
     @functools.cached_property
     def finder(self) -> DescentFinder:
@@ -195,7 +322,7 @@ class Level:
         """The same level with its lowest ``modes`` modes."""
         return replace(
             self,
-            omega=self.omega[:modes],
+            squares=self.squares[:modes],
             vectors=self.vectors[:, :modes],
             damping=self.damping[:modes, :modes],
             gap_rows=self.gap_rows[:, :modes],
@@ -205,32 +332,75 @@ class Level:
 
     def overridden(self, override: LevelOverride) -> Level:
         """The same mode shapes with given frequencies and ratios."""
-        omega, damping = self.omega.copy(), self.damping.copy()
+        squares, damping = self.squares.copy(), self.damping.copy()
         if override.frequencies is not None:
             given = 2 * math.pi * np.asarray(override.frequencies, dtype=float)[: self.modes]
-            omega[: len(given)] = given
+            squares[: len(given)] = given**2
         if override.ratios is not None:
             ratios = np.asarray(override.ratios, dtype=float)[: self.modes]
             damping[: len(ratios), :] = damping[:, : len(ratios)] = 0.0
-            damping[np.arange(len(ratios)), np.arange(len(ratios))] = 2 * ratios * omega[: len(ratios)]
-        return replace(self, omega=omega, damping=damping)
+            doubled = 2 * np.sqrt(np.abs(squares[: len(ratios)]))
+            damping[np.arange(len(ratios)), np.arange(len(ratios))] = ratios * doubled
+        return replace(self, squares=squares, damping=damping)
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
-        """State of rest under a static load (m,) in base coordinates."""
-        base, index = self.base, list(self.indices)
-        forces, configuration = self.rest(load, base.gaps[index])
-        projected = self.vectors.T @ load
-        drive = np.where(self.omega > 0, 0.0, projected + self.vectors.T @ (base.directions[:, index] @ forces))
-        strain = base.strain(configuration, index)
-        return Asymptotic(configuration, forces, drive, projected, strain, strain - float(load @ configuration))
+        """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
+        base, gaps = self.base, self.base.gaps[list(self.indices)]
+        supports = base.supports(self.indices, gaps)
+        along, configuration, pushing = self._rest(supports, load + base.preload)
+        strain = base.strain(configuration, self.indices)
+        return Asymptotic(
+            configuration=configuration,
+            forces=self._forces(supports, along, configuration, gaps),
+            drive=np.where(self.squares != 0, 0.0, self.vectors.T @ pushing),
+            load=self.vectors.T @ load,
+            strain=strain,
+            potential=strain - float(load @ configuration),
+        )
 
     def rest(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
+        supports = self.base.supports(self.indices, gaps)
+        along, configuration, _ = self._rest(supports, load)
+        return self._forces(supports, along, configuration, gaps), configuration
+
+    def _rest(self, supports: Supports, total: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(f, y, what drives zero-frequency modes) under a load (m,)."""
+        if self.neutral.size:
+            return self._neutral_rest(supports, total)
+        along, configuration = rest(self.base, supports, total)
+        return along, configuration, total + supports.directions @ along
+
+    def _neutral_rest(self, supports: Supports, total: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of some mode exactly."""
+        if np.any(supports.rigid):
+            raise NumericalFailure(
+                f"level {', '.join(self.closed)}: negative stiffness cancels that of a mode beside closed rigid "
+                "contacts, so there is no state of rest"
+            )
+        pushing = total - supports.directions @ supports.constants
+        _, found = rest(self.base, supports, total - self.neutral @ (self.neutral.T @ pushing))
+        configuration = found - self.neutral @ (self.neutral.T @ found)
+        return (
+            -supports.constants - supports.stiffness * (supports.directions.T @ configuration),
+            configuration,
+            pushing,
+        )
+
+    def _forces(self, supports: Supports, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """lambda (k,) of the closed contacts from the forces along their directions; of a chain from its gaps."""
         base, index = self.base, list(self.indices)
-        return _rest(base, base.directions[:, index], gaps, base.stiffnesses[index], load)
+        closing = base.directions[:, index].T @ configuration + gaps
+        forces = np.zeros(len(index))
+        for members, force in zip(supports.members, along, strict=True):
+            places = [self.indices.index(i) for i in members]
+            alone = len(members) == 1
+            springs = base.stiffnesses[list(members)]
+            forces[places] = base.signs[list(members)] * force if alone else -springs * closing[places]
+        return forces
 
 
-def build_base(structure: LinearStructure, contacts: Sequence[UnilateralContact], modes: int | str) -> Base:
+def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> Base:
     """The base of a structure: all its modes where that is affordable, else enough for ``modes`` of any level."""
     rows = np.array([structure.row(contact.direction) for contact in contacts]).reshape(-1, structure.n)
     complete = structure.n <= COMPLETE or modes == "all"
@@ -239,7 +409,8 @@ def build_base(structure: LinearStructure, contacts: Sequence[UnilateralContact]
     else:
         points = np.array(list(structure.points.values())).reshape(-1, structure.n)
         count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
-        found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([rows, points]))
+        distinct = rows[sorted(set(rays_of(contacts)))]
+        found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))
     return Base(
         modes=found,
         damping=_base_damping(structure, found),
@@ -250,35 +421,37 @@ def build_base(structure: LinearStructure, contacts: Sequence[UnilateralContact]
     )
 
 
+def rays_of(contacts: Sequence[Contact]) -> list[int]:
+    """For every contact the first one of the same direction up to its sign: itself, or its law's first spring."""
+    first: dict[ForceLaw, int] = {}
+    return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
+
+
 def build_level(base: Base, indices: tuple[int, ...]) -> Level:
     """The level with these contacts closed, with every mode the base can give."""
     closed = list(indices)
-    rigid = np.isinf(base.stiffnesses[closed])
-    directions = base.directions[:, closed]
-    pinned, sprung = directions[:, rigid], directions[:, ~rigid]
-    free = _null_space(base, pinned, [base.contacts[i].name for i in np.array(closed, int)[rigid]])
-    stiffness = base.stiffnesses[closed][~rigid]
-    stacked = np.vstack([base.modes.omega[:, None] * free, np.sqrt(stiffness)[:, None] * (sprung.T @ free)])
-    omega, rotation = right_singular_vectors(stacked) if closed else (base.modes.omega, np.eye(base.modes.count))
-    omega[: _rigid_body_modes(base, directions)] = 0.0
-    vectors = free @ rotation if closed else rotation
-    _check(base, omega, vectors, len(closed))
-    forces = np.zeros((len(closed), len(omega)))
-    rates = np.zeros_like(forces)
-    forces[~rigid] = -stiffness[:, None] * (sprung.T @ vectors)
-    if np.any(rigid):
-        forces[rigid] = _reaction_rows(base, pinned, omega, vectors, sprung @ forces[~rigid])
-        rates[rigid] = np.linalg.lstsq(pinned, base.damping @ vectors, rcond=None)[0]
+    supports = base.supports(closed, base.gaps[closed])
+    pinned = supports.directions[:, supports.rigid]
+    free = _null_space(base, pinned, [base.contacts[i].name for i in closed if base.contacts[i].rigid])
+    squares, vectors, accuracy = _modes(base, supports, free) if closed else (base.modes.omega**2, free, 0.0)
+    rigid_body = _rigid_body_modes(base, supports)
+    squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
+    squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
+    zero = squares == 0
+    _check(base, squares, vectors, supports, accuracy)
+    damping = base.resistance(closed)
+    forces, rates = _force_rows(base, closed, squares, vectors, damping)
     return Level(
         closed=tuple(base.contacts[i].name for i in closed),
         indices=indices,
         base=base,
-        omega=omega,
+        squares=squares,
         vectors=vectors,
-        damping=_projected_damping(base, omega, vectors),
+        damping=_projected_damping(damping, squares, vectors),
         gap_rows=cleared(base.directions.T @ vectors, np.abs(base.directions.T) @ np.abs(vectors)),
         force_rows=forces,
         force_rate_rows=rates,
+        neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
     )
 
 
@@ -288,6 +461,57 @@ def cleared(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     The gap of a contact that another one holds does not move; what is left of it has no sign.
     """
     return np.where(np.abs(sums) <= ZERO * sizes, 0.0, sums)
+
+
+def _modes(base: Base, supports: Supports, free: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """omega^2 ascending, modes (m, r) in the motions ``free`` (m, r), and the mu that limits their accuracy."""
+    directions, stiffness = supports.directions, supports.stiffness
+    stiffening, softening = (stiffness > 0) & ~supports.rigid, stiffness < 0
+    springs = np.sqrt(stiffness[stiffening])[:, None] * (directions[:, stiffening].T @ free)
+    omega, rotation = right_singular_vectors(np.vstack([base.modes.omega[:, None] * free, springs]))
+    squares, vectors = omega**2, free @ rotation
+    if not np.any(softening):
+        return squares, vectors, 0.0
+    return _softened(squares, vectors, (vectors.T @ directions[:, softening]) * np.sqrt(-stiffness[softening]))
+
+
+def _softened(squares: np.ndarray, vectors: np.ndarray, pull: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """``_modes`` of diag(squares) - W W^T, W = ``pull`` (r, s)."""
+    shift = 0.0 if _share(squares, pull) <= NEARLY_INDEFINITE else 2 * float(np.linalg.norm(pull, 2)) ** 2
+    while shift and _share(squares + shift / 2, pull) <= NEARLY_INDEFINITE:
+        shift /= 2
+    root = np.sqrt(squares + shift)
+    left, taken, _ = np.linalg.svd(_divided(pull, root), full_matrices=False)
+    factor = np.diag(root) - (left * (1 - np.sqrt(1 - taken**2))) @ (left.T * root)
+    omega, rotation = right_singular_vectors(factor)
+    return (omega - math.sqrt(shift)) * (omega + math.sqrt(shift)), vectors @ rotation, shift
+
+
+def _share(squares: np.ndarray, pull: np.ndarray) -> float:
+    """Largest eigenvalue of B^-1 W W^T B^-1, B^2 = diag(squares): above 1 negative springs win."""
+    if np.any((squares <= 0)[:, None] & (pull != 0)):
+        return math.inf
+    return float(np.linalg.norm(_divided(pull, np.sqrt(squares)), 2)) ** 2
+
+
+def _divided(pull: np.ndarray, root: np.ndarray) -> np.ndarray:
+    return pull / np.where(root > 0, root, 1.0)[:, None]
+
+
+def _force_rows(
+    base: Base, closed: list[int], squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Contact forces of the closed contacts from eta and eta', (k, r) each."""
+    rigid = np.isinf(base.stiffnesses[closed])
+    forces = np.zeros((len(closed), len(squares)))
+    rates = np.zeros_like(forces)
+    pinned, sprung = base.directions[:, closed][:, rigid], base.directions[:, closed][:, ~rigid]
+    forces[~rigid] = -base.stiffnesses[closed][~rigid][:, None] * (sprung.T @ vectors)
+    rates[~rigid] = -base.dampings[closed][~rigid][:, None] * (sprung.T @ vectors)
+    if np.any(rigid):
+        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, sprung @ forces[~rigid])
+        rates[rigid] = np.linalg.lstsq(pinned, damping @ vectors, rcond=None)[0]
+    return forces, rates
 
 
 def _dense(matrix: Matrix) -> np.ndarray:
@@ -307,13 +531,13 @@ def _base_damping(structure: LinearStructure, modes: Modes) -> np.ndarray:
     return (projected + projected.T) / 2
 
 
-def _projected_damping(base: Base, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own."""
-    damping: np.ndarray = vectors.T @ base.damping @ vectors
-    free = omega == 0
-    negligible = np.abs(damping) <= UNDAMPED * np.max(np.abs(base.damping), initial=0.0)
-    damping[negligible & (free[:, None] | free[None, :])] = 0.0
-    return damping
+    projected: np.ndarray = vectors.T @ damping @ vectors
+    free = squares == 0
+    negligible = np.abs(projected) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    projected[negligible & (free[:, None] | free[None, :])] = 0.0
+    return projected
 
 
 def _null_space(base: Base, pinned: np.ndarray, names: list[str]) -> np.ndarray:
@@ -327,40 +551,42 @@ def _null_space(base: Base, pinned: np.ndarray, names: list[str]) -> np.ndarray:
     return orthogonal[:, pinned.shape[1] :]
 
 
-def _rigid_body_modes(base: Base, directions: np.ndarray) -> int:
+def _rigid_body_modes(base: Base, supports: Supports) -> int:
     """Rigid-body motions that no closed contact resists."""
-    rigid = directions[: base.modes.rigid]
+    rigid = supports.resisting[: base.modes.rigid]
     if rigid.size == 0:
         return base.modes.rigid
     singular = np.linalg.svd(rigid, compute_uv=False)
-    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * _largest_norm(directions)))
+    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * _largest_norm(supports.resisting)))
 
 
 def _reaction_rows(
-    base: Base, pinned: np.ndarray, omega: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
+    base: Base, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
 ) -> np.ndarray:
     """Reaction of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho, solved for rho (c, r).
 
-    Weighted by 1 / (Omega^2 + omega^2), in which no mode of the base outweighs the others.
+    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
     """
     squared = base.modes.omega[:, None] ** 2
-    rows = np.zeros((pinned.shape[1], len(omega)))
-    for k in range(len(omega)):
-        total = squared[:, 0] + omega[k] ** 2
+    rows = np.zeros((pinned.shape[1], len(squares)))
+    for k in range(len(squares)):
+        total = squared[:, 0] + abs(squares[k])
         weight = 1 / np.where(total > 0, total, np.min(total[total > 0], initial=np.inf))
         weight = np.where(np.any(total > 0), weight, 1.0)
-        residual = (squared[:, 0] - omega[k] ** 2) * vectors[:, k] - spring_forces[:, k]
+        residual = (squared[:, 0] - squares[k]) * vectors[:, k] - spring_forces[:, k]
         rows[:, k] = np.linalg.solve(pinned.T @ (weight[:, None] * pinned), pinned.T @ (weight * residual))
     return rows
 
 
-def _check(base: Base, omega: np.ndarray, vectors: np.ndarray, closed: int) -> None:
+def _check(base: Base, squares: np.ndarray, vectors: np.ndarray, supports: Supports, accuracy: float) -> None:
     """Mass normalisation and interlacing."""
-    error = np.max(np.abs(vectors.T @ vectors - np.eye(len(omega))), initial=0.0)
-    open_omega = base.modes.omega
-    slack = INTERLACING * open_omega + np.finfo(float).eps * np.max(open_omega, initial=0.0)
-    below, above = (open_omega - slack)[: len(omega)], (open_omega + slack)[closed:]
-    interlaced = np.all(omega >= below) and np.all(omega[: len(above)] <= above)
+    error = np.max(np.abs(vectors.T @ vectors - np.eye(len(squares))), initial=0.0)
+    stiffening, softening = int(np.sum(supports.stiffness > 0)), int(np.sum(supports.stiffness < 0))
+    given = base.modes.omega**2
+    slack = INTERLACING * (given + accuracy) + np.finfo(float).eps * np.max(given, initial=0.0)
+    below, above = (given - slack)[: len(squares) - softening], (given + slack)[stiffening:]
+    count = min(len(above), len(squares))
+    interlaced = np.all(squares[softening:] >= below) and np.all(squares[:count] <= above[:count])
     if not (error <= ORTHONORMAL and interlaced):
         raise NumericalFailure(
             f"level: its modes fail their invariants (mass normalisation off by {error:g}, "
@@ -368,23 +594,33 @@ def _check(base: Base, omega: np.ndarray, vectors: np.ndarray, closed: int) -> N
         )
 
 
-def _rest(
-    base: Base, directions: np.ndarray, gaps: np.ndarray, stiffness: np.ndarray, load: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Contact forces (k,) and configuration y (m,) at rest, rigid-body motion nobody resists left out."""
-    elastic = slice(base.modes.rigid, None)
+def rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (d,) along the supports and configuration y (m,) at rest, motion nobody resists left out."""
+    elastic, free = slice(base.modes.rigid, None), slice(base.modes.rigid)
     compliance = base.modes.omega[elastic] ** -2.0
-    touching = directions[elastic]
-    flexibility = touching.T @ (compliance[:, None] * touching) + np.diag(1 / stiffness)
-    carried = _range(directions[: base.modes.rigid], INDEPENDENT * _largest_norm(directions))
-    coupling = directions[: base.modes.rigid].T @ carried
-    matrix = np.block([[flexibility, coupling], [coupling.T, np.zeros((carried.shape[1],) * 2)]])
-    given = np.concatenate([-gaps - touching.T @ (compliance * load[elastic]), -carried.T @ load[: base.modes.rigid]])
-    solution = np.linalg.solve(matrix, given)
-    forces, rigid = solution[: len(gaps)], solution[len(gaps) :]
+    touching = supports.directions[elastic]
+    sprung = supports.stiffness != 0  # the others push with G, whatever y is
+    own = np.where(sprung, 1 / np.where(sprung, supports.stiffness, 1.0), 1.0)
+    flexibility = sprung[:, None] * (touching.T @ (compliance[:, None] * touching)) + np.diag(own)
+    carried = _range(supports.resisting[free], INDEPENDENT * _largest_norm(supports.resisting))
+    coupling = supports.directions[free].T @ carried
+    none = np.zeros((carried.shape[1],) * 2)
+    matrix = np.block([[flexibility, sprung[:, None] * coupling], [coupling.T, none]])
+    pressed = -supports.offsets - sprung * (touching.T @ (compliance * load[elastic]))
+    given = np.concatenate([pressed, -carried.T @ load[free]])
+    solution = _solved(matrix, given)
+    forces, rigid = solution[: len(own)], solution[len(own) :]
     total = cleared(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
     configuration = np.concatenate([carried @ rigid, compliance * total])
     return forces, configuration
+
+
+def _solved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """The solution, the smallest one where the matrix is singular: springs that cancel, under a load they allow."""
+    try:
+        return np.linalg.solve(matrix, given)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(matrix, given, rcond=None)[0]
 
 
 def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:

@@ -1,11 +1,11 @@
 """Exact free response of modal equations, as sums of exponentials.
 
-    eta'' + D eta' + diag(omega^2) eta = p,   p constant on zero-frequency modes, zero on the others
+    eta'' + D eta' + diag(omega^2) eta = p,   p constant on modes with omega = 0, zero on the others
     eta(t) = Re sum_j V_j c_j t^d_j exp(lambda_j t),   c = A eta(0) + B eta'(0) + P p
 
-D [1/s] is diagonal for proportional damping: then each mode has its own closed form (underdamped,
-overdamped, nearly critical by a Taylor polynomial, zero frequency). Where D couples the modes, the
-lambda_j are the complex eigenvalues of the 2r x 2r first-order system. A conjugate pair is kept once,
+omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: then each mode has its own closed
+form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). Where D couples the
+modes, the lambda_j are the complex eigenvalues of the 2r x 2r first-order system. A conjugate pair is kept once,
 with its weight doubled. Constant forces on modes of non-zero frequency belong to the asymptotic
 configuration, not here.
 """
@@ -161,8 +161,8 @@ class ModalResponse:
         return 0.5 * float(np.sum(total.real))
 
 
-def modal_response(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
-    """Closed form for frequencies omega (r,) [rad/s] and damping D (r, r) [1/s].
+def modal_response(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D (r, r) [1/s].
 
     Raises NumericalFailure where coupled damping leaves no complete set of complex modes.
     """
@@ -170,13 +170,13 @@ def modal_response(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
     scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
     off_diagonal = damping - np.diag(diagonal)
     if np.all(np.abs(off_diagonal) <= DIAGONAL * np.maximum(scale, np.max(scale, initial=0.0) * DIAGONAL)):
-        return _uncoupled(omega, diagonal)
-    return _coupled(omega, damping)
+        return _uncoupled(squares, diagonal)
+    return _coupled(squares, damping)
 
 
-def _uncoupled(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
-    terms = [term for k in range(len(omega)) for term in _mode_terms(k, omega[k], damping[k] / 2)]
-    p, r = len(terms), len(omega)
+def _uncoupled(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2)]
+    p, r = len(terms), len(squares)
     shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
     for j, (k, _, _, weights) in enumerate(terms):
         shapes[k, j] = 1.0
@@ -188,10 +188,13 @@ def _uncoupled(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
 Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
 
 
-def _mode_terms(k: int, omega: float, delta: float) -> list[Term]:
-    """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p."""
-    if omega == 0.0:
+def _mode_terms(k: int, square: float, delta: float) -> list[Term]:
+    """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
+    if square == 0.0:
         return _free_terms(k, delta)
+    if square < 0:
+        return _growing_terms(k, square, delta)
+    omega = np.sqrt(square)
     difference = (delta - omega) * (delta + omega)
     root = np.sqrt(abs(difference))
     if root <= NEARLY_CRITICAL * omega:
@@ -208,6 +211,17 @@ def _mode_terms(k: int, omega: float, delta: float) -> list[Term]:
     ]
 
 
+def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
+    """Terms of omega^2 < 0, delta >= 0: one rate grows and one decays, the smaller of them from their product."""
+    decaying = -(delta + np.sqrt(delta**2 - square))
+    growing = square / decaying
+    difference = growing - decaying
+    return [
+        (k, growing, 0, (-decaying / difference, 1 / difference, 0.0)),
+        (k, decaying, 0, (growing / difference, -1 / difference, 0.0)),
+    ]
+
+
 def _free_terms(k: int, delta: float) -> list[Term]:
     """Terms of eta'' + 2 delta eta' = p."""
     if delta == 0.0:
@@ -220,24 +234,24 @@ def _free_terms(k: int, delta: float) -> list[Term]:
     ]
 
 
-def _coupled(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+def _coupled(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
     """Undamped rigid-body modes on their own, all others by their complex modes."""
-    alone = (omega == 0) & ~np.any(damping, axis=1)
+    alone = (squares == 0) & ~np.any(damping, axis=1)
     if not np.any(alone):
-        return _complex_modes(omega, damping)
+        return _complex_modes(squares, damping)
     together = ~alone
     parts = (
-        _uncoupled(omega[alone], np.zeros(int(np.sum(alone)))),
-        _complex_modes(omega[together], damping[np.ix_(together, together)]),
+        _uncoupled(squares[alone], np.zeros(int(np.sum(alone)))),
+        _complex_modes(squares[together], damping[np.ix_(together, together)]),
     )
-    return _side_by_side(parts, (np.flatnonzero(alone), np.flatnonzero(together)), len(omega))
+    return _side_by_side(parts, (np.flatnonzero(alone), np.flatnonzero(together)), len(squares))
 
 
-def _complex_modes(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
-    """Complex modes of z' = S z, z = (omega eta, eta'); zero-frequency modes are carried as eta itself."""
-    r = len(omega)
-    scale = np.where(omega > 0, omega, 1.0)
-    system = np.block([[np.zeros((r, r)), np.diag(scale)], [-np.diag(omega**2 / scale), -damping]])
+def _complex_modes(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    """Complex modes of z' = S z, z = (|omega| eta, eta'); zero-frequency modes are carried as eta itself."""
+    r = len(squares)
+    scale = np.where(squares != 0, np.sqrt(np.abs(squares)), 1.0)
+    system = np.block([[np.zeros((r, r)), np.diag(scale)], [-np.diag(squares / scale), -damping]])
     rates, vectors = (found.astype(complex) for found in np.linalg.eig(system))  # eig gives real ones where all decay
     if not np.linalg.cond(vectors) < WORST_CONDITION:
         raise NumericalFailure(
@@ -250,7 +264,7 @@ def _complex_modes(omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
     from_displacement, from_velocity = maps[:, :r] * scale, maps[:, r:]
     none = np.zeros_like(from_velocity)
     response = ModalResponse(basis, vectors[:r, kept] / scale[:, None], from_displacement, from_velocity, none, False)
-    return _with_drift(response, omega, damping) if np.any(omega == 0) else response
+    return _with_drift(response, squares, damping) if np.any(squares == 0) else response
 
 
 def _real_part_inverse(vectors: np.ndarray, paired: np.ndarray) -> np.ndarray:
@@ -267,20 +281,20 @@ def _real_part_inverse(vectors: np.ndarray, paired: np.ndarray) -> np.ndarray:
     return coefficients
 
 
-def _with_drift(response: ModalResponse, omega: np.ndarray, damping: np.ndarray) -> ModalResponse:
+def _with_drift(response: ModalResponse, squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
     """Adds the motion u + w t of damped zero-frequency modes under a constant force: diag(omega^2) u + D w = p."""
-    free = np.flatnonzero(omega == 0)
-    unknowns = np.diag(omega**2)
+    free = np.flatnonzero(squares == 0)
+    unknowns = np.diag(squares)
     unknowns[:, free] = damping[:, free]
-    solution = np.linalg.solve(unknowns, np.eye(len(omega))[:, free])
+    solution = np.linalg.solve(unknowns, np.eye(len(squares))[:, free])
     drift = np.zeros_like(solution)
     drift[free] = solution[free]
     offset = solution - drift
     count, p = len(free), len(response.basis.rates)
     rates = np.concatenate([response.basis.rates, np.zeros(3 * count)])
     powers = np.concatenate([response.basis.powers, np.tile([0, 0, 1], count)])  # u, then w t with its derivative w
-    added = np.stack([offset, drift, drift], axis=2).reshape(len(omega), 3 * count)
-    maps = [np.vstack([m, np.zeros((3 * count, len(omega)))]) for m in _maps(response)]
+    added = np.stack([offset, drift, drift], axis=2).reshape(len(squares), 3 * count)
+    maps = [np.vstack([m, np.zeros((3 * count, len(squares)))]) for m in _maps(response)]
     maps[2][:p, free] = -(response.from_displacement @ offset + response.from_velocity @ drift)
     maps[2][p : p + 3 * count : 3, free] = maps[2][p + 2 : p + 3 * count : 3, free] = np.eye(count)
     shapes = np.hstack([response.shapes, added])

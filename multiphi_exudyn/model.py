@@ -12,8 +12,10 @@ import numpy as np
 import scipy.optimize
 
 from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.equilibrium import equilibrium
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level
+from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
+from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level, rays_of
 from multiphi_exudyn.structure import LinearStructure, is_real
 
 __all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
@@ -54,8 +56,9 @@ class Tolerance:
 class MultiPhiModel:
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
-    structure: M, C, K and points. contacts: rigid or compliant, any number; with c contacts there are 2^c levels,
-    of which only those asked for are built.
+    structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws; kept with every law by its
+    chain of springs. With c contacts there are 2^c levels, and for every law as many times that as it has segments, of
+    which only those asked for are built.
     modes: r of every level, or "all"; or ``UpTo`` a frequency; or a ``Tolerance``, from which ``simulate`` finds that
     frequency. Levels are truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
@@ -63,7 +66,7 @@ class MultiPhiModel:
     """
 
     structure: LinearStructure
-    contacts: Sequence[UnilateralContact] = ()
+    contacts: Sequence[Given] = ()
     modes: int | str | UpTo | Tolerance = 6
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -93,19 +96,44 @@ class MultiPhiModel:
         if "base" not in self._shared:
             self._shared["base"] = build_base(self.structure, self.contacts, self.most_modes or "all")
         base: Base = self._shared["base"]
-        most = base.modes.count - len(self.contacts)
+        most = base.modes.count - self.directions
         if self.most_modes is not None and self.most_modes > most:
             raise MultiPhiValueError(
                 f"modes: got {self.most_modes}, need at most {most} "
-                f"({base.modes.count} modes less {len(self.contacts)} contacts), or 'all'"
+                f"({base.modes.count} modes less {self.directions} contacts), or 'all'"
             )
         return base
+
+    @functools.cached_property
+    def force_laws(self) -> tuple[ForceLaw, ...]:
+        """The force laws among what was given."""
+        return tuple(dict.fromkeys(contact.law for contact in self.contacts if isinstance(contact, LawSpring)))
+
+    @functools.cached_property
+    def chains(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of every law's springs on either side of its centre, from there outward."""
+        sides: dict[tuple[ForceLaw, int], list[int]] = {}
+        for i, contact in enumerate(self.contacts):
+            if isinstance(contact, LawSpring):
+                sides.setdefault((contact.law, contact.side), []).append(i)
+        return tuple(map(tuple, sides.values()))
+
+    @property
+    def levels_possible(self) -> int:
+        """Number of levels: 2 for every contact times the segments of every law."""
+        plain = len(self.contacts) - sum(map(len, self.chains))
+        return 2**plain * math.prod(law.levels for law in self.force_laws)
+
+    @property
+    def directions(self) -> int:
+        """Number of directions in which there are contacts; a law has one."""
+        return len(set(rays_of(self.contacts)))
 
     @property
     def most_modes(self) -> int | None:
         """The largest number of modes that a level can have; None where it has all of them."""
         if isinstance(self.modes, (UpTo, Tolerance)):
-            return max(1, min(self.modes.most, self.structure.n - len(self.contacts)))
+            return max(1, min(self.modes.most, self.structure.n - self.directions))
         return None if isinstance(self.modes, str) else int(self.modes)
 
     @property
@@ -148,8 +176,10 @@ class MultiPhiModel:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
 
         The configuration that the contacts admit nearest to the one without them, in the energy of structure and
-        contact springs: those that press make the level whose state of rest it is. Needs a structure without
+        contact springs: those that press make the level whose state of rest it is. With force laws it is the
+        equilibrium that is reached when the forces are applied slowly (equilibrium.py). Needs a structure without
         rigid-body modes.
+        Raises NumericalFailure where force laws let the structure snap through on the way.
         """
         base = self.base
         if base.modes.rigid:
@@ -157,6 +187,8 @@ class MultiPhiModel:
                 f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
             )
         load = self.base_load(forces)
+        if self.force_laws:
+            return base.modes.shapes @ equilibrium(base, load)
         compliance = base.modes.omega**-2.0
         gaps = base.directions.T @ (compliance * load) + base.gaps
         bending = base.directions.T / base.modes.omega
@@ -200,14 +232,16 @@ class MultiPhiModel:
             raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
 
 
-def _contacts(given: Any) -> tuple[UnilateralContact, ...]:
+def _contacts(given: Any) -> tuple[Contact, ...]:
+    """Contacts, every law by its chain of springs."""
+    needed = "UnilateralContact or ForceLaw"
     if not isinstance(given, Iterable):
-        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of UnilateralContact")
-    contacts = tuple(given)
-    for contact in contacts:
-        if not isinstance(contact, UnilateralContact):
-            raise MultiPhiTypeError(f"contacts: got {type(contact).__name__}, need UnilateralContact")
-    return contacts
+        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
+    items = tuple(given)
+    for item in items:
+        if not isinstance(item, (UnilateralContact, ForceLaw, LawSpring)):
+            raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
+    return expanded(items)
 
 
 def _check_overrides(given: Any) -> None:

@@ -42,7 +42,7 @@ def simulate(
 
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
     compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
-    Loads that vary in time are not for the compiled loop.
+    Force laws, viscous contacts and loads that vary in time are not for the compiled loop.
     A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
     that is ok says where a Tolerance, or that of a smooth load, could not be reached.
@@ -98,7 +98,11 @@ def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool 
 
 
 def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
-    """The compiled loop, None without numba; that is an error where it is needed."""
+    """The compiled loop, None without numba or for contacts that it does not know; an error where it is needed."""
+    if rule.model.chains or any(contact.damping for contact in rule.model.contacts):
+        if needed:
+            raise MultiPhiError("compiled: got True with force laws or viscous contacts, need None or False")
+        return None
     try:
         return importlib.import_module("multiphi_exudyn.compiled.loop").CompiledLoop(rule)
     except ImportError as error:

@@ -84,13 +84,15 @@ class State:
 class Loss:
     """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
 
-    stop_work: what moving stops put into it by their impulses, no loss.
+    stop_work: what moving stops put into it by their impulses, no loss. damping: the strain of viscous contacts that
+    change inside their stop (contact.py).
     """
 
     impact: float = 0.0
     truncation_kinetic: float = 0.0
     truncation_strain: float = 0.0
     stop_work: float = 0.0
+    damping: float = 0.0
 
     def __add__(self, other: Loss) -> Loss:
         return Loss(
@@ -98,12 +100,13 @@ class Loss:
             self.truncation_kinetic + other.truncation_kinetic,
             self.truncation_strain + other.truncation_strain,
             self.stop_work + other.stop_work,
+            self.damping + other.damping,
         )
 
     @property
     def total(self) -> float:
         """Sum of all that was lost [J]."""
-        return self.impact + self.truncation_kinetic + self.truncation_strain
+        return self.impact + self.truncation_kinetic + self.truncation_strain + self.damping
 
 
 @dataclass(frozen=True)

@@ -206,7 +206,7 @@ class Trajectory:
         return intervals
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Kinetic + strain energy [J], the strain of closed compliant contacts included."""
+        """Kinetic + strain energy [J], that of closed compliant contacts and of force laws included."""
         return self._evaluate(t, side, lambda segment, times: segment.energy(times))
 
     @functools.cached_property
@@ -226,7 +226,7 @@ class Trajectory:
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
-            damping=sum(segment.damping_work() for segment in self.segments),
+            damping=losses.damping + sum(segment.damping_work() for segment in self.segments),
             final=float(last.energy(end)[0]),
         )
 

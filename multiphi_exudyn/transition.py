@@ -56,16 +56,15 @@ class LoadedLevel:
     def strain(self, displacement: np.ndarray) -> np.ndarray:
         """Strain energy [J] of the structure and of its closed compliant contacts, for (r,) or every column of (r, k).
 
-        1/2 |omega eta|^2 + eta . (Phi^T f - drive) + strain(x_inf)
+        1/2 sum omega^2 eta^2 + eta . (Phi^T f - drive) + strain(x_inf); of force laws as in ``Base.strain``
         """
         bent = self.asymptotic.load - self.asymptotic.drive
-        stretched = (self.level.omega * displacement.T).T
-        return np.asarray(0.5 * np.sum(stretched**2, axis=0) + bent @ displacement + self.asymptotic.strain)
+        stretched = 0.5 * self.level.squares @ displacement**2
+        return np.asarray(stretched + bent @ displacement + self.asymptotic.strain)
 
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the static load [J]."""
-        stretched = self.level.omega * displacement
-        potential = 0.5 * float(stretched.dot(stretched)) + self.asymptotic.potential
+        potential = 0.5 * float(self.level.squares.dot(displacement * displacement)) + self.asymptotic.potential
         return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
 
     def kinetic(self, velocity: np.ndarray) -> np.ndarray:
@@ -75,7 +74,7 @@ class LoadedLevel:
     def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """eta'' (r,) from eta, eta' (38.3)."""
         own = self.level
-        return self.asymptotic.drive - own.omega**2 * displacement - own.damping @ velocity
+        return self.asymptotic.drive - own.squares * displacement - own.damping @ velocity
 
     def gap(self, contact: int, displacement: np.ndarray) -> float:
         """Gap of a contact [m]."""

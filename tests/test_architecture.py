@@ -12,8 +12,8 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
     ("modes", "modal_response", "first_root", "history", "forced_response"),
-    ("structure", "beam", "contact", "loads"),
-    ("level", "transition", "model", "excitation"),
+    ("structure", "beam", "contact", "force_law", "loads"),
+    ("level", "equilibrium", "transition", "model", "excitation"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("exudyn_plugin",),
     ("study.scene",),

@@ -60,7 +60,7 @@ def rate_sign(k: Levels, a: int, row: np.ndarray, x: np.ndarray, v: np.ndarray, 
         if k.rated[a]:
             term += row[1, i] * acceleration[i]
         value += term
-        size += abs(term) + abs(row[0, i] * x[i]) * math.sqrt(k.squared[a, i])
+        size += abs(term) + abs(row[0, i] * x[i]) * math.sqrt(abs(k.squared[a, i]))
     return sign_of(value, size)
 
 

@@ -137,7 +137,7 @@ class Pack:
         _split(response.from_velocity.T, a.from_state[k, r : 2 * r])
         both = np.vstack([response.shapes, response.shapes * rates]).T
         _split(both.conj(), a.to_state[k, :p])
-        a.squared[k, :r], a.damping[k, :r, :r] = own.omega**2, own.damping
+        a.squared[k, :r], a.damping[k, :r, :r] = own.squares, own.damping
         a.closed[k, list(own.indices)] = True
         a.rated[k] = np.any(own.force_rate_rows)
         for contact in range(len(self._rigid)):

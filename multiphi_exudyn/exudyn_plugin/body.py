@@ -338,7 +338,7 @@ class MultiPhiBody:
     def _choose_test(self) -> None:
         closed = self._state.closed
         if closed not in self._tests:
-            rows = [self._rule.function(self._state.level, contact) for contact in range(len(self.model.contacts))]
+            rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
             given = self._stepped(closed), rows, self._step
             self._tests[closed] = StepTest(*given), Lookahead(*given)
         self._test, self._lookahead = self._tests[closed]

@@ -117,7 +117,7 @@ class DrivenBody(MultiPhiBody):
         closed = self._in_solver.closed
         if closed not in self._driven_tests:
             level = self._driven.level(closed)
-            rows = [self._driven.function(level, contact) for contact in range(len(self.model.contacts))]
+            rows = [self._driven.function(level, contact) for contact in self._driven.ends(closed)]
             self._driven_tests[closed] = DrivenStepTest(self._in_solver, level, rows, self._step)
         return self._driven_tests[closed]
 

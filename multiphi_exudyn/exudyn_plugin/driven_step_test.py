@@ -3,7 +3,7 @@
 For a contact's function s (event_rule.py) of xi = (eta, w) linear interpolation is off by at most h^2/8 max|s''|:
 
     min(s0, s1) > h^2/8 (|[P R] A S^-1| max|S z'| + |R| |p'| + |P_w| |w''| + |R_w| |w'''|),
-    max |S z'| <= max at the ends + h |p'|
+    max |S z'| <= (max at the ends + h |p'|) exp(sigma h)
 
 in the notation of step_test.py, p = P w + Q w' the modal force. The channels enter by bounds that hold for the whole
 run; a kink of a sampled course counts as the second derivative 2 |jump of w'| / h. Steps in which a course itself
@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from multiphi_exudyn.excitation import DrivenLevel, Excitation
-from multiphi_exudyn.exudyn_plugin.step_test import energy_norm, gains
+from multiphi_exudyn.exudyn_plugin.step_test import energy_norm, gains, swell
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.history import History
 from multiphi_exudyn.state import Row
@@ -43,7 +43,7 @@ class DrivenStepTest:
         self._count, self._share = count, step**2 / 8
         first, second, third = (np.array(bounds) for bounds in zip(*_bounds(level.excitation, step), strict=True))
         forced = float(np.linalg.norm(np.abs(level.force) @ first + np.abs(level.force_rate) @ second))
-        self._gains = gains(stepped, modal[:, : 2 * size], 1)
+        self._gains = gains(stepped, modal[:, : 2 * size], 1) * swell(stepped, step)
         self._extra = np.linalg.norm(rate[:, :modes], axis=1) * forced + step * forced * self._gains
         self._extra += np.abs(position[:, modes:]) @ second + np.abs(rate[:, modes:]) @ third
 

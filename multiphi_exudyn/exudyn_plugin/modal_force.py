@@ -25,7 +25,7 @@ __all__ = ["ForcedRule", "shift"]
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
     """d (r,) of a modal force (s,), s >= r."""
     centre = np.zeros(level.modes)
-    return np.divide(force[: level.modes], level.omega**2, out=centre, where=level.omega > 0)
+    return np.divide(force[: level.modes], level.squares, out=centre, where=level.squares != 0)
 
 
 class ForcedRule(EventRule):
@@ -63,6 +63,6 @@ def _forced(plain: LoadedLevel, force: np.ndarray) -> LoadedLevel:
         rest,
         configuration=rest.configuration + level.vectors @ d,
         forces=rest.forces + level.force_rows @ d,
-        drive=rest.drive + np.where(level.omega > 0, 0.0, force[: level.modes]),
+        drive=rest.drive + np.where(level.squares != 0, 0.0, force[: level.modes]),
     )
     return _ForcedLevel(level, asymptotic, plain.gap_constants + level.gap_rows @ d, plain, d)

@@ -3,11 +3,12 @@
 For a contact's function s (event_rule.py) the cubic Hermite interpolant of s, s' at both ends is off by at most
 h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s > 0 on the whole step if
 
-    min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'|
+    min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'| exp(sigma h)
 
-s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(omega, I). |S z'| is an energy norm of the
-velocities: under a constant force it cannot grow, so the values at the two ends bound it in between, whatever
-that force is. What fails the test is looked at exactly (body.py): the test may not decide, but it does not err.
+s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
+velocities: under a constant force it grows no faster than with the largest rate sigma of a growing mode (omega^2 < 0),
+mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
+looked at exactly (body.py): the test may not decide, but it does not err.
 
 The states ahead of a body on which nothing acts are powers of the trapezoidal rule's matrix times the present one,
 so that one product answers for many steps at once (Lookahead).
@@ -23,7 +24,7 @@ from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.first_root import HERMITE
 from multiphi_exudyn.state import Row
 
-__all__ = ["Lookahead", "StepTest", "energy_norm", "gains"]
+__all__ = ["Lookahead", "StepTest", "energy_norm", "gains", "swell"]
 
 KNOTS = 16  # intervals a lookahead is divided into
 SPACING = 0.5  # rad, the phase of the highest mode in one of them
@@ -35,7 +36,7 @@ class StepTest:
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
         size, count = stepped.size, len(rows)
         norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1))])
-        self._matrix = np.vstack([_conditions(stepped, rows, step), norm])
+        self._matrix = np.vstack([_conditions(stepped, rows, step, step), norm])
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
     def at(self, x: np.ndarray) -> tuple[float, float, float]:
@@ -59,7 +60,7 @@ class Lookahead:
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
         each = max(1, int(SPACING / (np.max(_omega(stepped)) * step)))
         self.steps = KNOTS * each
-        conditions, count = _conditions(stepped, rows, each * step), len(rows)
+        conditions, count = _conditions(stepped, rows, each * step, self.steps * step), len(rows)
         self._one_step = _step_matrix(stepped, step)
         flow = np.linalg.matrix_power(self._one_step, each)
         knots = [conditions]
@@ -78,17 +79,19 @@ class Lookahead:
         return np.asarray(np.linalg.matrix_power(self._one_step, steps) @ x)
 
 
-def _conditions(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
+def _conditions(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float) -> np.ndarray:
     """s - h s'/3, s, s + h s'/3 of all contacts as functions of x = (q, q', q'', 1), (3 c, 3 s + 1).
 
-    Each is divided by its factor of max |S z'|, so that all have the same right-hand side.
+    Each is divided by its factor of max |S z'|, which is known at the start of a time ``lasting`` [s], so that all have
+    the same right-hand side.
     """
     modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
     along, rate, none = np.zeros((3, count, size))
     along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
     rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3) + np.finfo(float).tiny
+    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3)
+    scale = scale * swell(stepped, lasting) + np.finfo(float).tiny
     functions = np.vstack([value - third, value, value + third]) @ stepped.physical
     constants = np.tile([row.constant for row in rows], 3)
     return np.hstack([functions, constants[:, None]]) / np.tile(scale, 3)[:, None]
@@ -107,7 +110,18 @@ def _step_matrix(stepped: SteppedLevel, step: float) -> np.ndarray:
 
 
 def _omega(stepped: SteppedLevel) -> np.ndarray:
-    return np.asarray(np.sqrt(np.diagonal(stepped.stiffness)))
+    return np.asarray(np.sqrt(np.abs(np.diagonal(stepped.stiffness))))
+
+
+def _signed(stepped: SteppedLevel) -> np.ndarray:
+    """omega^2 / |omega|."""
+    return np.asarray(np.sign(np.diagonal(stepped.stiffness)) * _omega(stepped))
+
+
+def swell(stepped: SteppedLevel, duration: float) -> float:
+    """How much |S z'| can grow in this time."""
+    lowest = float(np.min(np.diagonal(stepped.stiffness), initial=0.0))
+    return math.exp(math.sqrt(-lowest) * duration)
 
 
 def energy_norm(stepped: SteppedLevel) -> np.ndarray:
@@ -122,6 +136,6 @@ def gains(stepped: SteppedLevel, functionals: np.ndarray, power: int) -> np.ndar
     none, identity = np.zeros((size, size)), np.eye(size)
     system = np.block([[none, identity], [-stepped.stiffness, -stepped.own_damping]])
     scaled = np.block(
-        [[none, identity], [-np.diag(_omega(stepped)), -stepped.own_damping]]
+        [[none, identity], [-np.diag(_signed(stepped)), -stepped.own_damping]]
     )  # A S^-1, also where omega = 0
     return np.asarray(np.linalg.norm(functionals @ np.linalg.matrix_power(system, power - 1) @ scaled, axis=1))

@@ -2,7 +2,7 @@
 
     M q'' + D q' + K q = p + drive,   q = eta, padded to the body's size with coordinates that stay zero
 
-Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'.
+Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in either.
 
 Matched to the step h: the trapezoidal rule turns exp(h s) into (1 + h s/2) / (1 - h s/2), so it is exact for
 z = (eta, eta') if it is given, instead of z' = A z + B p,
@@ -12,7 +12,7 @@ z = (eta, eta') if it is given, instead of z' = A z + B p,
 
 exactly also under a constant modal force p. With the first block rows [Q V] of A_h and G of B_h as a new velocity
 q' = Q eta + V eta' + G p this is again of second order, its static stiffness is K itself, and for a mode without
-damping M = (omega h/2)^2 / tan(omega h/2)^2 and D = 0. The damping need not be diagonal. Needs omega h < pi.
+damping M = (omega h/2)^2 / tan(omega h/2)^2 and D = 0. The damping need not be diagonal. Needs |omega| h < pi.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ class SteppedLevel:
     def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
         """A level matched to ``step`` [s], or plain for None."""
         level = loaded.level
-        omega, damping = np.ones(size), np.zeros((size, size))  # rad/s: padding is never excited
-        omega[: level.modes] = level.omega
+        squares, damping = np.ones(size), np.zeros((size, size))  # rad2/s2: padding is never excited
+        squares[: level.modes] = level.squares
         damping[: level.modes, : level.modes] = level.damping
         drive = np.zeros(size)
         drive[: level.modes] = loaded.asymptotic.drive
-        maps = _plain(damping) if step is None else _matched(omega, damping, step)
+        maps = _plain(damping) if step is None else _matched(squares, damping, step)
         mass, stepped, q, v, g = maps
-        return cls(loaded, mass, stepped, np.diag(omega**2), damping, drive, q, v, g)
+        return cls(loaded, mass, stepped, np.diag(squares), damping, drive, q, v, g)
 
     @property
     def closed(self) -> tuple[int, ...]:
@@ -126,17 +126,18 @@ def _plain(damping: np.ndarray) -> Maps:
     return identity, damping, none, identity, none
 
 
-def _matched(omega: np.ndarray, damping: np.ndarray, step: float) -> Maps:
+def _matched(squares: np.ndarray, damping: np.ndarray, step: float) -> Maps:
+    omega = np.sqrt(np.abs(squares))
     if np.max(omega) * step >= math.pi:
         raise MultiPhiValueError(
             f"matchedStepSize: got {step:g} s, need less than {math.pi / np.max(omega):g} s, half the shortest "
             "period of the kept modes"
         )
-    s, identity = len(omega), np.eye(len(omega))
+    s, identity = len(squares), np.eye(len(squares))
     scale = np.where(omega > 0, omega, 1 / step)  # both halves of z alike
     system = np.zeros((3 * s, 3 * s))
     system[:s, s : 2 * s] = np.diag(scale)
-    system[s : 2 * s, :s] = -np.diag(omega**2 / scale)
+    system[s : 2 * s, :s] = -np.diag(squares / scale)
     system[s : 2 * s, s : 2 * s] = -damping
     system[s : 2 * s, 2 * s :] = identity
     flow = scipy.linalg.expm(system * step)[: 2 * s]
