@@ -73,7 +73,7 @@ class DescentFinder:
         self._decay = np.minimum(basis.rates.real, 0.0)
         self._growth = np.maximum(basis.rates.real, 0.0)
         self._eternal = basis.pure and not np.any(self._growth)
-        self._window = WINDOW / np.max(self._growth) if np.any(self._growth) else math.inf
+        self._window = WINDOW / float(np.max(self._growth)) if np.any(self._growth) else math.inf
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
         self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
         self._tables: dict[float, _Table] = {}
@@ -89,7 +89,7 @@ class DescentFinder:
             bounds = self._bounds(signals.coefficients, start, latest)
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
-            if not math.isfinite(bounds[0][0]):
+            if not all(math.isfinite(bound[0] + bound[-1]) for bound in bounds):
                 raise NumericalFailure("the motion is not finite")
             if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds, latest)) is not None:
                 return near if near.time <= horizon else None
@@ -135,15 +135,17 @@ class DescentFinder:
 
     def _bounds(self, coefficients: np.ndarray, start: float, horizon: float) -> list[list[float]]:
         """For every signal, upper bounds of |g|, |g'|, ..., |g^(6)| on [start, horizon], constants left out."""
-        if self.basis.pure:
-            weights = self._magnitudes
-            if start > 0.0 or not self._eternal:
-                weights = np.exp(self._decay * start + self._growth * horizon)[:, None] * weights
-            found: list[list[float]] = (np.abs(coefficients) @ weights).tolist()
+        if self._eternal and start == 0.0:
+            found: list[list[float]] = (np.abs(coefficients) @ self._magnitudes).tolist()
             return found
-        envelope = np.exp(self._decay * start + self._growth * horizon) * horizon**self.basis.powers
-        bounds: list[list[float]] = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
-        return bounds
+        with np.errstate(over="ignore", invalid="ignore"):  # what has grown out of all bounds is not finite
+            envelope = np.exp(self._decay * start + self._growth * horizon)
+            if self.basis.pure:
+                found = (np.abs(coefficients) @ (envelope[:, None] * self._magnitudes)).tolist()
+                return found
+            envelope = envelope * horizon**self.basis.powers
+            found = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
+            return found
 
     def _near(
         self, coefficients: np.ndarray, constants: list[float], bounds: list[list[float]], valid: float

@@ -18,6 +18,7 @@ from multiphi_exudyn.driven import DrivenMotion, DrivenRule, to_tolerance
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.excitation import Excitation
+from multiphi_exudyn.force_law import Contact
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.motion import CompiledMotion, Motion
@@ -144,9 +145,14 @@ def _start(
             )
         if contact.rigid and gap <= scale:
             touching.append(i)
-        elif gap < -scale:
+        elif gap < -scale and not _pulls(contact, gap, float(v @ base.directions[:, i])):
             penetrating.append(i)
     return Start(y, v, tuple(penetrating), tuple(touching))
+
+
+def _pulls(contact: Contact, gap: float, rate: float) -> bool:
+    """Whether a contact inside its stop is viscous and would pull."""
+    return contact.damping > 0 and contact.stiffness * gap + contact.damping * rate > 0
 
 
 def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:

@@ -439,3 +439,48 @@ def test_the_example_inside_exudyn_agrees_with_the_model_on_its_own(capsys):
     assert len(body.events) > 40
     assert distance < 1e-7
     assert f"{len(body.events)} events" in capsys.readouterr().out
+
+
+class TestForceLawsAndViscousContacts:
+    """Chains of levels, levels of negative stiffness and viscous contacts in the solver, against ``simulate``."""
+
+    LAWS = {
+        "hardening": (lambda q: 1e4 * (q + 2 * q**3), [0.3, 0.8, 1.5]),
+        "two wells": (lambda q: 1e4 * (-q + 0.5 * q**3), [0.3, 0.8, 1.9]),
+    }
+
+    @pytest.mark.parametrize("name", LAWS)
+    def test_a_law_is_exact_at_the_matched_step_and_second_order_at_others(self, name):
+        function, start = self.LAWS[name]
+        model = chain([mp.ForceLaw("m2", function, segments=32, span=(-2, 2))])
+        native = mp.simulate(model, 0.06, displacement=start)
+        assert native.stats.levels_built > 12
+        errors = []
+        for step, matched in ((1e-4, 1e-4), (1e-4, None), (5e-5, None)):
+            found = run(model, step, 0.06, displacement=start, matchedStepSize=matched)
+            errors.append(np.max(np.abs(found.points["m2"] - native.at("m2", np.minimum(found.time, 0.06)))))
+            assert [e.contact for e in found.events] == [e.contact for e in native.events]
+        assert errors[0] < 1e-10
+        assert 3.5 < errors[1] / errors[2] < 4.5
+
+    def test_a_viscous_contact_is_exact_at_the_matched_step(self):
+        model = chain([mp.UnilateralContact("stop", "m0", 0.1, 3e4, 200.0)])
+        native = mp.simulate(model, 0.1, displacement=[0.3, 0.8, 1.5])
+        found = run(model, 1e-4, 0.1, displacement=[0.3, 0.8, 1.5], matchedStepSize=1e-4)
+        assert len(native.events) > 4
+        times = [e.time for e in found.events]
+        assert times == pytest.approx([e.time for e in native.events], abs=1e-11)
+        np.testing.assert_allclose(found.points["m2"], native.at("m2", np.minimum(found.time, 0.1)), atol=1e-9)
+        force = native.contact_force("stop", np.minimum(found.time, 0.1))
+        np.testing.assert_allclose(found.contact_force["stop"], force, atol=1e-6 * np.max(force))
+
+    def test_a_law_beside_a_contact_under_a_harmonic_load(self):
+        law = mp.ForceLaw("m2", self.LAWS["two wells"][0], segments=16, span=(-2, 2))
+        model = chain([law, mp.UnilateralContact("stop", "m0", 0.1, 3e4, 200.0)])
+        given = {"displacement": [0.3, 0.8, 1.5], "loads": [mp.HarmonicLoad("m1", 2e3, 20.0)]}
+        native = mp.simulate(model, 0.06, **given)
+        errors = []
+        for step in (1e-4, 5e-5):
+            found = run(model, step, 0.06, **given)
+            errors.append(np.max(np.abs(found.points["m2"] - native.at("m2", np.minimum(found.time, 0.06)))))
+        assert 3.3 < errors[0] / errors[1] < 4.7

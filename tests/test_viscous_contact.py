@@ -1,0 +1,98 @@
+"""Viscous contacts: they never pull, close again inside, and their damper's work is damping."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from small_structures import chain
+from true_law import against_viscous
+
+import multiphi_exudyn as mp
+
+T = np.linspace(0, 12, 121)
+
+
+def scene(seed):
+    random = np.random.default_rng(seed)
+    n = int(random.integers(2, 5))
+    at, stiffness = f"m{random.integers(n)}", 10 ** random.uniform(0, 2)
+    damping, gap = 10 ** random.uniform(-1.5, 1), random.uniform(-0.2, 0.5)
+    contact = mp.UnilateralContact("stop", at, gap, stiffness, damping)
+    return chain(n), contact, 1.5 * random.normal(size=n)
+
+
+def runs(seed):
+    structure, contact, velocity = scene(seed)
+    run = mp.simulate(mp.MultiPhiModel(structure, [contact], modes="all"), 12.0, velocity=velocity)
+    return run, *against_viscous(structure, contact, T, velocity, longest=0.1)
+
+
+SEEDS = range(12)
+
+
+class TestAgainstTheIntegrator:
+    @pytest.mark.parametrize("seed", SEEDS)
+    def test_motion_and_events_agree(self, seed):
+        run, true, events = runs(seed)
+        assert run.status == "ok"
+        assert_allclose(run.displacement(T), true, rtol=0, atol=1e-10)
+        assert [e.kind for e in run.events] == [kind for _, kind, _ in events]
+        assert_allclose([e.time for e in run.events], [time for time, _, _ in events], rtol=0, atol=1e-10)
+
+    def test_the_scenes_open_inside_and_close_again_inside(self):
+        found = [kind for seed in SEEDS for _, kind, gap in runs(seed)[2] if gap < -1e-6]
+        assert found.count("open") > 20
+        assert found.count("close") >= 2
+
+
+class TestLaw:
+    @pytest.mark.parametrize("seed", SEEDS)
+    def test_never_pulls_and_never_pushes_while_open(self, seed):
+        structure, contact, velocity = scene(seed)
+        run = mp.simulate(mp.MultiPhiModel(structure, [contact], modes="all"), 12.0, velocity=velocity)
+        force, gap = run.contact_force("stop", T), run.gap("stop", T)
+        rate = structure.row(contact.direction) @ run.velocity(T)
+        expected = np.where(gap < 0, np.maximum(0, -contact.stiffness * gap - contact.damping * rate), 0)
+        assert_allclose(force, expected, rtol=0, atol=1e-10 * np.max(force))
+
+    @pytest.mark.parametrize("seed", SEEDS)
+    def test_what_its_damper_takes_is_damping(self, seed):
+        structure, contact, velocity = scene(seed)
+        run = mp.simulate(mp.MultiPhiModel(structure, [contact], modes="all"), 12.0, velocity=velocity)
+        ledger = run.ledger
+        assert abs(ledger.residual) < 1e-12 * ledger.initial
+        assert abs(ledger.truncation_kinetic) + abs(ledger.truncation_strain) < 1e-12 * ledger.initial
+        assert ledger.impact == 0
+        assert 0 < ledger.damping < ledger.initial
+
+    def test_of_truncated_levels_closes_the_ledger_too(self):
+        contact = mp.UnilateralContact("stop", "m3", 0.2, 40.0, 4.0)
+        run = mp.simulate(mp.MultiPhiModel(chain(6), [contact], modes=4), 60.0, velocity=np.arange(6.0) / 3)
+        assert run.status == "ok"
+        assert len(run.events) > 5
+        assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial
+
+    def test_without_damping_is_a_compliant_contact(self):
+        small = [mp.UnilateralContact("stop", "m0", 0.2, 40.0, c) for c in (0.0, 1e-9)]
+        first, second = (
+            mp.simulate(mp.MultiPhiModel(chain(3), [c], modes="all"), 12.0, velocity=np.ones(3)) for c in small
+        )
+        assert_allclose(second.displacement(T), first.displacement(T), rtol=0, atol=1e-7)
+
+    def test_beside_others_under_a_harmonic_load(self):
+        contacts = [
+            mp.UnilateralContact("viscous", "m0", 0.1, 20.0, 3.0),
+            mp.UnilateralContact("rigid", {"m3": -1.0}, 0.8),
+            mp.ForceLaw("m2", ([-1, 0, 1], [-2, 0, 1])),
+        ]
+        m = mp.MultiPhiModel(chain(4), contacts, modes="all")
+        run = mp.simulate(m, 20.0, velocity=np.ones(4), loads=[mp.HarmonicLoad("m1", 0.5, 0.3)])
+        assert run.status == "ok"
+        assert {e.contact for e in run.events} >= {"viscous", "rigid", "law+1"}
+        assert abs(run.ledger.residual) < 1e-9
+        assert run.ledger.damping > 0
+        assert run.ledger.impact > 0
+
+    def test_a_moving_stop_is_refused(self, refused):
+        m = mp.MultiPhiModel(chain(2), [mp.UnilateralContact("stop", "m0", 0.1, 20.0, 3.0)], modes="all")
+        moving = mp.StopMotion("stop", mp.Smooth(lambda t: 0.1 * t, 1e-6))
+        refused(ValueError, "stop motion of 'stop': got a viscous contact", mp.simulate, m, 1.0, loads=[moving])
