@@ -369,12 +369,10 @@ class EventRule:
     def _loss(self, state: State, after: State, collided: float = 0.0, plastic: Loss | None = None) -> Loss:
         """What was lost between two states of one instant, the energy ``collided`` in an impact with its own loss."""
         relaxed = self._relaxed(state, after) if self._viscous else 0.0
-        return replace(
-            plastic or Loss(),
-            truncation_kinetic=state.kinetic - after.kinetic - collided,
-            truncation_strain=state.potential - after.potential - relaxed,
-            damping=relaxed,
-        )
+        kinetic, strain = state.kinetic - after.kinetic - collided, state.potential - after.potential - relaxed
+        if plastic is None:
+            return Loss(0.0, kinetic, strain, 0.0, relaxed)
+        return Loss(plastic.impact, kinetic, strain, plastic.stop_work, relaxed)
 
     def _relaxed(self, state: State, after: State) -> float:
         """Strain energy [J] of viscous contacts that opened inside their stop, less that of those that closed there."""

@@ -89,7 +89,7 @@ class DescentFinder:
             bounds = self._bounds(signals.coefficients, start, latest)
             if self._eternal and all(c > bound[0] for c, bound in zip(constants, bounds, strict=True)):
                 return None
-            if not all(math.isfinite(bound[0] + bound[-1]) for bound in bounds):
+            if not math.isfinite(sum([bound[0] + bound[-1] for bound in bounds])):
                 raise NumericalFailure("the motion is not finite")
             if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds, latest)) is not None:
                 return near if near.time <= horizon else None

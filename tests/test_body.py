@@ -441,17 +441,18 @@ def test_the_example_inside_exudyn_agrees_with_the_model_on_its_own(capsys):
     assert f"{len(body.events)} events" in capsys.readouterr().out
 
 
+LAWS = {
+    "hardening": (lambda q: 1e4 * (q + 2 * q**3), [0.3, 0.8, 1.5]),
+    "two wells": (lambda q: 1e4 * (-q + 0.5 * q**3), [0.3, 0.8, 1.9]),
+}
+
+
 class TestForceLawsAndViscousContacts:
     """Chains of levels, levels of negative stiffness and viscous contacts in the solver, against ``simulate``."""
 
-    LAWS = {
-        "hardening": (lambda q: 1e4 * (q + 2 * q**3), [0.3, 0.8, 1.5]),
-        "two wells": (lambda q: 1e4 * (-q + 0.5 * q**3), [0.3, 0.8, 1.9]),
-    }
-
     @pytest.mark.parametrize("name", LAWS)
     def test_a_law_is_exact_at_the_matched_step_and_second_order_at_others(self, name):
-        function, start = self.LAWS[name]
+        function, start = LAWS[name]
         model = chain([mp.ForceLaw("m2", function, segments=32, span=(-2, 2))])
         native = mp.simulate(model, 0.06, displacement=start)
         assert native.stats.levels_built > 12
@@ -467,7 +468,7 @@ class TestForceLawsAndViscousContacts:
         model = chain([mp.UnilateralContact("stop", "m0", 0.1, 3e4, 200.0)])
         native = mp.simulate(model, 0.1, displacement=[0.3, 0.8, 1.5])
         found = run(model, 1e-4, 0.1, displacement=[0.3, 0.8, 1.5], matchedStepSize=1e-4)
-        assert len(native.events) > 4
+        assert len(native.events) == 4
         times = [e.time for e in found.events]
         assert times == pytest.approx([e.time for e in native.events], abs=1e-11)
         np.testing.assert_allclose(found.points["m2"], native.at("m2", np.minimum(found.time, 0.1)), atol=1e-9)
@@ -475,7 +476,7 @@ class TestForceLawsAndViscousContacts:
         np.testing.assert_allclose(found.contact_force["stop"], force, atol=1e-6 * np.max(force))
 
     def test_a_law_beside_a_contact_under_a_harmonic_load(self):
-        law = mp.ForceLaw("m2", self.LAWS["two wells"][0], segments=16, span=(-2, 2))
+        law = mp.ForceLaw("m2", LAWS["two wells"][0], segments=16, span=(-2, 2))
         model = chain([law, mp.UnilateralContact("stop", "m0", 0.1, 3e4, 200.0)])
         given = {"displacement": [0.3, 0.8, 1.5], "loads": [mp.HarmonicLoad("m1", 2e3, 20.0)]}
         native = mp.simulate(model, 0.06, **given)

@@ -304,7 +304,7 @@ class TestMotion:
     def test_keeps_its_energy_over_five_thousand_events(self):
         stiff = chain(1, stiffness=100.0)
         m = mp.MultiPhiModel(stiff, [law(lambda q: 100 * hardening(q), "m0", segments=64)], modes="all")
-        run = mp.simulate(m, 8.0, displacement=[1.5])
+        run = mp.simulate(m, 17.0, displacement=[1.5])
         assert len(run.events) > 5000
         energy = run.energy(np.array([0.0, run.t_end]))
         assert abs(energy[1] / energy[0] - 1) < 1e-10
