@@ -2,6 +2,7 @@
 
 import importlib
 import importlib.util
+import math
 from pathlib import Path
 
 import pytest
@@ -41,3 +42,15 @@ def test_parameter_study(capsys, tmp_path, monkeypatch):
     assert rows[1].values["first contact [ms]"] == pytest.approx(68.97, abs=0.1)
     assert example.main(path, "serial") == rows
     assert capsys.readouterr().out.count("impulse") == 4
+
+
+def test_force_laws(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["force_laws.py", str(tmp_path / "laws.png")])
+    example = load("force_laws")
+    monkeypatch.setattr(example, "SEGMENTS", (8, 16, 64))
+    errors = example.main()
+    for runs in errors.values():
+        assert math.log2(runs["native"][1] / runs["native"][2]) / 2 > 1.8
+        assert runs["user object"] == pytest.approx(runs["native"], rel=0.02)
+    assert (tmp_path / "laws.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.count("order") == 4
