@@ -38,6 +38,9 @@ FOUND = {
     "no stiffness at all": Recipe(
         88, "free dense", 2, "heavy", 3, "mixed", "mixed", "mixed", "few", "striking", "point"
     ),
+    "signals that have all but decayed": Recipe(
+        2184, "unconnected", 3, "heavy", 4, "mixed", "zero", "above", "one", "moving", "none"
+    ),
     "a held contact beside another one": Recipe(
         286, "dense", 3, "modal", 4, "mixed", "zero", "mixed", "all", "striking", "point"
     ),
@@ -71,9 +74,10 @@ def sensitive(case, t, factor=1e-12):
     return bool(np.max(np.abs(x - y)) > 1e-2 * CLOSE * np.max(np.abs(x)))
 
 
+@pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("name", FOUND)
-def test_what_went_wrong_once_stays_right(name):
-    assert complaints(run_of(built(FOUND[name]))) == []
+def test_what_went_wrong_once_stays_right(name, compiled):
+    assert complaints(run_of(built(FOUND[name]), compiled=compiled)) == []
 
 
 @settings(max_examples=40)

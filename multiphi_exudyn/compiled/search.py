@@ -19,6 +19,7 @@ from multiphi_exudyn.first_root import HERMITE, LIFTED, RESOLUTION, SIMULTANEOUS
 __all__ = ["FOUND", "NONE", "UNDECIDED", "first_descent", "meets_another"]
 
 NONE, FOUND, UNDECIDED = 0, 1, 2
+MOST_SAMPLES = 2**18  # of one search: where signals have all but decayed, steps stay narrow; blocks serve better there
 
 
 @jit
@@ -211,6 +212,8 @@ def first_descent(
                 left, right, h, bounds[s], constants[s], signals[s], rates, phi[here], p
             ):
                 doubtful, fallen = doubtful + 1, s
+        if samples > MOST_SAMPLES:
+            return UNDECIDED, t, fallen, samples
         if doubtful == 0:
             t, here, k = t + h, there, k + 1 if roomy and k < top else k
             continue
