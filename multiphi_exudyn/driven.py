@@ -240,8 +240,8 @@ class DrivenSegment(Segment):
         return sum(float(weights @ self.force(contact, times)) for times, weights in self._quadrature(start, end))
 
     def damping_work(self) -> float:
-        """Integral of y'^T C y' [J]."""
-        if not np.any(self._resistance):
+        """Integral of y'^T C y' and of what viscous contacts take up [J]."""
+        if not np.any(self.level.level.damping):
             return 0.0
         return sum(float(weights @ self._dissipation(t)) for t, weights in self._quadrature(self.start, self.end))
 
@@ -256,12 +256,18 @@ class DrivenSegment(Segment):
         return self.level
 
     def _dissipation(self, times: np.ndarray) -> np.ndarray:
-        moved = self._driven.motion(self.modal(times, 1))
-        return np.asarray(np.sum(moved * (self._resistance @ moved), axis=0))
+        xi_t = self.modal(times, 1)
+        moved, dampers = self._driven.motion(xi_t), self._dampers(xi_t)
+        coefficients = self._driven.level.base.dampings[list(self._driven.level.indices)]
+        viscous = np.divide(dampers.T**2, coefficients, out=np.zeros_like(dampers.T), where=coefficients > 0)
+        return np.asarray(np.sum(moved * (self._driven.level.base.damping @ moved), axis=0) + np.sum(viscous, axis=1))
 
-    @property
-    def _resistance(self) -> np.ndarray:
-        return self.level.level.base.resistance(self.level.level.indices)
+    def _dampers(self, xi_t: np.ndarray) -> np.ndarray:
+        """c g' (k, times) [N] of the closed contacts: what their dampers hold against opening."""
+        index = list(self._driven.level.indices)
+        return np.asarray(
+            self._driven.level.base.dampings[index][:, None] * (self._driven.level.speed_rows[index] @ xi_t)
+        )
 
     def _power(self, times: np.ndarray) -> np.ndarray:
         """Power (k,) [W] of the channels."""
@@ -270,16 +276,16 @@ class DrivenSegment(Segment):
         w, w_t = level.split(xi)[1], level.split(xi_t)[1]
         varying = level.excitation.patterns @ w
         power = np.sum(varying * (level.level.vectors @ xi_t), axis=0)
-        index = [i for i in level.level.indices if not math.isinf(base.stiffnesses[i])]
-        springs = base.stiffnesses[index][:, None] * (
-            level.level.gap_rows[index] @ xi + level.gap_constants[index][:, None]
-        )
+        index = list(level.level.indices)
+        stiffness = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
+        gaps = level.level.gap_rows[index] @ xi + level.gap_constants[index][:, None]
+        springs = stiffness[:, None] * gaps + self._dampers(xi_t)
         power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
         if np.any(level.carried):
             moved, accelerated = level.motion(xi_t), level.motion(self.modal(times, 2))
             y = level.configuration(xi)
             load = (level.excitation.static + base.preload)[:, None] + varying
-            residual = accelerated + self._resistance @ moved + (base.modes.omega**2 * y.T).T - load
+            residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
             residual += base.directions[:, index] @ springs
             power += np.sum((level.carried @ w_t) * residual, axis=0)
         return np.asarray(power)

@@ -3,7 +3,7 @@
 Everything that varies is a channel w_k(t), k = 1 ... q, a history each:
 
     load          f = ... + b_k w_k                 b_k a pattern (m,) in base coordinates
-    moving stop   g_i = h_i.x + gap_i - s_ik w_k    s_k (c,); where the contact is rigid w_k' is a channel too
+    moving stop   g_i = h_i.x + gap_i - s_ik w_k    s_k (c,); for rigid and viscous contacts w_k' is a channel too
 
 A level carries them as prescribed coordinates: xi = (eta, w), x = Psi eta + y_inf + R w, with
 
@@ -13,7 +13,8 @@ The first part is the quasi-static deflection of the modes left out (its inertia
 of the load on it are not). Y holds the motion of rigid stops, the static shapes of eq. (38.5) with x_k(t); it has
 inertia:
 
-    eta'' + D eta' + omega^2 eta = P w + Q w',   P = Psi^T (b + k h s) - Psi^T C Y (on w'),   Q = -Psi^T Y (on w')
+    eta'' + D eta' + omega^2 eta = P w + Q w',   P = Psi^T (b + k h s),   on w' as a channel of its own
+                                                 P = Psi^T (c h s - C Y),   Q = -Psi^T Y
 
 In xi every gap and contact force is again linear, so rows, maps between levels, events and energies are those of
 levels under static loads, with q more columns.
@@ -28,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.force_law import LawSpring
 from multiphi_exudyn.history import History, translated
 from multiphi_exudyn.level import Level
@@ -179,22 +180,20 @@ class _Channels:
         contact = self._model.contacts[self._model.index(name)]
         if isinstance(contact, LawSpring):
             raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
-        if contact.damping:
-            raise MultiPhiValueError(f"stop motion of {name!r}: got a viscous contact, need one without damping")
 
     def _move(self, stop: np.ndarray, course: Course) -> None:
         """Stops that move by their entries of (c,) times the course."""
         history, nothing = self._history(course), np.zeros(self._model.base.modes.count)
         self._append(nothing, stop, history)
-        rigid = [c.name for c, moves in zip(self._model.contacts, stop, strict=True) if moves and c.rigid]
-        if not rigid:
-            return
-        if isinstance(course, Sampled):
+        moving = [contact for contact, moves in zip(self._model.contacts, stop, strict=True) if moves]
+        rigid = [contact.name for contact in moving if contact.rigid]
+        if rigid and isinstance(course, Sampled):
             raise MultiPhiTypeError(
                 f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
             )
-        self.rate_of[-1] = len(self.histories)
-        self._append(nothing, self._no_stop(), history.derivative)
+        if rigid or any(contact.damping for contact in moving):
+            self.rate_of[-1] = len(self.histories)
+            self._append(nothing, self._no_stop(), history.derivative)
 
     def _append(self, pattern: np.ndarray, stop: np.ndarray, history: History) -> None:
         self.patterns.append(pattern)
@@ -392,13 +391,12 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
     pinned = directions[:, rigid]
     for k, derivative in enumerate(excitation.rate_of):
-        if derivative >= 0 and np.any(carried[:, k]):
-            damped = base.resistance(index) @ carried[:, k]
+        if derivative >= 0:
+            pressed = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # of dampers, at w' = 1
+            damped = base.damping @ carried[:, k] - directions @ pressed
             force[:, derivative] -= level.vectors.T @ damped
             rate[:, derivative] -= level.vectors.T @ carried[:, k]
-            contact_force[~rigid, derivative] -= base.dampings[index][~rigid] * (
-                directions[:, ~rigid].T @ carried[:, k]
-            )
+            contact_force[~rigid, derivative] += pressed[~rigid]
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
     return _Prescribed(shapes, carried, force, rate, stop_force, contact_force, contact_rate)

@@ -92,7 +92,20 @@ class TestLaw:
         assert run.ledger.damping > 0
         assert run.ledger.impact > 0
 
-    def test_a_moving_stop_is_refused(self, refused):
-        m = mp.MultiPhiModel(chain(2), [mp.UnilateralContact("stop", "m0", 0.1, 20.0, 3.0)], modes="all")
-        moving = mp.StopMotion("stop", mp.Smooth(lambda t: 0.1 * t, 1e-6))
-        refused(ValueError, "stop motion of 'stop': got a viscous contact", mp.simulate, m, 1.0, loads=[moving])
+    @pytest.mark.parametrize("damping", [0.3, 3.0, 30.0])
+    def test_a_moving_stop_presses_by_its_speed_too(self, damping):
+        contact, velocity = mp.UnilateralContact("stop", "m0", 0.1, 20.0, damping), np.array([-1.0, 0.5])
+        m = mp.MultiPhiModel(chain(2), [contact], modes="all")
+        moving = mp.StopMotion("stop", mp.Harmonic(0.3, 0.4, -np.pi / 2))
+        run, rate = mp.simulate(m, 12.0, velocity=velocity, loads=[moving]), 0.8 * np.pi
+
+        def stop(t):
+            return 0.3 * np.sin(rate * t), 0.3 * rate * np.cos(rate * t)
+
+        expected, events = against_viscous(chain(2), contact, T, velocity, longest=0.05, stop=stop)
+        assert_allclose(run.displacement(T), expected, rtol=0, atol=1e-9)
+        assert_allclose([e.time for e in run.events], [time for time, _, _ in events], atol=1e-9)
+        assert len(events) >= 4
+        assert np.min(run.contact_force("stop", T)) >= -1e-12
+        assert abs(run.ledger.residual) < 1e-11
+        assert run.ledger.damping > 0

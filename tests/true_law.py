@@ -29,16 +29,24 @@ def with_forces(
 
 
 def against_viscous(
-    structure: LinearStructure, contact: UnilateralContact, times: np.ndarray, velocity: np.ndarray, longest: float
+    structure: LinearStructure,
+    contact: UnilateralContact,
+    times: np.ndarray,
+    velocity: np.ndarray,
+    longest: float,
+    stop: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0),
 ) -> tuple[np.ndarray, list[tuple[float, str, float]]]:
-    """x (n, k) from x = 0, and (time, kind, gap) of every event; longest: step, so that no event is stepped over."""
+    """x (n, k) from x = 0, and (time, kind, gap) of every event; longest: step, so that no event is stepped over.
+
+    stop: z and z' of a stop that moves.
+    """
     n, stiffness, row = structure.n, np.asarray(structure.stiffness), structure.row(contact.direction)
 
     def gap(t, y):
-        return row @ y[:n] + contact.gap
+        return row @ y[:n] + contact.gap - stop(t)[0]
 
     def force(t, y):
-        return -contact.stiffness * gap(t, y) - contact.damping * (row @ y[n:])
+        return -contact.stiffness * gap(t, y) - contact.damping * (row @ y[n:] - stop(t)[1])
 
     def rate(t, y):
         pushed = row * force(t, y) if phase == "closed" else 0.0
