@@ -355,6 +355,9 @@ class DrivenMotion(Motion):
         given = started, self.time, state.level, coefficients, state.phases, armed_at
         return DrivenSegment(*given, flow=state.flow, entry_work=entry_work)
 
+    def _work_since(self) -> float:
+        return self.work
+
     def _evaluations(self) -> int:
         assert isinstance(self.rule, DrivenRule)
         return self.model.evaluations + sum(finder.evaluations for finder in self.rule.finders.values())

@@ -74,6 +74,8 @@ class Motion:
             message=self.message,
             start=self.start,
             start_loss=self.start_loss,
+            final=self.state if segments else None,
+            final_work=self._work_since(),
             load=self.rule.load,
             stats=Statistics(
                 levels_built=self.model.levels_built,
@@ -84,6 +86,10 @@ class Motion:
                 function_evaluations=self._evaluations() - self._evaluated,
             ),
         )
+
+    def _work_since(self) -> float:
+        """Work [J] of what varies in time since the last segment ended."""
+        return 0.0
 
     def _evaluations(self) -> int:
         """Samples of event signals so far."""

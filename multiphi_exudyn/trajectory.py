@@ -17,7 +17,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.state import Event, Loss, Phase
+from multiphi_exudyn.state import Event, Loss, Phase, State
 from multiphi_exudyn.structure import At
 from multiphi_exudyn.transition import LoadedLevel
 
@@ -135,6 +135,8 @@ class Ledger:
 class Trajectory:
     """Result of ``simulate``.
 
+    final: the state it ends in, after whatever happened at that instant; final_work: see Motion.
+
     status: "ok" | "failed"; message: the cause. t_end [s]: how far it goes. events: in order of time.
     Times are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or "left".
     """
@@ -147,6 +149,8 @@ class Trajectory:
     message: str
     start: Start
     start_loss: Loss
+    final: State | None
+    final_work: float
     load: np.ndarray
     stats: Statistics
 
@@ -216,10 +220,10 @@ class Trajectory:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = sum((event.loss for event in self.events), self.start_loss)
         y0, v0 = self.start.displacement, self.start.velocity
-        last = self.segments[-1]
-        end = np.array([last.end])
-        varying = sum(segment.varying_work() for segment in self.segments)
-        reached = last.level.configuration(last.modal(end)[:, 0])
+        last = self.final
+        assert last is not None, "a run with segments has a final state"
+        varying = sum((segment.varying_work() for segment in self.segments), self.final_work)
+        reached = last.level.configuration(last.displacement)
         return Ledger(
             initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating),
             work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying,
@@ -227,7 +231,7 @@ class Trajectory:
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
             damping=losses.damping + sum(segment.damping_work() for segment in self.segments),
-            final=float(last.energy(end)[0]),
+            final=last.kinetic + float(last.level.strain(last.displacement)),
         )
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:

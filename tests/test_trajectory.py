@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from small_structures import chain, oscillator, random_model, stop
 
-from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
+from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, RayleighDamping, UnilateralContact, simulate
 
 SOFT = 40.0
 LOAD = -0.7
@@ -212,3 +212,13 @@ class TestOneMassPinned:
         assert_allclose(run.energy(3.0), 4.0, rtol=1e-12)
         assert_allclose(run.contact_impulse("stop", 2.0, 3.0), 8.0, rtol=1e-12)
         assert abs(run.ledger.residual) < 1e-14 * run.ledger.initial
+
+
+def test_the_ledger_of_a_run_that_fails_at_an_event_holds_that_event():
+    """Two stops at the same place cannot both be closed: the run ends there, with the first impact accounted for."""
+    structure = LinearStructure([[1.0]], [[1.0]], points={"m": 0})
+    stops = [UnilateralContact(name, "m", 1e-3) for name in ("one", "two")]
+    run = simulate(MultiPhiModel(structure, stops, modes="all"), 5.0, loads=[ConstantLoad("m", -10.0)])
+    assert run.status == "failed"
+    assert run.ledger.impact > 1e-3
+    assert abs(run.ledger.residual) < 1e-15
