@@ -215,16 +215,20 @@ class EventRule:
             state, loss, changes = self._answer(state, asking, heard, freed)
         else:
             state = self._with_phases(state)
-        for _ in range(ROUNDS):
+        for _ in range(ROUNDS + len(self._rigid)):
             if Phase.REFUSED not in state.phases:
                 return state, loss, changes
             heard |= {change.contact for change in changes}
-            unheard = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
-            if not unheard:
+            refused = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED}
+            unheard, pulling = refused - heard, self._held(state, refused)
+            if unheard:
+                heard |= unheard
+                freed |= self._held(state, unheard)
+                state, lost, made = self._answer(state, unheard, heard, freed)
+            elif pulling:  # heard before: what others did at this instant took its reaction away
+                state, lost, made = self._switch(state, pulling)
+            else:
                 return state, loss, changes
-            heard |= unheard
-            freed |= self._held(state, unheard)
-            state, lost, made = self._answer(state, unheard, heard, freed)
             loss, changes = loss + lost, changes + made
         names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")

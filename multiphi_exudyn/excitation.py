@@ -100,9 +100,10 @@ class Excitation:
         base, channels = model.base, _Channels(model, end, finer)
         for load in loads:
             channels.add(load)
+        channels.add_static(static_load(model, loads))
         patterns = _columns(channels.patterns, base.modes.count)
         stops = _columns(channels.stops, len(model.contacts))
-        return cls(static_load(model, loads), patterns, stops, tuple(channels.histories), tuple(channels.rate_of))
+        return cls(channels.static, patterns, stops, tuple(channels.histories), tuple(channels.rate_of))
 
     @property
     def channels(self) -> int:
@@ -161,6 +162,18 @@ class _Channels:
                 f"loads: got {type(load).__name__}, need ConstantLoad, Gravity, HarmonicLoad, SampledLoad, "
                 "FunctionLoad, SweepLoad, StopMotion or BaseMotion"
             )
+
+    def add_static(self, load: np.ndarray) -> None:
+        """Constant loads (m,); those that pull at damped rigid-body motion are a channel too.
+
+        Its free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for little damping d;
+        the response to a channel does not.
+        """
+        base, self.static = self._model.base, load
+        rigid = base.modes.rigid
+        if np.any(base.damping[:rigid]) and np.any(load[:rigid]):
+            self._append(load, self._no_stop(), History.constant(1.0))
+            self.static = np.zeros_like(load)
 
     def _shake(self, load: BaseMotion) -> None:
         """Inertia of the moving frame, and the stops that do not move with it."""

@@ -263,3 +263,15 @@ class TestEquivalences:
         model = mp.MultiPhiModel(chain(2), [], modes="all")
         with pytest.raises(mp.MultiPhiValueError, match="compiled"):
             mp.simulate(model, 1.0, loads=[mp.HarmonicLoad("m0", 1.0, 1.0)], compiled=True)
+
+
+@pytest.mark.parametrize("resistance", [1e-9, 1e-6, 1e-4, 1.0])
+def test_little_damping_of_a_rigid_body_under_a_constant_load_costs_no_accuracy(resistance):
+    ball = mp.LinearStructure([[2.0]], [[0.0]], damping=[[2.0 * resistance]], points={"m": 0})
+    run = mp.simulate(mp.MultiPhiModel(ball, [], modes="all"), 3.0, loads=[mp.Gravity("m", -10.0)])
+    for t in (1e-3, 0.1, 3.0):
+        x = resistance * t
+        fallen = -10 * t**2 * (0.5 - x / 6 + x**2 / 24 - x**3 / 120) if x < 1e-3 else None
+        exact = fallen if fallen is not None else -10 * (t + np.expm1(-x) / resistance) / resistance
+        assert_allclose(run.at("m", t), exact, rtol=1e-11)
+    assert abs(run.ledger.residual) < 1e-12 * run.ledger.work_of_loads

@@ -12,7 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from run_checks import complaints
 from small_structures import chain, oscillator, random_model, stop
+from strategies import built, recipe_of
 
 from multiphi_exudyn import (
     ConstantLoad,
@@ -201,3 +203,11 @@ class TestNotANumber:
         assert run.status == "failed"
         assert "finite" in run.message
         assert run.message.startswith("at t = 0")
+
+
+def test_a_closed_rigid_contact_never_pulls_whatever_others_did_at_its_instant():
+    """Seeds of a random campaign in which a contact that had just closed was left with a negative reaction."""
+    for number in (3559, 8999, 9045, 9361, 9920, 10099):
+        case = built(recipe_of(number))
+        given = case.displacement, case.velocity, case.loads
+        assert not complaints(simulate(case.model, case.t_end, *given, compiled=False))

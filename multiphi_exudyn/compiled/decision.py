@@ -277,6 +277,7 @@ def decide(
     if answer == DENIED and phases[contact] != ARMED:
         phases[contact] = REFUSED
     for other in range(len(phases)):
-        if phases[other] == REFUSED and (other != contact or answer == LIFTED):
+        held = rigid and k.closed[b, other]
+        if phases[other] == REFUSED and (other != contact or answer == LIFTED or held):
             return NOT_PLAIN, a
     return answer, b
