@@ -443,7 +443,7 @@ def test_the_example_inside_exudyn_agrees_with_the_model_on_its_own(capsys):
 
 LAWS = {
     "hardening": (lambda q: 1e4 * (q + 2 * q**3), [0.3, 0.8, 1.5]),
-    "two wells": (lambda q: 1e4 * (-q + 0.5 * q**3), [0.3, 0.8, 1.9]),
+    "two wells": (lambda q: 1e4 * (-3 * q + q**3), [0.3, 0.8, 1.9]),
 }
 
 
@@ -456,6 +456,8 @@ class TestForceLawsAndViscousContacts:
         model = chain([mp.ForceLaw("m2", function, segments=32, span=(-2, 2))])
         native = mp.simulate(model, 0.06, displacement=start)
         assert native.stats.levels_built > 12
+        lowest = min(np.min(segment.level.level.squares) for segment in native.segments)
+        assert (lowest < 0) == (name == "two wells")
         errors = []
         for step, matched in ((1e-4, 1e-4), (1e-4, None), (5e-5, None)):
             found = run(model, step, 0.06, displacement=start, matchedStepSize=matched)

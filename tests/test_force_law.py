@@ -324,6 +324,22 @@ class TestMotion:
         assert run.status == "failed"
         assert "not finite" in run.message
 
+    def test_an_early_event_of_a_growing_motion_is_found_whatever_the_horizon(self):
+        m = model(mp.ForceLaw("m2", ([-1, 0, 1, 2], [9, 0, -9, 60])))
+        short, long = (mp.simulate(m, end, displacement=1e-3 * START) for end in (3.0, 300.0))
+        assert np.min(m.level(("law+1",)).squares) < -4
+        assert long.status == "ok"
+        assert short.events[0].time == pytest.approx(long.events[0].time, rel=1e-13)
+        assert abs(long.ledger.residual) < 1e-9
+
+    def test_beside_a_rigid_stop_that_moves_the_work_of_its_constant_force_is_known(self):
+        m = model(law(magnet, segments=16), mp.UnilateralContact("stop", "m0", 0.1))
+        moving = mp.StopMotion("stop", mp.Smooth(lambda t: 0.15 * (1 - np.cos(2 * t)), 1e-10))
+        run = mp.simulate(m, 8.0, displacement=START, loads=[moving])
+        assert run.status == "ok"
+        assert sum(end - start for start, end in run.contact_intervals("stop")) > 0.5
+        assert abs(run.ledger.residual) < 1e-9
+
     def test_refuses_the_compiled_loop_and_moving_springs(self, refused):
         m = model(law(hardening, segments=4))
         with pytest.raises(MultiPhiError, match="compiled: got True with force laws"):
