@@ -36,7 +36,7 @@ Function = Callable[[Any], Any]
 
 SAMPLES = 2**14  # of a law on either side of its central knot; knots stand on samples
 MOST_SEGMENTS = 2**10  # a law that needs more is not followed by straight segments
-HALVINGS = 40  # of the interval in which the smallest error of so many segments lies
+BALANCED = 1e-3  # of the smallest error that so many segments can have: nearer to it is not sought
 STRAIGHT = 1e-12  # of the largest slope: a smaller change of slope is round-off
 ZERO_FORCE = 1e-14  # of the largest force: the law vanishes there
 
@@ -302,13 +302,15 @@ def _chord_error(q: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
 def _with_segments(sides: list[np.ndarray], values: list[np.ndarray], count: int, error: float) -> list[np.ndarray]:
     """The knots of at most so many segments with the smallest error [N]; ``error`` is one that they can have."""
     high, low, best = error, 0.0, _spread(sides, values, error)
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
+    while high - low > BALANCED * high:
+        middle = (low + high) / 2 if low else high / 4  # segments grow with error^-1/2
         found = _spread(sides, values, middle)
         if sum(len(index) - 1 for index in found) <= count:
             high, best = middle, found
         else:
             low = middle
+        if high <= ZERO_FORCE * error:
+            break
     return best
 
 

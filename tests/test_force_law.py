@@ -288,8 +288,8 @@ class TestMotion:
     def test_a_free_structure_is_held_by_its_law(self):
         row = np.array([0.0, 0.0, 1.0])
         true = with_forces(chain(3, ends=0), T, lambda t, x, v: -row * hardening(row @ x), START)
-        run = mp.simulate(model(law(hardening, segments=256), ends=0), 10.0, displacement=START)
-        assert relative(run.displacement(T), true) < 1e-3
+        run = mp.simulate(model(law(hardening, segments=96), ends=0), 10.0, displacement=START)
+        assert relative(run.displacement(T), true) < 6e-3
         assert np.ptp(run.energy(T)) < 1e-11 * run.ledger.initial
 
     def test_the_exchange_at_the_centre_is_one_instant(self):
