@@ -8,6 +8,7 @@ from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
+from multiphi_exudyn.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.level import Level, LevelOverride
 from multiphi_exudyn.loads import (
     BaseMotion,
@@ -26,6 +27,7 @@ from multiphi_exudyn.loads import (
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event
+from multiphi_exudyn.steady_state import SteadyState, steady_state
 from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
 from multiphi_exudyn.trajectory import Ledger, Trajectory
 from multiphi_exudyn.truncation import truncation_indicator
@@ -37,6 +39,7 @@ __all__ = [
     "ConstantLoad",
     "Event",
     "ForceLaw",
+    "FrequencyResponse",
     "FunctionLoad",
     "Gravity",
     "Harmonic",
@@ -57,6 +60,7 @@ __all__ = [
     "SampledLoad",
     "Section",
     "Smooth",
+    "SteadyState",
     "StopMotion",
     "Sweep",
     "SweepLoad",
@@ -64,7 +68,9 @@ __all__ = [
     "Trajectory",
     "UnilateralContact",
     "UpTo",
+    "frequency_response",
     "planar_beam",
     "simulate",
+    "steady_state",
     "truncation_indicator",
 ]

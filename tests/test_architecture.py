@@ -15,6 +15,7 @@ FLOORS = (
     ("structure", "beam", "contact", "force_law", "loads"),
     ("level", "equilibrium", "transition", "model", "excitation"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
+    ("shooting", "steady_state", "frequency_response"),
     ("exudyn_plugin",),
     ("study.scene",),
     ("study.running",),
