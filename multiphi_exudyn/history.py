@@ -30,6 +30,7 @@ DEGREE = 8  # of the polynomials that stand for smooth functions
 MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
 FIRST_PIECES = 64  # into which a smooth function's interval is divided before any comparison
 ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
+PHASE_ROUND_OFF = 2e-15  # of a phase, several roundings: no interpolant is asked to know it better
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -79,8 +80,13 @@ class History:
 
     @classmethod
     def modulated(cls, amplitude: Function, phase: Function, omega: Function, end: float, tolerance: float) -> History:
-        """u = Re(amplitude(t) exp(i phase(t))) on [0, end], omega the phase's rate, by which the pieces ride."""
-        return cls._interpolated(lambda t: amplitude(t) * np.exp(1j * phase(t)), omega, end, tolerance)
+        """u = Re(amplitude(t) exp(i phase(t))) on [0, end], omega the phase's rate, by which the pieces ride.
+
+        After many cycles a phase is known to its round-off only, and no interpolant comes closer.
+        """
+        ends = np.array([0.0, end])
+        known = PHASE_ROUND_OFF * float(np.max(np.abs(amplitude(ends) * phase(ends))))
+        return cls._interpolated(lambda t: amplitude(t) * np.exp(1j * phase(t)), omega, end, max(tolerance, known))
 
     @classmethod
     def _interpolated(cls, function: Function, omega: Function, end: float, tolerance: float) -> History:

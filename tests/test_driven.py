@@ -275,3 +275,12 @@ def test_little_damping_of_a_rigid_body_under_a_constant_load_costs_no_accuracy(
         exact = fallen if fallen is not None else -10 * (t + np.expm1(-x) / resistance) / resistance
         assert_allclose(run.at("m", t), exact, rtol=1e-11)
     assert abs(run.ledger.residual) < 1e-12 * run.ledger.work_of_loads
+
+
+def test_a_sweep_of_thousands_of_cycles_is_no_failure_though_its_phase_is_known_to_round_off_only():
+    """2 to 250 Hz in 60 s: 47500 rad."""
+    structure = chain(2, damping=mp.ModalDamping([0.1, 0.1]), stiffness=1e4)
+    run = mp.simulate(mp.MultiPhiModel(structure, modes="all"), 61.0, loads=[mp.SweepLoad("m1", 1.0, 2, 250, 60.0)])
+    assert run.status == "ok"
+    assert "smooth loads: the response is certain to" in run.message
+    assert len(run.segments) < 2000
