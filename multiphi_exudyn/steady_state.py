@@ -35,9 +35,10 @@ __all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "steady_state"]
 
 HIGHEST_ORDER = 8  # of a sub-harmonic response that is looked for
 CHUNK = 2 * HIGHEST_ORDER  # periods run at a time: every order is seen to repeat
-NEAR = 0.1  # of the size of the motion: states that repeat to this are worth Newton's method,
+NEAR = 0.03  # of the size of the motion: states that repeat to this are worth Newton's method,
 FAR = 1.0  # of how far the run has been: a longer step leaves the response that it was about to reach
-MOST_STEPS = 8  # of Newton's method: within one order of events the map is nearly linear
+MOST_STEPS = 8  # of Newton's method: within one order of events the map is nearly linear,
+SHRINKING = 0.5  # and a step longer than this part of the one before shows that it is not
 ATTRACTS = 1 - 1e-7  # a multiplier above this cannot be told from 1 by finite differences
 DIFFERENCE = 1e-6  # of the size of the motion: step of the finite differences, half the digits
 TIGHTEST = 1e-12  # tolerance: below it lies the round-off of a period
@@ -219,19 +220,19 @@ class _Search:
         """A state that repeats after ``order`` periods and attracts, None where there is none nearby."""
         basis = self._basis(chunk.trajectory)
         origin = np.concatenate([self.weights @ x, self.weights @ v])
-        place = np.zeros(basis.shape[1])
+        place, allowed = np.zeros(basis.shape[1]), FAR * chunk.reach
         for _ in range(MOST_STEPS):
             reached = self._mapped(origin, basis, place, order)
             jacobian = None if reached is None else self._jacobian(origin, basis, place, order, reached, chunk.size)
             if reached is None or jacobian is None:
                 return None
-            multipliers = np.abs(np.linalg.eigvals(jacobian))
             step = np.linalg.lstsq(np.eye(len(place)) - jacobian, reached - place)[0]
-            place = place + step
-            if np.linalg.norm(place) > FAR * chunk.reach or not np.all(np.isfinite(place)):
+            length = float(np.linalg.norm(step))
+            if not length <= allowed:
                 return None
-            if np.linalg.norm(step) <= self.tolerance * chunk.size:
-                largest = float(np.max(multipliers)) ** (1 / order)
+            place, allowed = place + step, max(SHRINKING * length, self.tolerance * chunk.size)
+            if length <= self.tolerance * chunk.size:
+                largest = float(np.max(np.abs(np.linalg.eigvals(jacobian)))) ** (1 / order)
                 return (*self._configuration(origin, basis, place), largest) if largest < ATTRACTS else None
         return None
 

@@ -3,8 +3,12 @@
 import importlib
 import importlib.util
 import math
+
+
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -13,6 +17,7 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 def load(name):
     spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
@@ -54,3 +59,23 @@ def test_force_laws(capsys, monkeypatch, tmp_path):
         assert runs["user object"] == pytest.approx(runs["native"], rel=0.02)
     assert (tmp_path / "laws.png").stat().st_size > 10_000
     assert capsys.readouterr().out.count("order") == 4
+
+
+def test_modal_test(capsys, tmp_path):
+    picture = tmp_path / "modal.png"
+    own, found = load("modal_test").main([str(picture)])
+    assert found.frequencies == pytest.approx(own.frequencies, rel=0.002)
+    assert found.ratios == pytest.approx(own.ratios, rel=0.05)
+    assert len(found.frequencies) == 4
+    assert capsys.readouterr().out.count("\n") == 5
+    assert picture.stat().st_size > 10_000
+
+
+def test_frequency_response(capsys, tmp_path):
+    picture = tmp_path / "response.png"
+    found = load("frequency_response").main([str(picture)])
+    assert found.up.amplitude("node2")[-1] == pytest.approx(found.down.amplitude("node2")[0], rel=1e-6)
+    assert found.up.amplitude("node2")[-1] == pytest.approx(found.linear("node2", np.array([10.0]))[0], rel=1e-4)
+    assert found.up.duty("support")[0] > 0.02
+    assert capsys.readouterr().out.count("node2") == 8
+    assert picture.stat().st_size > 10_000

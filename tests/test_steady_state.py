@@ -150,7 +150,7 @@ def test_a_constant_load_shifts_the_response_of_a_linear_model_and_leaves_its_am
 
 
 def test_a_run_that_fails_is_a_state_with_its_cause_and_the_next_frequency_goes_on(monkeypatch):
-    """A stop as stiff as the spring, two contacts a period of the load: chatter, if one in two periods were the limit."""
+    """A stop as stiff as the spring, an impact a period of the load, where fewer are called chatter."""
     monkeypatch.setattr(sys.modules[Motion.__module__], "CHATTER_WINDOW", 12)
     monkeypatch.setattr(sys.modules[Motion.__module__], "EVENTS_PER_PERIOD", 0.5)
     model = oscillator(gap=0.4, contact=8.0, damping=mp.ModalDamping([0.3]))
