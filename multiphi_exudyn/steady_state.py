@@ -6,12 +6,8 @@ The state at whole periods T of the load, q = (s y, y') in base coordinates with
 
 A response of order p repeats after p periods, P^p(q) = q: 1 is a periodic response, 2 and more a sub-harmonic one. The
 run goes on from chunk to chunk of periods until the states repeat to a tolerance; that test decides. What decays slowly
-is not waited for: between chunks Newton's method looks for the repeating state,
-
-    (1 - J) dq = P^p(q) - q,   J = dP^p / dq by finite differences in the modes of the level that holds at whole periods
-
-and the next chunk starts there, if the state attracts: the eigenvalues of J, the multipliers, lie inside the unit
-circle. Source: A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, 1995, ch. 5 (shooting) and 3 (multipliers).
+is not waited for: between chunks Newton's method looks for the repeating state (shooting.py), and the next chunk starts
+there, if the state attracts.
 """
 
 from __future__ import annotations
@@ -25,9 +21,9 @@ from typing import TypeAlias
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Harmonic, HarmonicLoad, Load, StaticLoad
+from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Harmonic, HarmonicLoad, StaticLoad
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
-from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real
 from multiphi_exudyn.trajectory import Trajectory
 
@@ -35,11 +31,7 @@ __all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "steady_state"]
 
 HIGHEST_ORDER = 8  # of a sub-harmonic response that is looked for
 CHUNK = 2 * HIGHEST_ORDER  # periods run at a time: every order is seen to repeat
-NEAR = 0.03  # of the size of the motion: states that repeat to this are worth Newton's method,
-FAR = 1.0  # of how far the run has been: a longer step leaves the response that it was about to reach
-MOST_STEPS = 8  # of Newton's method: within one order of events the map is nearly linear,
-SHRINKING = 0.5  # and a step longer than this part of the one before shows that it is not
-ATTRACTS = 1 - 1e-7  # a multiplier above this cannot be told from 1 by finite differences
+NEAR = 0.03  # of the size of the motion: states that repeat to this are worth Newton's method
 DIFFERENCE = 1e-6  # of the size of the motion: step of the finite differences, half the digits
 TIGHTEST = 1e-12  # tolerance: below it lies the round-off of a period
 SAMPLES = 64  # of a period of the load, for the size of the motion; HIGHEST_ORDER times as many to look for extremes
@@ -116,7 +108,7 @@ def steady_state(
     n = model.structure.n
     x = np.zeros(n) if displacement is None else model.structure.vector("displacement", displacement)
     v = np.zeros(n) if velocity is None else model.structure.vector("velocity", velocity)
-    return _Search(model, load, (load, *other_loads), tolerance).settle(x, v, periods)
+    return _Search(PeriodMap(model, (load, *other_loads), 1.0 / frequency(load)), load, tolerance).settle(x, v, periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
@@ -161,26 +153,19 @@ class _Chunk:
         return self.size + float(np.max(np.linalg.norm(self.states.T - self.states[:, -1], axis=1)))
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Search:
     """A search under way; see the module's docstring."""
 
-    model: MultiPhiModel
+    map: PeriodMap
     load: PeriodicLoad
-    loads: tuple[Load, ...]
     tolerance: float
-
-    def __post_init__(self) -> None:
-        self.period = 1.0 / frequency(self.load)
-        base = self.model.base
-        self.shapes, self.weights = base.modes.shapes, base.weights
-        self.scales = np.maximum(base.modes.omega, 2 * math.pi / self.period)[:, None]
 
     def settle(self, x: np.ndarray, v: np.ndarray, periods: int) -> SteadyState:
         """Chunks until states repeat, Newton's method in between."""
         done, multiplier = 0, math.nan
         while True:
-            trajectory = self._run(x, v, CHUNK)
+            trajectory = self.map.run(x, v, CHUNK)
             if trajectory.status != "ok":
                 return self._failed(trajectory, done)
             chunk, done = self._chunk(trajectory), done + CHUNK
@@ -191,96 +176,30 @@ class _Search:
                 return self._lost(chunk, done)
             x, v, multiplier = self._shot(chunk)
 
-    def _run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
-        return simulate(self.model, periods * self.period, x, v, self.loads)
-
     def _chunk(self, trajectory: Trajectory) -> _Chunk:
-        whole = np.minimum(np.arange(CHUNK + 1) * self.period, trajectory.t_end)
+        whole = np.minimum(np.arange(CHUNK + 1) * self.map.period, trajectory.t_end)
         last = np.linspace(whole[-2], whole[-1], SAMPLES)
         x, v = trajectory.displacement(whole), trajectory.velocity(whole)
-        moving = self._states(trajectory.displacement(last), trajectory.velocity(last))
+        moving = self.map.states(trajectory.displacement(last), trajectory.velocity(last))
         size = float(np.max(np.linalg.norm(moving - np.mean(moving, axis=1, keepdims=True), axis=0)))
-        return _Chunk(x, v, self._states(x, v), size, trajectory)
-
-    def _states(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """q (2 m, k) of x, x' (n, k)."""
-        return np.vstack([self.scales * (self.weights @ x), self.weights @ v])
-
-    # ------------------------------------------------------------------ Newton's method
+        return _Chunk(x, v, self.map.states(x, v), size, trajectory)
 
     def _shot(self, chunk: _Chunk) -> tuple[np.ndarray, np.ndarray, float]:
         """x, x' where the next chunk starts, and the largest multiplier there."""
         x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
         order = chunk.candidate
-        return (self._newton(x, v, order, chunk) if order else None) or (x, v, math.nan)
-
-    def _newton(
-        self, x: np.ndarray, v: np.ndarray, order: int, chunk: _Chunk
-    ) -> tuple[np.ndarray, np.ndarray, float] | None:
-        """A state that repeats after ``order`` periods and attracts, None where there is none nearby."""
-        basis = self._basis(chunk.trajectory)
-        origin = np.concatenate([self.weights @ x, self.weights @ v])
-        place, allowed = np.zeros(basis.shape[1]), FAR * chunk.reach
-        for _ in range(MOST_STEPS):
-            reached = self._mapped(origin, basis, place, order)
-            jacobian = None if reached is None else self._jacobian(origin, basis, place, order, reached, chunk.size)
-            if reached is None or jacobian is None:
-                return None
-            step = np.linalg.lstsq(np.eye(len(place)) - jacobian, reached - place)[0]
-            length = float(np.linalg.norm(step))
-            if not length <= allowed:
-                return None
-            place, allowed = place + step, max(SHRINKING * length, self.tolerance * chunk.size)
-            if length <= self.tolerance * chunk.size:
-                largest = float(np.max(np.abs(np.linalg.eigvals(jacobian)))) ** (1 / order)
-                return (*self._configuration(origin, basis, place), largest) if largest < ATTRACTS else None
-        return None
-
-    def _basis(self, trajectory: Trajectory) -> np.ndarray:
-        """Orthonormal directions of q (2 m, 2 r): modes of the last level, at rest and moving."""
-        closed = trajectory.segments[-1].level.level.closed
-        vectors = self.model.level(closed).vectors
-        spanned = np.linalg.qr(self.scales * vectors)[0]
-        nothing = np.zeros_like(vectors)
-        return np.block([[spanned, nothing], [nothing, vectors]])
-
-    def _configuration(self, origin: np.ndarray, basis: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """x, x' (n,) at a place (2 r,) in the basis, seen from y, y' (2 m,)."""
-        m, moved = len(self.scales), basis @ place
-        y, y_t = origin[:m] + moved[:m] / self.scales[:, 0], origin[m:] + moved[m:]
-        return self.shapes @ y, self.shapes @ y_t
-
-    def _mapped(self, origin: np.ndarray, basis: np.ndarray, place: np.ndarray, order: int) -> np.ndarray | None:
-        """P^order in the basis, None where the run fails or cannot start."""
-        try:
-            trajectory = self._run(*self._configuration(origin, basis, place), order)
-        except MultiPhiValueError:  # a disturbance that leads into a rigid stop
-            return None
-        if trajectory.status != "ok":
-            return None
-        end = trajectory.t_end
-        m = len(self.scales)
-        start = np.concatenate([self.scales[:, 0] * origin[:m], origin[m:]])
-        reached = self._states(trajectory.displacement(end)[:, None], trajectory.velocity(end)[:, None])[:, 0]
-        return np.asarray(basis.T @ (reached - start))
-
-    def _jacobian(
-        self, origin: np.ndarray, basis: np.ndarray, place: np.ndarray, order: int, reached: np.ndarray, size: float
-    ) -> np.ndarray | None:
-        columns = []
-        for direction in np.eye(len(place)):
-            moved = self._mapped(origin, basis, place + DIFFERENCE * size * direction, order)
-            if moved is None:
-                return None
-            columns.append((moved - reached) / (DIFFERENCE * size))
-        return np.array(columns).T
+        if not order:
+            return x, v, math.nan
+        closed = chunk.trajectory.segments[-1].level.level.closed
+        shooting = Shooting.around(self.map, order, closed, x, v, DIFFERENCE * chunk.size)
+        return shooting.attracting(self.tolerance * chunk.size, chunk.reach) or (x, v, math.nan)
 
     # ------------------------------------------------------------------ results
 
     def _found(self, chunk: _Chunk, order: int, done: int, multiplier: float) -> SteadyState:
         residual = chunk.drifts[order - 1] / chunk.size if chunk.size else 0.0
         x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
-        shown = self._run(x, v, order)
+        shown = self.map.run(x, v, order)
         return SteadyState("periodic", "", self.load, order, float(residual), multiplier, done, shown, x, v)
 
     def _lost(self, chunk: _Chunk, done: int) -> SteadyState:
@@ -290,9 +209,10 @@ class _Search:
         return SteadyState("not settled", message, self.load, 0, residual, math.nan, done, chunk.trajectory, x, v)
 
     def _failed(self, trajectory: Trajectory, done: int) -> SteadyState:
-        reached = done + int(trajectory.t_end / self.period)
+        reached = done + int(trajectory.t_end / self.map.period)
         message = f"after {reached} periods: {trajectory.message}"
-        x, v = self.shapes @ trajectory.start.displacement, self.shapes @ trajectory.start.velocity
+        shapes, start = self.map.model.base.modes.shapes, trajectory.start
+        x, v = shapes @ start.displacement, shapes @ start.velocity
         return SteadyState("failed", message, self.load, 0, math.nan, math.nan, reached, trajectory, x, v)
 
 
