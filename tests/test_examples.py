@@ -3,8 +3,6 @@
 import importlib
 import importlib.util
 import math
-
-
 import sys
 from pathlib import Path
 
