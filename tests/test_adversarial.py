@@ -243,11 +243,14 @@ class TestTheChecksSee:
 
     def test_energy_out_of_nothing(self):
         run = run_of(built(self.CASE))
-        for changed, complaint in ((0, "energy: rises"), (-1, "ledger: residual")):
-            segments = list(run.segments)
-            weaker = dataclasses.replace(segments[changed], coefficients=0.9 * segments[changed].coefficients)
-            segments[changed] = weaker
-            found = complaints(dataclasses.replace(run, segments=segments))
+        first, *others = run.segments
+        weaker = dataclasses.replace(first, coefficients=0.9 * first.coefficients)
+        slower = dataclasses.replace(run.start, velocity=0.9 * run.start.velocity)
+        for wrong, complaint in (
+            ({"segments": [weaker, *others]}, "energy: rises"),
+            ({"start": slower}, "ledger: residual"),
+        ):
+            found = complaints(dataclasses.replace(run, **wrong))
             assert any(text.startswith(complaint) for text in found), found
 
     def test_the_lowest_value_between_samples(self):
