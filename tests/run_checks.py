@@ -9,7 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.state import Phase
 
-CLOSES = 1e-10  # of the largest energy: what the ledger may leave open, and what a row may be below zero
+CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
@@ -87,11 +87,14 @@ def missed(run, segments, samples):
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
     of the whole run: an impact that stops all motion leaves a state that is round-off of the one before.
     """
-    complete, largest = _complete(run), {}
+    complete, largest, reach = _complete(run), {}, _reach(segments)
     looked_at = list(_signals(segments, run, complete))
     for segment, contact, _, signal in looked_at:
         key = contact, contact in segment.level.level.indices
-        largest[key] = max(largest.get(key, 0.0), signal.size(segment.end - segment.start))
+        own = signal.size(segment.end - segment.start)
+        largest[key] = max(
+            largest.get(key, 0.0), own, signal.arm * (np.max(np.abs(run.load)) if signal.held else reach)
+        )
     for segment, contact, heard, signal in looked_at:
         size = largest[contact, contact in segment.level.level.indices]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
@@ -111,14 +114,25 @@ def _signals(segments, run, complete):
                 yield segment, contact, phase is Phase.ARMED, Signal(segment, contact, bool(rigid[contact]))
 
 
+def _reach(segments):
+    """The largest coordinate y of the run: what a gap that never moves is the difference of."""
+    starts = [segment.level.configuration(segment.modal(np.array([segment.start]))) for segment in segments]
+    return max((float(np.max(np.abs(y))) for y in starts), default=0.0)
+
+
 class Signal:
-    """s of a contact on a segment: constant + Re sum a_j t^d_j exp(lambda_j t)."""
+    """s of a contact on a segment: constant + Re sum a_j t^d_j exp(lambda_j t).
+
+    held: whether s is a reaction. arm: what a coordinate, or a load, of 1 can at most make of it.
+    """
 
     def __init__(self, segment, contact, rigid):
         level = segment.level
         own, self.basis = level.level, level.level.response.basis
         modal = own.response.shapes * segment.coefficients
         if rigid and contact in own.indices:
+            row = own.base.directions[:, contact]
+            self.held, self.arm = True, float(np.sum(np.abs(row)) / (row @ row))
             k = own.indices.index(contact)
             rates = self.basis.derivative(segment.coefficients)
             self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ (own.response.shapes * rates)
@@ -129,6 +143,7 @@ class Signal:
             self.coefficients = sign * (own.gap_rows[contact] @ modal)
             self.constant = sign * float(level.gap_constants[contact])
             row = np.abs(own.base.directions[:, contact])
+            self.held, self.arm = False, float(np.sum(row))
             self.terms = float(row @ (np.abs(own.vectors) @ np.sum(np.abs(modal), axis=1)))
             self.terms += float(row @ np.abs(level.asymptotic.configuration)) + abs(float(own.base.gaps[contact]))
 
