@@ -4,7 +4,7 @@ A harmonic force at node1; where the tip strikes the support the curve bends to 
 structure does depends on where it comes from. Most responses with contact never repeat; their amplitude is the mean
 over the last periods. Beside them: the full nonlinear Exudyn beam, run until its amplitude is that of a steady state.
 
-Run: python examples/frequency_response.py [--full] [FIGURE.png]      --full: all frequencies and the full beam, 15 min
+Run: python examples/frequency_response.py [--full] [FIGURE.png]      --full: all frequencies and the full beam, 5 min
 """
 
 from __future__ import annotations

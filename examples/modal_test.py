@@ -3,7 +3,7 @@
 A shaker sweeps from 2 to 250 Hz, then the beam rings down; accelerometers at node1 to node3 are sampled. Frequencies
 and damping ratios are identified from the force and these records alone. The third mode, 0.009 % of the critical
 damping, decays by a factor of e in 16 s: its peak is 0.02 Hz wide, and a record that ends before it has died away
-widens it. After 60 s of decay 2 % of it are left, its ratio comes out to 1 %; after 120 s to 0.1 %.
+widens it. After 60 s of decay 2 % of it are left, and its ratio comes out to half a per cent.
 
 Run: python examples/modal_test.py [FIGURE.png]
 """

@@ -29,6 +29,13 @@ def test_a_lone_mode_in_a_band_is_exact():
     assert found.ratios == pytest.approx(RATIOS[2:3], rel=1e-6)
 
 
+def test_neighbouring_modes_are_told_apart():
+    hz, ratios = np.array([30.0, 32.0, 108.0, 205.0]), np.array([2e-3, 1e-3, 1e-2, 1e-2])
+    found = identified_modes(LINES, accelerances(hz=hz, ratios=ratios), 2.0, 250.0)
+    assert found.frequencies == pytest.approx(hz, rel=1e-5)
+    assert found.ratios == pytest.approx(ratios, rel=1e-4)
+
+
 def test_noise_on_the_functions_makes_no_modes_and_moves_none():
     functions = accelerances()
     random = np.random.default_rng(0)

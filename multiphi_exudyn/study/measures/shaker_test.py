@@ -9,8 +9,8 @@ A, F the discrete Fourier transforms of responses and force. Near a mode, in a b
     H_p = (b_p0 + b_p1 s + b_p2 s^2) / (s - lambda),   s = 2 pi i (f - f_0)
 
 with one pole lambda for all responses; the polynomial holds the residue and what the other modes add. Multiplied by
-s - lambda the equations are linear in lambda and b, weighted by the last 1 / (s - lambda) they are those of H itself
-(C. K. Sanathanan, J. Koerner, IEEE Trans. Automatic Control 8, 1963). The band follows the pole's own width.
+s - lambda the equations are linear in lambda and b (E. C. Levy, IRE Trans. Automatic Control 4, 1959). The band is
+found with the pole: it ends at half way to the next peak, or some widths of the peak away from it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,10 @@ from multiphi_exudyn.study.measures.response_frequencies import ResponseModes
 __all__ = ["frequency_response_functions", "identified_modes"]
 
 PROMINENCE = 10.0  # dB by which a peak of all responses together stands out of its surroundings
-FIRST_BAND = 0.1  # of the peak's frequency, either side: wide beside any line's noise
+FIRST_BAND = 0.1  # of the peak's frequency at most, either side: wide beside the noise of single lines
 WIDTHS = 4.0  # half band in units of zeta f, the half width of the peak,
 FEWEST_LINES = 8  # either side of it, whatever its width
 ROUNDS = 4  # of a band from the pole's width and a pole from the band
-WEIGHTINGS = 8  # of the equations by the last pole: they change no more after a few
 DEGREE = 2  # of b_p, in the last band
 SOFTEST = 0.2  # of the critical damping: what is softer than this is no resonance
 
@@ -57,31 +56,33 @@ def identified_modes(frequencies: np.ndarray, functions: np.ndarray, lowest: flo
     f, h = frequencies[band], functions[:, band]
     level = 10 * np.log10(np.sum(np.abs(h) ** 2, axis=0))
     peaks = scipy.signal.find_peaks(level, prominence=PROMINENCE)[0]
-    poles = [_pole(f, h, float(f[peak])) for peak in peaks]
+    poles = [_pole(f, h, float(f[peak]), _alone(f[peaks], float(f[peak]))) for peak in peaks]
     found = sorted((abs(pole) / (2 * math.pi), -pole.real / abs(pole)) for pole in poles)
     kept = [(hz, ratio) for hz, ratio in found if lowest <= hz <= highest and 0 < ratio < SOFTEST]
     return ResponseModes(np.array([hz for hz, _ in kept]), np.array([ratio for _, ratio in kept]))
 
 
-def _pole(f: np.ndarray, h: np.ndarray, peak: float) -> complex:
-    """The pole [1/s] near a peak [Hz]."""
+def _alone(peaks: np.ndarray, peak: float) -> float:
+    """Half band [Hz] around a peak that no other one lies in."""
+    others = np.abs(peaks[peaks != peak] - peak)
+    return float(np.min(others / 2, initial=FIRST_BAND * peak))
+
+
+def _pole(f: np.ndarray, h: np.ndarray, peak: float, most: float) -> complex:
+    """The pole [1/s] near a peak [Hz], from a half band of ``most`` [Hz] or less."""
     fewest = FEWEST_LINES * float(f[1] - f[0])
-    half, centre, pole = max(FIRST_BAND * peak, fewest), peak, 0j
+    half, centre, pole = max(most, fewest), peak, 0j
     for _ in range(ROUNDS):
         use = np.abs(f - centre) <= half
         pole = 2j * math.pi * centre + 2 * math.pi * half * _fitted((f[use] - centre) / half, h[:, use])
         centre = pole.imag / (2 * math.pi)
-        half = max(WIDTHS * abs(pole.real) / (2 * math.pi), fewest)
+        half = max(min(WIDTHS * abs(pole.real) / (2 * math.pi), most), fewest)
     return pole
 
 
 def _fitted(places: np.ndarray, h: np.ndarray) -> complex:
     """The pole of H (points, k) at s = 1j times places (k,) in -1 ... 1."""
-    s, pole = 1j * places, complex(-FIRST_BAND)
-    powers = np.vander(s, DEGREE + 1)
-    for _ in range(WEIGHTINGS):
-        weights = 1 / np.abs(s - pole)
-        polynomials = np.kron(np.eye(len(h)), powers * weights[:, None])
-        matrix = np.column_stack([(h * weights).ravel(), polynomials])
-        pole = complex(np.linalg.lstsq(matrix, (h * s * weights).ravel())[0][0])
-    return pole
+    s = 1j * places
+    polynomials = np.kron(np.eye(len(h)), np.vander(s, DEGREE + 1))
+    matrix = np.column_stack([h.ravel(), polynomials])
+    return complex(np.linalg.lstsq(matrix, (h * s).ravel())[0][0])
