@@ -83,7 +83,9 @@ def draw(record: Record, found: ResponseModes, path: str) -> None:
         SWEEP + 0.8, 0.93, "end of the sweep, free decay", fontsize=9, va="top", transform=upper.get_xaxis_transform()
     )
     upper.set(xlabel="time [s]", ylabel="node2 [m/s²]", xlim=(0, record.time[-1]))
-    upper.set_title("1 N at node1 swept from 2 to 250 Hz, support removed", fontsize=11)
+    upper.set_title(
+        "1 N at node1 swept from 2 to 250 Hz, support removed; in brackets: identified less the model's", fontsize=11
+    )
     _functions(lower, record, found)
     for axis in (upper, lower):
         axis.spines[["top", "right"]].set_visible(False)
@@ -97,7 +99,7 @@ def _functions(axis: matplotlib.axes.Axes, record: Record, found: ResponseModes)
     for k, (point, colour) in enumerate(zip(POINTS, ("#009E73", "#0072B2", "#D55E00"), strict=True)):
         axis.loglog(f[band], np.abs(functions[k, band]), color=colour, lw=2.5, alpha=0.35, label=point)
         axis.loglog(f[band], np.abs(fitted[k]), color=colour, lw=0.9)
-    axis.plot([], [], color="0.3", lw=0.9, label="made of the identified modes (number: difference to the model's)")
+    axis.plot([], [], color="0.3", lw=0.9, label="made of the identified modes")
     axis.set_ylim(top=axis.get_ylim()[1] * 60)
     values = zip(record.own.frequencies, found.frequencies, record.own.ratios, found.ratios, strict=True)
     for k, (true, hz, own, ratio) in enumerate(values):
