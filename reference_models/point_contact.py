@@ -82,8 +82,7 @@ def _point_contact(beam: Beam, contact: UnilateralContact) -> PointContact:
     if point not in beam.points:
         known = ", ".join(sorted(beam.points)) or "none"
         raise MultiPhiValueError(f"contact {contact.name!r} direction: got {point!r}, need one of: {known}")
-    damping = float(getattr(contact, "damping", 0.0))
-    return PointContact(contact.name, point, coefficient, float(contact.gap), float(contact.stiffness), damping)
+    return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping)
 
 
 def point_and_coefficient(what: str, direction: At) -> tuple[str, float]:

@@ -47,13 +47,6 @@ ANCF, EXACT = "ancf", "geometrically-exact"
 
 
 @dataclass(frozen=True)
-class Viscous(UnilateralContact):
-    """A contact with the damping [N s/m] that its law takes."""
-
-    damping: float = 0.0
-
-
-@dataclass(frozen=True)
 class Cubic:
     """F = k1 q + k3 q^3."""
 
@@ -285,7 +278,7 @@ STOP = UnilateralContact("stop", "inner", 2e-5, 3e4)
 
 def contact_force(full, contact, way):
     """h lambda of a stop that moves by way(t) = (z, z')."""
-    row, d = full.structure.row("inner"), getattr(contact, "damping", 0.0)
+    row, d = full.structure.row("inner"), contact.damping
 
     def force(t, x, v):
         z, rate = way(t)
@@ -329,7 +322,7 @@ class TestStops:
         assert np.max(np.abs(left.points["tip"] - carried.points["tip"])) > 1e-6
 
     def test_a_viscous_contact_is_met_and_never_pulls(self):
-        contact = Viscous("stop", "inner", 1e-4, 3e4, damping=40.0)
+        contact = UnilateralContact("stop", "inner", 1e-4, 3e4, damping=40.0)
         load = HarmonicLoad("tip", -5.0, 20.0, 0.5)
 
         def force(full):
@@ -345,7 +338,7 @@ class TestStops:
         assert difference(found.points, elastic.points) > 1e-2
 
     def test_a_viscous_contact_dissipates_what_the_beam_loses(self):
-        contact = Viscous("stop", {"inner": 2.0}, 2e-4, 1e4, damping=10.0)
+        contact = UnilateralContact("stop", {"inner": 2.0}, 2e-4, 1e4, damping=10.0)
         load = [HarmonicLoad("tip", 1.0, 20.0), StopMotion("stop", Harmonic(1e-4, 10.0, -np.pi / 2))]
         _, found = run(load, contacts=[contact], damped=False, step=2e-5)
         assert found.balance.dissipated > 0.05 * found.balance.work
@@ -355,7 +348,7 @@ class TestStops:
         """At hardly any damping the two implementations of a contact agree."""
         load = [HarmonicLoad("tip", -5.0, 20.0)]
         _, element = run(load, contacts=[replace(STOP, gap=5e-4)])
-        _, spring = run(load, contacts=[Viscous("stop", "inner", 5e-4, 3e4, damping=1e-9)])
+        _, spring = run(load, contacts=[UnilateralContact("stop", "inner", 5e-4, 3e4, damping=1e-9)])
         assert element.contact_intervals["stop"]
         assert difference(spring.points, element.points) < 1e-3
 
@@ -414,7 +407,7 @@ class TestArguments:
 
     def test_a_round_support_neither_moves_nor_damps(self, refused):
         settings = FullBeamSettings(elements=2, contact="circle")
-        viscous = Viscous("stop", "inner", 1e-3, 1e4, damping=1.0)
+        viscous = UnilateralContact("stop", "inner", 1e-3, 1e4, damping=1.0)
         refused(MultiPhiValueError, "contact 'stop': got a circle", FullBeam, BEAM, [viscous], settings)
         full = FullBeam(BEAM, [STOP], settings)
         loads = [StopMotion("stop", Harmonic(1e-3, 1.0))]

@@ -201,7 +201,7 @@ def _sum(values: Sequence[float | None]) -> float | None:
 
 
 def _check(bench: Workbench, modes: int, step: float | None) -> None:
-    most = bench.structure.n - len(bench.mechanics.contacts)
+    most = bench.structure.n - bench.mechanics.directions
     if isinstance(modes, bool) or not isinstance(modes, int):
         raise MultiPhiTypeError(f"modes: got {modes!r}, need an integer")
     if not 1 <= modes <= most:

@@ -179,9 +179,14 @@ def _scene(comparison: Comparison) -> dict[str, Any]:
         "start": None if scene.file.start is None else scene.file.start.model_dump(),
         "loads": [load.model_dump(exclude_none=True) for load in scene.file.loads],
         "contacts": {
-            contact.name: {"gap": contact.gap, "stiffness": "rigid" if contact.rigid else contact.stiffness}
+            contact.name: {
+                "gap": contact.gap,
+                "stiffness": "rigid" if contact.rigid else contact.stiffness,
+                "damping": contact.damping,
+            }
             for contact in comparison.bench.mechanics.contacts
         },
+        "force_laws": [law.model_dump(exclude_none=True) for law in scene.file.force_laws],
         "assumptions": list(comparison.bench.mechanics.assumptions),
     }
 

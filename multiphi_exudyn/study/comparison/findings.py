@@ -6,11 +6,15 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
+from multiphi_exudyn.study.scene.scene_laws import described_laws
 from multiphi_exudyn.study.scene.scene_loads import described_loads
 
 __all__ = ["Findings", "findings", "percent", "seconds", "times"]
@@ -88,14 +92,18 @@ def _compared(comparison: Comparison) -> str:
     )
     return (
         f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}"
-        f"{_driven(comparison)}{', and meets ' + stops if stops else ''}. "
+        f"{_driven(comparison)}{', and meets ' + stops if stops else ''}{_on_it(comparison)}. "
         f"The reference is the {comparison.reference.label}."
     )
 
 
+def _on_it(comparison: Comparison) -> str:
+    laws = described_laws(comparison.bench.scene)
+    return f"; on it acts {' and '.join(laws)}" if laws else ""
+
+
 def _damped(contact: UnilateralContact) -> str:
-    damping = getattr(contact, "damping", 0.0)
-    return f", {engineering(damping)}N s/m" if damping else ""
+    return f", {engineering(contact.damping)}N s/m" if contact.damping else ""
 
 
 def _start(comparison: Comparison) -> str:
@@ -155,6 +163,7 @@ def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from _sensitivity(comparison)
     yield from _truncation(comparison)
     yield from _contact_law(comparison)
+    yield from _force_laws(comparison)
     if comparison.bench.overrides:
         yield (
             "The reduced levels have the printed frequencies and ratios, which no one linear model has. The full "
@@ -220,6 +229,34 @@ def _contact_law(comparison: Comparison) -> Iterable[str]:
         "rebound against a stop that gives way and pushes back. More modes do not remove that difference; "
         "it is the law, not the truncation. Levels of the reference's own stiffness have no such difference."
     )
+
+
+def _force_laws(comparison: Comparison) -> Iterable[str]:
+    """How well segments follow a law, and whether the reference stays where they do."""
+    for law in comparison.bench.mechanics.force_laws:
+        low, high = law.knots[[0, -1]]
+        span = f"{1e3 * low:g} to {1e3 * high:g} mm"
+        if callable(law.law):
+            yield (
+                f"Reduced models follow the force law {law.name} by {len(law.slopes)} straight segments from {span}, "
+                f"to {percent(law.error)} of its largest force there; the full beam has the law itself."
+            )
+        reached = _reached(comparison, law)
+        if len(reached) and not low <= np.min(reached) <= np.max(reached) <= high:
+            yield (
+                f"The reference leaves the span of the force law {law.name} ({span}): it reaches "
+                f"{1e3 * np.min(reached):.3g} to {1e3 * np.max(reached):.3g} mm. Beyond the span reduced models go on "
+                "along the last segments."
+            )
+
+
+def _reached(comparison: Comparison, law: ForceLaw) -> np.ndarray:
+    """q (k,) [m] of the reference; empty where it failed or not all of the law's points are recorded."""
+    places: dict[str, float] = {law.at: 1.0} if isinstance(law.at, str) else dict(law.at)
+    points = comparison.reference.points
+    if not all(name in points for name in places):
+        return np.empty(0)
+    return np.sum([factor * points[name] for name, factor in places.items()], axis=0)
 
 
 def _key_figures(comparison: Comparison) -> Iterable[tuple[str, str, str]]:

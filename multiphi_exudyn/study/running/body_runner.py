@@ -57,7 +57,8 @@ def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
 
 
 def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
-    """The fields of a ModelRun that the body's sensors give, on the common grid."""
+    """The fields of a ModelRun that the body's sensors give, on the common grid, without the springs of force laws."""
+    contacts = [contact.name for contact in bench.mechanics.contacts]
     points = {
         name: CubicHermiteSpline(recorded.time, values, recorded.velocities[name])(bench.time)
         for name, values in recorded.points.items()
@@ -65,12 +66,12 @@ def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
     return {
         "time": bench.time,
         "points": points,
-        "gaps": {name: np.interp(bench.time, recorded.time, gap) for name, gap in recorded.gaps.items()},
+        "gaps": {name: np.interp(bench.time, recorded.time, recorded.gaps[name]) for name in contacts},
         "contact_force": {
-            name: np.interp(bench.time, recorded.time, force) for name, force in recorded.contact_force.items()
+            name: np.interp(bench.time, recorded.time, recorded.contact_force[name]) for name in contacts
         },
-        "contact_intervals": {name: interval_array(given) for name, given in recorded.contact_intervals.items()},
-        "impulse": {name: _impulse(recorded, name) for name in recorded.contact_force},
+        "contact_intervals": {name: interval_array(recorded.contact_intervals[name]) for name in contacts},
+        "impulse": {name: _impulse(recorded, name) for name in contacts},
         "ledger": {
             row: float(sum(getattr(event.loss, row) for event in recorded.events))
             for row in ("impact", "truncation_kinetic", "truncation_strain")

@@ -102,6 +102,6 @@ def _start(bench: Workbench) -> dict[str, Any]:
         return {}
     if isinstance(start, DisplacedStart):
         return start.model_dump()
-    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False))
+    model = MultiPhiModel(bench.structure, bench.nonlinearities(rigid=False))
     reached = float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
     return {"load_at": start.load_at, "measured_at": start.load_at, "displacement": reached}

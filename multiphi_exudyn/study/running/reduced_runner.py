@@ -83,13 +83,13 @@ def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiMod
     contacts = bench.contacts(spec.contact == "rigid")
     assert spec.modes is not None, "filled in where the scene lists its models"
     projected = global_basis(bench.structure, contacts, spec.modes)
-    model = MultiPhiModel(projected, contacts, modes="all")
+    model = MultiPhiModel(projected, bench.nonlinearities(spec.contact == "rigid"), modes="all")
     return model, start_configuration(replace(bench, structure=projected), model)
 
 
 def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:
     """The fields of a ModelRun that a trajectory gives."""
-    contacts = [contact.name for contact in trajectory.model.contacts]
+    contacts = [contact.name for contact in bench.mechanics.contacts]
 
     def histories() -> dict[str, Any]:
         points = {name: trajectory.at(name, bench.time) for name in bench.points}

@@ -63,10 +63,10 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
         return f"Craig-Bampton in Exudyn, {reduced}, step {spec.step * 1e6:g} µs{start}"
     if isinstance(spec, StepwiseModel):
         return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
-    rigid = all(contact.rigid for contact in bench.contacts(spec.contact == "rigid"))
-    levels = f"{'rigid' if rigid else 'compliant'} levels, r = {spec.modes}"
+    kind = _levels(bench, spec.contact == "rigid")
+    levels = f"{kind}, r = {spec.modes}"
     if isinstance(spec, ReducedModel) and spec.tolerance is not None:
-        levels = f"{'rigid' if rigid else 'compliant'} levels, modes for a truncation error of {spec.tolerance:g}"
+        levels = f"{kind}, modes for a truncation error of {spec.tolerance:g}"
     if isinstance(spec, UserObjectModel):
         printed = ", printed frequencies" if bench.overrides else ""
         return f"Exudyn user object, {levels}{printed}, step {spec.step * 1e6:g} µs"
@@ -74,3 +74,10 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
     if isinstance(spec, GlobalBasisModel):
         return f"global basis, {levels} from each of two{loop}"
     return f"Multi-Phi, {levels}{', printed frequencies' if bench.overrides else ''}{loop}"
+
+
+def _levels(bench: Workbench, rigid: bool) -> str:
+    contacts = bench.contacts(rigid)
+    if bench.mechanics.force_laws and not contacts:
+        return "levels of force laws"
+    return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"

@@ -21,6 +21,7 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
+    "place_in_words",
 ]
 
 
@@ -53,6 +54,11 @@ def by_key(*keys: str) -> Discriminator:
 
     needed = "a table with the field " + " or ".join(keys)
     return Discriminator(choose, custom_error_type="form", custom_error_message=needed)
+
+
+def place_in_words(at: str | Mapping[str, float]) -> str:
+    """A place as part of a sentence."""
+    return at if isinstance(at, str) else " and ".join(f"{factor:+g} {name}" for name, factor in at.items())
 
 
 class Table(BaseModel):

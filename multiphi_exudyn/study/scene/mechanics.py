@@ -1,4 +1,4 @@
-"""What a scene file describes, as mechanics: beam or matrices, contacts, damping, and what is assumed.
+"""What a scene file describes, as mechanics: beam or matrices, contacts, force laws, damping, and what is assumed.
 
 Errors of the mechanical objects get the file and the field they came from.
 """
@@ -18,6 +18,7 @@ import numpy as np
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
+from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
@@ -38,6 +39,7 @@ from multiphi_exudyn.study.scene.scene_file import (
     StructureSpec,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
@@ -50,7 +52,7 @@ Damping = Matrix | ModalDamping | RayleighDamping | None
 
 @dataclass(frozen=True)
 class Mechanics:
-    """A scene's structure, given as a beam or as matrices, with its contacts and its damping.
+    """A scene's structure, given as a beam or as matrices, with its contacts, its force laws and its damping.
 
     parameter_set: of the paper's rig, None for any other structure.
     assumptions: what the scene rests on beyond what is known, one sentence each.
@@ -62,12 +64,18 @@ class Mechanics:
     matrices: LinearStructure | None = None
     parameter_set: str | None = None
     assumptions: tuple[str, ...] = field(default=())
+    force_laws: tuple[ForceLaw, ...] = ()
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the structure's points."""
         given = self.beam.points if self.beam is not None else _known(self.matrices).points
         return tuple(given)
+
+    @property
+    def directions(self) -> int:
+        """How many modes a level has less than the structure has DoFs: one for each contact and each force law."""
+        return len(self.contacts) + len(self.force_laws)
 
 
 def mechanics_of(scene: Scene) -> Mechanics:
@@ -77,11 +85,13 @@ def mechanics_of(scene: Scene) -> Mechanics:
         _at(scene, f"contacts[{i}]", partial(UnilateralContact, **spec.model_dump(exclude_defaults=True)))
         for i, spec in enumerate(scene.file.contacts)
     )
-    mechanics = replace(mechanics, contacts=mechanics.contacts + own)
+    laws = tuple(_at(scene, f"force_laws[{i}]", partial(law_of, spec)) for i, spec in enumerate(scene.file.force_laws))
+    mechanics = replace(mechanics, contacts=mechanics.contacts + own, force_laws=laws)
     if scene.file.damping is not None:
         mechanics = replace(mechanics, damping=_damping(scene.file.damping))
     _check_points(scene, mechanics)
     _check_contacts(scene, mechanics)
+    check_laws(scene, mechanics.contacts, mechanics.force_laws)
     _check_loads(scene, mechanics)
     return mechanics
 
@@ -109,6 +119,8 @@ def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
         yield _assumed_start(f"{1e3 * start.displacement:+g} mm at {start.measured_at}", start.load_at)
     elif start is not None:
         yield _assumed_start(f"{start.force:+g} N", start.load_at)
+    for law in described_laws(scene):
+        yield f"force law of this scene: {law} (assumed: the paper's rig has none)"
     for load in described_loads(scene):
         yield f"load of this scene: {load} (assumed: the paper's rig is only released)"
     if math.isfinite(spec.support_stiffness):
@@ -175,6 +187,8 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
     for i, contact in enumerate(file.contacts):
         names = [contact.direction] if isinstance(contact.direction, str) else contact.direction
         named |= {f"contacts[{i}].direction": name for name in names}
+    for i, law in enumerate(file.force_laws):
+        named |= {f"force_laws[{i}].at": name for name in ([law.at] if isinstance(law.at, str) else law.at)}
     for i, load in enumerate(file.loads):
         for part in ("at", "direction"):
             place = getattr(load, part, None) or ()
@@ -225,13 +239,15 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
     """Penalty models need a finite stiffness, penalty elements on one coordinate a single point."""
     if contact.rigid and isinstance(model, (FullModel, CraigBamptonModel, StepwiseModel)):
         refuse(scene, f"stiffness of contact {contact.name}", "inf", f"a finite one: {model.name} is a penalty model")
-    if getattr(contact, "damping", 0.0):
+    if contact.damping:
         if isinstance(model, (CraigBamptonModel, StepwiseModel)):
             refuse(scene, field_name, model.kind, f"another kind: its contacts have no damping, {contact.name} has")
         if isinstance(model, FullModel) and model.contact == "circle":
             refuse(
                 scene, field_name.replace("kind", "contact"), "circle", "'coordinate': a round support has no damping"
             )
+        if getattr(model, "loop", "numpy") == "compiled" and getattr(model, "contact", "") != "rigid":
+            refuse(scene, field_name.replace("kind", "loop"), "compiled", "'numpy': viscous contacts are not compiled")
     points = 1 if isinstance(contact.direction, str) else len(contact.direction)
     if points > 1 and isinstance(model, (FullModel, CraigBamptonModel)):
         needed = f"another kind: its contacts act on single points, {contact.name} on {points}"
@@ -242,6 +258,8 @@ def _check_published(scene: Scene, mechanics: Mechanics) -> None:
     """Printed frequencies are those of a rigid clamp and of a rigid support, and say nothing of others."""
     if mechanics.parameter_set is None or not published_override(mechanics.parameter_set):
         return
+    if mechanics.force_laws:
+        refuse(scene, "force_laws[0].name", mechanics.force_laws[0].name, "none: the printed frequencies have no law")
     for name in ("translation", "rotation"):
         given = getattr(scene.file.structure, f"clamp_{name}")
         if math.isfinite(given):

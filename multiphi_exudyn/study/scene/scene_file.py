@@ -1,4 +1,4 @@
-"""The format of a scene file: structure + contacts + start + loads + damping + outputs + the models to run.
+"""The format of a scene file: structure, contacts, force laws, start, loads, damping, outputs, and the models to run.
 
 SI units, angles in radians. Every field is typed and none may be unknown; what the names in a file
 refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene.scenes`).
@@ -25,6 +25,7 @@ from multiphi_exudyn.study.scene.fields import (
     Table,
     by_key,
 )
+from multiphi_exudyn.study.scene.law_tables import LawSpec
 from multiphi_exudyn.study.scene.load_tables import LoadSpec
 
 __all__ = [
@@ -286,6 +287,7 @@ class SceneFile(Table):
     modes: Annotated[int, Field(ge=1)] = 6
     structure: StructureSpec
     contacts: tuple[ContactSpec, ...] = ()
+    force_laws: tuple[LawSpec, ...] = ()
     start: StartSpec | None = None  # none, with loads: at rest, undeformed
     loads: tuple[LoadSpec, ...] = ()
     damping: DampingSpec | None = None

@@ -24,6 +24,7 @@ from multiphi_exudyn.loads import (
     SweepLoad,
 )
 from multiphi_exudyn.structure import At
+from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
@@ -98,13 +99,13 @@ def _described(spec: LoadSpec) -> str:
     if isinstance(spec, GravitySpec):
         return f"a weight of {spec.acceleration:+g} m/s²"
     if isinstance(spec, BaseMotionSpec):
-        left = f", which {_listed(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
+        left = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
         return f"a base that moves by {_in_words(spec.course, 'm')}{left}"
     if isinstance(spec, StopMotionSpec):
         return f"a stop of {spec.contact} that moves by {_in_words(spec.course, 'm')}"
     if isinstance(spec, ConstantLoadSpec):
-        return f"a constant force of {spec.force:+g} N at {_place(spec.at)}"
-    return f"a force at {_place(spec.at)} of {_in_words(spec, 'N')}"
+        return f"a constant force of {spec.force:+g} N at {place_in_words(spec.at)}"
+    return f"a force at {place_in_words(spec.at)} of {_in_words(spec, 'N')}"
 
 
 def _in_words(spec: CourseSpec, unit: str) -> str:
@@ -114,11 +115,3 @@ def _in_words(spec: CourseSpec, unit: str) -> str:
         span = f"{spec.start_hz:g} to {spec.end_hz:g} Hz in {spec.duration:g} s"
         return f"{spec.amplitude:g} {unit}, swept from {span} ({spec.law})"
     return f"samples from {spec.csv}" if spec.csv else f"{len(spec.time or ())} samples"
-
-
-def _place(at: str | dict[str, float]) -> str:
-    return at if isinstance(at, str) else _listed([f"{factor:+g} {name}" for name, factor in at.items()])
-
-
-def _listed(names: tuple[str, ...] | list[str]) -> str:
-    return " and ".join(names)

@@ -1,4 +1,4 @@
-"""What all models of a scene share: one (M, C, K), the contacts, the start and the time grid.
+"""What all models of a scene share: one (M, C, K), the contacts and force laws, the start and the time grid.
 
 The structure is the linearisation of the reference's full beam, so a reduced model and its reference
 differ in nothing but the reduction, the geometric nonlinearity and the time integration.
@@ -18,6 +18,7 @@ import scipy.optimize
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
@@ -58,7 +59,7 @@ class Workbench:
     """A scene ready to run.
 
     structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
-    longest_period: of the open level [s]; infinite where it has a rigid-body mode.
+    longest_period: of the open level without force laws [s]; infinite where it has a rigid-body mode.
     repeats: of a model's online part, for its time; more where it is short.
     """
 
@@ -94,7 +95,11 @@ class Workbench:
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
         """The scene's contacts, as given or all of them rigid."""
         given = self.mechanics.contacts
-        return tuple(replace(contact, stiffness=math.inf) for contact in given) if rigid else given
+        return tuple(replace(contact, stiffness=math.inf, damping=0.0) for contact in given) if rigid else given
+
+    def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw, ...]:
+        """The contacts, as given or all of them rigid, and the scene's force laws."""
+        return (*self.contacts(rigid), *self.mechanics.force_laws)
 
     @property
     def overrides(self) -> dict[tuple[str, ...], LevelOverride]:
@@ -131,7 +136,7 @@ class Workbench:
         modes: int | str | Tolerance = spec.modes or "all"
         if isinstance(spec, ReducedModel) and spec.tolerance is not None:
             modes = Tolerance(spec.tolerance)
-        return MultiPhiModel(self.structure, self.contacts(rigid), modes=modes, overrides=self.overrides)
+        return MultiPhiModel(self.structure, self.nonlinearities(rigid), modes=modes, overrides=self.overrides)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
@@ -251,7 +256,7 @@ def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
         newton_tolerance=spec.newton_tolerance,
         output_step=scene.file.outputs.interval,
     )
-    return FullBeam(mechanics.beam, mechanics.contacts, settings)
+    return FullBeam(mechanics.beam, mechanics.contacts, settings, mechanics.force_laws)
 
 
 def _interface(structure: LinearStructure, mechanics: Mechanics, outputs: Sequence[str]) -> tuple[str, ...]:
@@ -266,10 +271,10 @@ def _contact_points(mechanics: Mechanics) -> list[str]:
 
 def _check_modes(scene: Scene, structure: LinearStructure, mechanics: Mechanics) -> None:
     """No model has more modes than there are."""
-    most = structure.n - len(mechanics.contacts)
+    most = structure.n - mechanics.directions
     if most < 1:
         raise MultiPhiValueError(
-            f"{scene.path}: structure: got {structure.n} DoFs and {len(mechanics.contacts)} contacts"
+            f"{scene.path}: structure: got {structure.n} DoFs and {mechanics.directions} contacts or laws"
         )
     for model in scene.models.values():
         if isinstance(model, CraigBamptonModel):

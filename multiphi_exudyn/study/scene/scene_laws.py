@@ -1,0 +1,88 @@
+"""The force laws of a scene file as force laws of multiphi_exudyn.force_law, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.force_law import ForceLaw, expanded
+from multiphi_exudyn.study.scene.fields import place_in_words
+from multiphi_exudyn.study.scene.law_tables import CubicLawSpec, HertzLawSpec, LawSpec, TableLawSpec
+from multiphi_exudyn.study.scene.scene_file import CraigBamptonModel, FullModel, StepwiseModel
+from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+
+__all__ = ["check_laws", "described_laws", "law_of"]
+
+
+def law_of(spec: LawSpec) -> ForceLaw:
+    """The law of a table; raises the errors of ForceLaw."""
+    if isinstance(spec, TableLawSpec):
+        return ForceLaw(spec.at, (spec.q, spec.force), name=spec.name)
+    return ForceLaw(spec.at, _shape(spec), spec.tolerance, spec.name, spec.span, spec.segments)
+
+
+def described_laws(scene: Scene) -> tuple[str, ...]:
+    """Every law in words, as parts of a sentence."""
+    return tuple(
+        f"the force law {spec.name} at {place_in_words(spec.at)} ({_form(spec)})" for spec in scene.file.force_laws
+    )
+
+
+def check_laws(scene: Scene, contacts: Sequence[UnilateralContact], laws: Sequence[ForceLaw]) -> None:
+    """Names of their own, also for the springs of their chains, and models that can take them; or the field's error."""
+    names = [contact.name for contact in contacts]
+    for i, law in enumerate(laws):
+        taken = next((name for name in (law.name, *(s.name for s in expanded([law]))) if name in names), None)
+        if taken is not None:
+            refuse(scene, f"force_laws[{i}].name", law.name, f"a name of its own: there is {taken} already")
+        names += [law.name, *(spring.name for spring in expanded([law]))]
+    for i, model in enumerate(scene.file.models):
+        for law in laws:
+            _check_law_of(scene, f"models[{i}]", model, law)
+
+
+def _check_law_of(scene: Scene, entry: str, model: ModelSpec, law: ForceLaw) -> None:
+    if isinstance(model, (CraigBamptonModel, StepwiseModel)):
+        refuse(scene, f"{entry}.kind", model.kind, f"another kind: this one has no force laws, and there is {law.name}")
+    if getattr(model, "loop", "numpy") == "compiled":
+        refuse(scene, f"{entry}.loop", "compiled", "'numpy': force laws are not compiled")
+    points = 1 if isinstance(law.at, str) else len(law.at)
+    if points > 1 and isinstance(model, FullModel):
+        needed = f"another kind: its force laws act on single points, {law.name} on {points}"
+        refuse(scene, f"{entry}.kind", model.kind, needed)
+
+
+def _shape(spec: LawSpec) -> Any:
+    """F [N] of q [m], of a number or of an array."""
+    if isinstance(spec, CubicLawSpec):
+        return partial(_cubic, k1=spec.k1, k3=spec.k3)
+    if isinstance(spec, HertzLawSpec):
+        return partial(_hertz, stiffness=spec.stiffness, gap=spec.gap, exponent=spec.exponent)
+    assert not isinstance(spec, TableLawSpec), "a table has no shape"
+    return partial(_magnet, strength=spec.strength, distance=spec.distance)
+
+
+def _cubic(q: Any, k1: float, k3: float) -> Any:
+    return k1 * q + k3 * q**3
+
+
+def _hertz(q: Any, stiffness: float, gap: float, exponent: float) -> Any:
+    return -stiffness * np.maximum(-q - gap, 0.0) ** exponent
+
+
+def _magnet(q: Any, strength: float, distance: float) -> Any:
+    return -strength * np.sign(distance - q) / (distance - q) ** 2
+
+
+def _form(spec: LawSpec) -> str:
+    if isinstance(spec, TableLawSpec):
+        return f"a table of {len(spec.q)} places"
+    if isinstance(spec, CubicLawSpec):
+        return f"{spec.k1:g} N/m q {spec.k3:+g} N/m³ q³"
+    if isinstance(spec, HertzLawSpec):
+        return f"{spec.stiffness:g} N/m^{spec.exponent:g} beyond a gap of {1e3 * spec.gap:g} mm"
+    return f"a magnet of {spec.strength:g} N m² at {1e3 * spec.distance:+g} mm"
