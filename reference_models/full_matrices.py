@@ -1,9 +1,10 @@
 """The full model of a structure that is given by matrices: all its coordinates in Exudyn, with contact elements.
 
-    M q'' + C q' + K q = f + sum h_i lambda_i,   lambda_i = k_i max(0, -g_i)
+    M q'' + C q' + K q = f + sum h_i lambda_i - sum p_j F_j(p_j.q),   lambda_i = k_i max(0, -g_i)
 
-ObjectGenericODE2 holds M, C, K and static loads, ObjectContactCoordinate every contact; the trapezoidal rule with a
-fixed step integrates. No modes, no levels: what is left against a reduced model is time integration and reduction.
+ObjectGenericODE2 holds M, C, K and static loads, its user function force laws (by their segments) and viscous
+contacts, lambda_i = max(0, -k_i g_i - c_i g_i') where g_i < 0; ObjectContactCoordinate every other contact; the
+trapezoidal rule with a fixed step integrates. No modes, no levels: what is left against a reduced model is time integration and reduction.
 """
 
 from __future__ import annotations
@@ -21,12 +22,15 @@ from scipy.integrate import cumulative_trapezoid
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.force_law import Contact, ForceLaw, expanded
 from multiphi_exudyn.structure import LinearStructure
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.solver_settings import simulation_settings
 
 __all__ = ["MatrixRun", "run_matrices"]
+
+Force = Callable[[float, np.ndarray, np.ndarray], np.ndarray]  # (n,) at t, q, q'
 
 NEWTON = 1e-10  # relative and absolute: linear but for the contacts, an iteration ends at round-off
 
@@ -35,7 +39,7 @@ NEWTON = 1e-10  # relative and absolute: linear but for the contacts, an iterati
 class MatrixRun:
     """k samples, one a step: time [s], gaps: contact -> (k,) [m], energy, work (k,) [J].
 
-    energy: kinetic, strain and contact springs; work: of the loads since the start. wall_s: of the solver [s].
+    energy: kinetic, strain, contact springs and force laws; work: of the loads since the start. wall_s: of the solver [s].
     """
 
     time: np.ndarray
@@ -56,14 +60,16 @@ def run_matrices(
     load: np.ndarray | None = None,
     varying: Callable[[np.ndarray], np.ndarray] | None = None,
     damping: np.ndarray | None = None,
+    laws: Sequence[ForceLaw] = (),
     cpu_limit_s: float | None = None,
 ) -> MatrixRun:
     """Integrate from x, x' (n,) with ``steps`` equal steps under a static load (n,).
 
     varying: the load that changes, (n, k) at times (k,) [s], beside the static one.
     damping: C (n, n), in place of the structure's own description of it.
+    laws: force laws; gaps are given of their springs.
 
-    Every contact has a finite stiffness and acts on one coordinate, or between two with opposite coefficients.
+    Every contact has a finite stiffness and, unless it is viscous, acts on one coordinate, or between two with opposite coefficients.
     Raises MultiPhiValueError for another contact, NumericalFailure where the solver stops early.
     """
     zero = np.zeros(structure.n)
@@ -71,17 +77,51 @@ def run_matrices(
     with quiet(), cpu_limit(cpu_limit_s):
         container = exu.SystemContainer()  # owns the system
         mbs = container.AddSystem()
-        sensors = _build(mbs, structure, contacts, (x, v, f), varying, damping)
+        local = _local_forces(structure, contacts, laws)
+        elastic = [contact for contact in contacts if not contact.damping]
+        sensors = _build(mbs, structure, elastic, (x, v, f), _user_force(varying, local), damping)
         started = time.perf_counter()
         _solve(mbs, t_end, steps, cpu_limit_s)
         wall_s = time.perf_counter() - started
         q, q_t = (np.array(mbs.GetSensorStoredData(sensor)) for sensor in sensors)
-    gaps = {c.name: q[:, 1:] @ structure.row(c.direction) + c.gap for c in contacts}
+    springs = [*contacts, *expanded(laws)]
+    gaps = {c.name: q[:, 1:] @ structure.row(c.direction) + c.gap for c in springs}
     work = (q[:, 1:] - q[0, 1:]) @ f
     if varying is not None:
         power = np.sum(varying(q[:, 0]).T * q_t[:, 1:], axis=1)
         work = work + cumulative_trapezoid(power, q[:, 0], initial=0)
-    return MatrixRun(q[:, 0], gaps, _energy(structure, contacts, gaps, q[:, 1:], q_t[:, 1:]), work, wall_s)
+    energy = _energy(structure, springs, gaps, q[:, 1:], q_t[:, 1:])
+    for law in laws:
+        energy = energy + law.constant * (q[:, 1:] @ structure.row(law.at) - law.centre)
+    return MatrixRun(q[:, 0], gaps, energy, work, wall_s)
+
+
+def _local_forces(
+    structure: LinearStructure, contacts: Sequence[UnilateralContact], laws: Sequence[ForceLaw]
+) -> Force | None:
+    """Forces (n,) of force laws and viscous contacts at q, q' (n,); None where there are none."""
+    places = [(law, structure.row(law.at)) for law in laws]
+    viscous = [(contact, structure.row(contact.direction)) for contact in contacts if contact.damping]
+
+    def force(t: float, q: np.ndarray, q_t: np.ndarray) -> np.ndarray:
+        total = np.zeros(structure.n)
+        for law, row in places:
+            total -= row * float(law.force(row @ q))
+        for contact, row in viscous:
+            gap = float(row @ q) + contact.gap
+            if gap < 0:
+                total += row * max(0.0, -contact.stiffness * gap - contact.damping * float(row @ q_t))
+        return total
+
+    return force if places or viscous else None
+
+
+def _user_force(varying: Callable[[np.ndarray], np.ndarray] | None, local: Force | None) -> Force | None:
+    """Varying loads and local forces (n,) at t, q, q'; None where there are neither."""
+    given: list[Force] = [] if local is None else [local]
+    if varying is not None:
+        given.append(lambda t, q, q_t: varying(np.array([t]))[:, 0])
+    return (lambda t, q, q_t: np.asarray(sum(force(t, q, q_t) for force in given))) if given else None
 
 
 def _build(
@@ -89,17 +129,17 @@ def _build(
     structure: LinearStructure,
     contacts: Sequence[UnilateralContact],
     given: tuple[np.ndarray, np.ndarray, np.ndarray],
-    varying: Callable[[np.ndarray], np.ndarray] | None,
+    added: Force | None,
     damping: np.ndarray | None,
 ) -> list[Any]:
     """Add everything and assemble; the sensors of coordinates and velocities. given: x, x', static load (n,)."""
     n, (displacement, velocity, load) = structure.n, given
 
     def force(mbs: Any, t: float, item: Any, q: Any, q_t: Any) -> np.ndarray:
-        assert varying is not None, "set only then"
-        return varying(np.array([t]))[:, 0]
+        assert added is not None, "set only then"
+        return added(t, np.array(q), np.array(q_t))
 
-    options = {"dampingMatrix": None if damping is None else _dense(damping), "forceUserFunction": varying and force}
+    options = {"dampingMatrix": None if damping is None else _dense(damping), "forceUserFunction": added and force}
     node = mbs.AddNode(
         eii.NodeGenericODE2(
             referenceCoordinates=np.zeros(n),
@@ -176,7 +216,7 @@ def _solve(mbs: Any, t_end: float, steps: int, cpu_limit_s: float | None) -> Non
 
 def _energy(
     structure: LinearStructure,
-    contacts: Sequence[UnilateralContact],
+    contacts: Sequence[Contact],
     gaps: dict[str, np.ndarray],
     q: np.ndarray,
     q_t: np.ndarray,

@@ -1,6 +1,9 @@
 """Brute force: contacts looked at on a dense grid, against what the events of a trajectory tell.
 
-    g(t) = h.x(t) + gap,   from the displacement and the contact's own definition, not from the event signals
+    g(t) = h.x(t) + gap - z(t)         from the displacement, the contact's definition and the way z of its stop,
+    a(t) = g(t) + (c/k) max(0, g'(t))  not from the event signals; by its law a contact is closed where a < 0
+
+a is g but for a viscous contact, which is open inside its stop where it would pull.
 
 SAMPLES_PER_PERIOD samples per shortest period of the levels visited, over the whole run where that fits the budget.
 Else half the budget is a grid over the whole run, the other half goes into windows of one such period at full
@@ -11,15 +14,26 @@ samples themselves.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.force_law import Contact
+from multiphi_exudyn.loads import BaseMotion, Load, StopMotion
 from multiphi_exudyn.state import Phase
 from multiphi_exudyn.trajectory import Trajectory
 
-__all__ = ["ContactSamples", "Sampling", "SegmentTable", "highest_frequency", "missed", "sample_contact", "sampling"]
+__all__ = [
+    "ContactSamples",
+    "Sampling",
+    "SegmentTable",
+    "highest_frequency",
+    "missed",
+    "sample_contact",
+    "sampling",
+    "truncated",
+]
 
 SAMPLES_PER_PERIOD = 10_000
 MOST_EVENTS = 2_000  # at whose instants a contact is looked at
@@ -66,10 +80,15 @@ class SegmentTable:
 
 @dataclass(frozen=True)
 class ContactSamples:
-    """Of one contact at times (k,): gap [m], force [N], whether it is closed, whether its phase excuses s < 0."""
+    """Of one contact at times (k,): gap [m], apart: a [m], slowed: (c/k) g' [m], force [N], closed and excused.
+
+    excused: its phase lets s < 0; for a viscous contact only where its model is truncated.
+    """
 
     times: np.ndarray
     gap: np.ndarray
+    apart: np.ndarray
+    slowed: np.ndarray
     force: np.ndarray
     closed: np.ndarray
     excused: np.ndarray
@@ -104,26 +123,50 @@ def _windows(trajectory: Trajectory, width: float, count: int) -> list[np.ndarra
 
 
 def sample_contact(
-    trajectory: Trajectory, contact: UnilateralContact, table: SegmentTable, times: np.ndarray
+    trajectory: Trajectory, contact: Contact, table: SegmentTable, times: np.ndarray, loads: Sequence[Load] = ()
 ) -> ContactSamples:
-    """One contact at times (k,)."""
+    """One contact at times (k,), its stop moved by some of the loads."""
     chunks = np.array_split(times, math.ceil(len(times) / CHUNK))
     row = trajectory.model.structure.row(contact.direction)
     gap = np.concatenate([np.asarray(trajectory.at(row, chunk)) for chunk in chunks]) + contact.gap
+    gap = gap - _way(trajectory, contact, row, times, loads)
     force = np.concatenate([np.asarray(trajectory.contact_force(contact.name, chunk)) for chunk in chunks])
     owner, i = table.owners(times), trajectory.model.index(contact.name)
-    return ContactSamples(times, gap, force, table.closed[owner, i], times <= table.excused[owner, i])
+    slowed, excused = np.zeros(len(times)), times <= table.excused[owner, i]
+    if contact.damping > 0:
+        rate = np.concatenate([row @ trajectory.velocity(chunk) for chunk in chunks])
+        slowed, excused = contact.damping / contact.stiffness * rate, excused & truncated(trajectory)
+    return ContactSamples(times, gap, gap + np.maximum(0.0, slowed), slowed, force, table.closed[owner, i], excused)
+
+
+def truncated(trajectory: Trajectory) -> bool:
+    """Whether a level has fewer modes than the structure has motions."""
+    return trajectory.model.level(()).modes < trajectory.model.structure.n
+
+
+def _way(
+    trajectory: Trajectory, contact: Contact, row: np.ndarray, times: np.ndarray, loads: Sequence[Load]
+) -> np.ndarray:
+    """z (k,) [m] of a contact's stop, away from it, seen from the base."""
+    way = np.zeros(len(times))
+    for load in loads:
+        if isinstance(load, StopMotion) and load.contact == contact.name:
+            way += load.course.history(trajectory.t_end).at(times)
+        if isinstance(load, BaseMotion) and contact.name in load.fixed_stops:
+            carried = float(row @ trajectory.model.structure.row(load.direction))
+            way -= carried * load.course.history(trajectory.t_end).at(times)
+    return way
 
 
 def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable, name: str, tolerance: float) -> int:
     """Closings and openings of a contact that no event tells: the most that one of three ways to look finds.
 
-    Samples below -tolerance in an open contact that its phase does not excuse (a run of them counts once); changes of
-    the gap's sign; changes of the level between segments.
+    Samples of a below -tolerance in an open contact that its phase does not excuse (a run of them counts once);
+    changes of the sign of a; changes of the level between segments.
     """
     own = np.array([event.time for event in trajectory.events if event.contact == name])
     slack = TIME_ROUND_OFF * trajectory.t_end
-    entered = (samples.gap < -tolerance) & ~samples.closed & ~samples.excused
+    entered = (samples.apart < -tolerance) & ~samples.closed & ~samples.excused
     inside = int(entered[0]) + int(np.sum(entered[1:] & ~entered[:-1]))
     i = trajectory.model.index(name)
     switched = table.start[1:][table.closed[1:, i] != table.closed[:-1, i]]
@@ -132,10 +175,10 @@ def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable,
 
 
 def _untold_signs(samples: ContactSamples, own: np.ndarray, slack: float, tolerance: float) -> int:
-    """Changes of the gap's sign between which no event lies and which no phase excuses."""
-    clear = np.flatnonzero(np.abs(samples.gap) > tolerance)
+    """Changes of the sign of a between which no event lies and which no phase excuses."""
+    clear = np.flatnonzero(np.abs(samples.apart) > tolerance)
     before, after = clear[:-1], clear[1:]
-    change = samples.gap[before] * samples.gap[after] < 0
+    change = samples.apart[before] * samples.apart[after] < 0
     change &= ~(samples.excused[before] | samples.excused[after])
     between = _events_in(own, samples.times[before[change]] - slack, samples.times[after[change]] + slack)
     return int(np.sum(between == 0))

@@ -9,6 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.force_law import Contact, ForceLaw, expanded
 from multiphi_exudyn.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import LinearStructure
@@ -38,7 +39,7 @@ class Pull:
 class Problem:
     """What a run is given.
 
-    structure, contacts, modes: of the model. displacement, velocity: x, x' (n,) at the start, None for zero.
+    structure, contacts (force laws among them), modes: of the model. displacement, velocity: x, x' (n,) at the start, None for zero.
     loads: of loads.py. t_end: end of the run in the case's unit of time.
     pull: the same problem for the full nonlinear beam; without one the full model has the structure's matrices.
     penalty: stiffness of the full model's contact elements where the contacts are rigid, None: it cannot be run.
@@ -46,7 +47,7 @@ class Problem:
     """
 
     structure: LinearStructure
-    contacts: Sequence[UnilateralContact]
+    contacts: Sequence[UnilateralContact | ForceLaw]
     t_end: float
     modes: int | str = "all"
     displacement: np.ndarray | None = None
@@ -61,9 +62,24 @@ class Problem:
         return MultiPhiModel(self.structure, self.contacts, modes=self.modes)
 
     @property
+    def parts(self) -> tuple[Contact, ...]:
+        """The contacts, every law by its chain of springs."""
+        return expanded(self.contacts)
+
+    @property
+    def laws(self) -> list[ForceLaw]:
+        """The force laws among the contacts."""
+        return [contact for contact in self.contacts if isinstance(contact, ForceLaw)]
+
+    @property
+    def damped(self) -> bool:
+        """Whether structure or contacts are."""
+        return self.structure.damping is not None or any(contact.damping > 0 for contact in self.parts)
+
+    @property
     def conservative(self) -> bool:
-        """Whether nothing but contacts may change the energy."""
-        return self.structure.damping is None and not self.loads
+        """Whether nothing but impacts may change the energy."""
+        return not self.damped and not self.loads
 
     @property
     def driven(self) -> bool:
@@ -72,11 +88,11 @@ class Problem:
 
     @property
     def penalty_contacts(self) -> list[UnilateralContact] | None:
-        """The contacts as penalty elements, None where a rigid one has no stand-in."""
-        penalty = self.penalty
+        """The unilateral contacts as penalty elements, None where a rigid one has no stand-in."""
+        penalty, given = self.penalty, [c for c in self.contacts if isinstance(c, UnilateralContact)]
         if penalty is None:
-            return None if any(contact.rigid for contact in self.contacts) else list(self.contacts)
-        return [replace(c, stiffness=penalty) if c.rigid else c for c in self.contacts]
+            return None if any(contact.rigid for contact in given) else given
+        return [replace(c, stiffness=penalty) if c.rigid else c for c in given]
 
 
 @dataclass(frozen=True)

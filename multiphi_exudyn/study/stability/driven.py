@@ -1,4 +1,4 @@
-"""Cases of loads that vary in time: resonance, and a load that changes at the very instant of an event."""
+"""Cases of what varies in time: resonance, loads that jump, stops and bases that move."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.loads import HarmonicLoad, SampledLoad
+from multiphi_exudyn.loads import BaseMotion, Harmonic, HarmonicLoad, SampledLoad, StopMotion
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
-from multiphi_exudyn.study.stability.structures import chain, oscillator, stop
+from multiphi_exudyn.study.stability.structures import STOP, chain, oscillator, stop
 
 __all__ = ["CASES"]
 
@@ -31,6 +31,25 @@ def _switched() -> Problem:
     return Problem(structure, [contact], 3.0, displacement=np.array([1.5 * BILINEAR.amplitude]), loads=[load])
 
 
+def _jumping(stiffness: float) -> Problem:
+    """Two masses under a force that comes and goes at once."""
+    load = SampledLoad("m1", np.array([0.1, 0.25, 0.6]), np.array([-40.0, -60.0, -80.0]))
+    return Problem(chain([1.0, 1.0], [1e4, 1e4]), [stop("m1", 2e-3, stiffness)], 1.0, loads=[load])
+
+
+def _moving_stop(stiffness: float) -> Problem:
+    """Two masses let go above a stop that goes up and down."""
+    moving = StopMotion(STOP, Harmonic(2e-3, 7.0))
+    structure, start = chain([1.0, 1.0], [1e4, 1e4]), np.array([2e-3, 5e-3])
+    return Problem(structure, [stop("m1", 3e-3, stiffness)], 1.0, displacement=start, loads=[moving])
+
+
+def _moving_base(stiffness: float, fixed: tuple[str, ...] = ()) -> Problem:
+    """Two masses whose base shakes."""
+    shaken = BaseMotion(np.ones(2), Harmonic(2e-3, 7.0), fixed)
+    return Problem(chain([1.0, 1.0], [1e4, 1e4]), [stop("m1", 2e-3, stiffness)], 1.0, loads=[shaken])
+
+
 CASES = (
     Case(
         "resonance-compliant",
@@ -46,5 +65,35 @@ CASES = (
         "load-changes-at-event",
         "The load ends at the instant at which the contact closes: two reasons for one new piece of motion.",
         lambda quick: _switched(),
+    ),
+    Case(
+        "load-jumps-compliant",
+        "A sampled load comes and goes at once: the motion goes on with a force that is not continuous.",
+        lambda quick: _jumping(1e5),
+    ),
+    Case(
+        "load-jumps-rigid",
+        "A sampled load that presses onto a rigid stop jumps: so does the reaction.",
+        lambda quick: _jumping(math.inf),
+    ),
+    Case(
+        "moving-stop-compliant",
+        "The stop goes up and down: it does work on what it touches.",
+        lambda quick: _moving_stop(1e5),
+    ),
+    Case(
+        "moving-stop-rigid",
+        "A rigid stop carries what lies on it and lets it go where it falls faster.",
+        lambda quick: _moving_stop(math.inf),
+    ),
+    Case(
+        "moving-base-compliant",
+        "The base shakes, its stop with it.",
+        lambda quick: _moving_base(1e5),
+    ),
+    Case(
+        "moving-base-fixed-rigid-stop",
+        "The base shakes, the rigid stop stays where it is: it moves as seen from the base.",
+        lambda quick: _moving_base(math.inf, (STOP,)),
     ),
 )

@@ -99,13 +99,14 @@ def _full_matrices(
         load=sum((load.row(structure) for load in static), np.zeros(structure.n)),
         varying=_varying(problem),
         damping=damping_matrix(structure),
+        laws=problem.laws,
         cpu_limit_s=limit_s,
     )
     coarse = f"{steps / (problem.t_end * highest):.3g} steps in the shortest period" if steps < wanted else ""
     outcome = Outcome(
         FULL_MODEL,
         message="; ".join(filter(None, (_stands_in(problem), coarse))),
-        energy=_drift(found.energy, found.work, structure.damping is None),
+        energy=_drift(found.energy, found.work, not problem.damped),
         steps=steps,
         time_s=found.wall_s,
     )
@@ -138,13 +139,13 @@ def _full_beam(
     outcome = Outcome(FULL_MODEL, found.status, found.message or _stands_in(problem), steps=found.steps)
     if found.status != OK or found.balance is None:
         return outcome
-    drift = _drift(found.energy, np.zeros(1), problem.structure.damping is None)
+    drift = _drift(found.energy, np.zeros(1), not problem.damped)
     outcome = replace(outcome, energy=drift, time_s=found.online_s)
     return _compared(outcome, problem, native, found.time, found.gaps)
 
 
 def _stands_in(problem: Problem) -> str:
-    rigid = any(contact.rigid for contact in problem.contacts)
+    rigid = any(contact.rigid for contact in problem.parts)
     return f"penalty of {problem.penalty:g} for the rigid contact: another law" if rigid else ""
 
 
@@ -162,7 +163,7 @@ def _drift(energy: np.ndarray, work: np.ndarray, conservative: bool) -> float:
 def loops_compared(outcome: Outcome, problem: Problem, native: Trajectory, other: Trajectory) -> Outcome:
     """The outcome of ``other`` with its difference to ``native``, on an even grid."""
     time = np.linspace(0.0, min(native.t_end, other.t_end), GRID)
-    gaps = {c.name: np.asarray(other.gap(c.name, time)) for c in problem.contacts}
+    gaps = {c.name: np.asarray(other.gap(c.name, time)) for c in problem.parts}
     return _compared(outcome, problem, native, time, gaps)
 
 
@@ -172,7 +173,7 @@ def _compared(
     """The outcome with difference and agreement of the contacts' travel h.x, unless there is no motion."""
     inside = time <= native.t_end
     pairs = [
-        (gaps[c.name][inside] - c.gap, np.asarray(native.gap(c.name, time[inside])) - c.gap) for c in problem.contacts
+        (gaps[c.name][inside] - c.gap, np.asarray(native.gap(c.name, time[inside])) - c.gap) for c in problem.parts
     ]
     pairs = [(values, ref) for values, ref in pairs if np.any(ref)]
     if not pairs:

@@ -3,8 +3,9 @@
     residual    |initial + work - losses - final| / E     E the largest energy of the run
     energy      undamped, unforced: max |energy(t) + losses until t - initial| / E; else the residual
     beyond      how far a contact is from its law [m]:
-                open -g;   closed and compliant max(g, |lambda / k + g|);   closed and rigid |g|
-    pulling     most negative reaction over the largest one
+                open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
+                with a as in brute_force.py; a force law: |sum of its springs' forces + F(q_m) - F(q)| / max |F'|
+    pulling     most negative reaction of a rigid or viscous contact over the largest one
 
 A truncated model may leave negative gaps; its event rule says where, in the phases, and ``Trajectory.deepest_gap``
 how deep. There only what no phase excuses is wrong, and a depth that the trajectory does not report.
@@ -17,8 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.study.stability.brute_force import ContactSamples, SegmentTable, missed, sample_contact, sampling
+from multiphi_exudyn.force_law import Contact, ForceLaw
+from multiphi_exudyn.study.stability.brute_force import (
+    ContactSamples,
+    SegmentTable,
+    missed,
+    sample_contact,
+    sampling,
+    truncated,
+)
 from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.trajectory import Trajectory
 
@@ -60,7 +68,7 @@ class Judgement:
             (not self.residual <= RESIDUAL, f"ledger residual {self.residual:.1e} of the largest energy"),
             (not self.energy <= RESIDUAL, f"energy off by {self.energy:.1e}"),
             (not law <= BEYOND * metre, f"{law / metre:.1e} m beyond the contact law"),
-            (not self.pulling <= PULLING, f"a rigid contact pulls with {self.pulling:.1e} of its largest reaction"),
+            (not self.pulling <= PULLING, f"a contact pulls with {self.pulling:.1e} of its largest reaction"),
             (self.missed > 0, f"{self.missed} closings or openings without an event"),
             (self._hidden(metre), f"open {self.open_depth / metre:.1e} m deep, {self.reported / metre:.1e} m reported"),
         ]
@@ -73,10 +81,11 @@ class Judgement:
 
 def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     """Judge a trajectory with about ``budget`` samples of every contact."""
-    table, look = SegmentTable.of(trajectory), sampling(trajectory, budget)
-    model, tolerance = trajectory.model, BEYOND * problem.metre
-    seen = [sample_contact(trajectory, contact, table, look.times) for contact in problem.contacts]
-    beyond = [_beyond(contact, found) for contact, found in zip(problem.contacts, seen, strict=True)]
+    table, look, tolerance = SegmentTable.of(trajectory), sampling(trajectory, budget), BEYOND * problem.metre
+    parts = problem.parts
+    seen = [sample_contact(trajectory, contact, table, look.times, problem.loads) for contact in parts]
+    beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
+    laws = [_beyond_law(law, trajectory, look.times) for law in problem.laws]
     largest, drift = _energies(trajectory, table)
     residual = _share(trajectory.ledger.residual, largest)
     return Judgement(
@@ -85,14 +94,14 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         events=len(trajectory.events),
         missed=sum(
             missed(trajectory, found, table, contact.name, tolerance)
-            for contact, found in zip(problem.contacts, seen, strict=True)
+            for contact, found in zip(parts, seen, strict=True)
         ),
-        beyond=_largest([np.max(values) for values in beyond]),
-        unexcused=_largest([np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, seen, strict=True)]),
-        open_depth=_largest([-np.min(s.gap[~s.closed], initial=0.0) for s in seen]),
-        pulling=_pulling(problem.contacts, seen),
-        truncated=model.level(()).modes < model.structure.n,
-        reported=_largest([-trajectory.deepest_gap(contact.name) for contact in problem.contacts]),
+        beyond=_largest([*(np.max(values) for values in beyond), *laws]),
+        unexcused=_largest([*(np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, seen, strict=True)), *laws]),
+        open_depth=_largest([-np.min(s.apart[~s.closed], initial=0.0) for s in seen]),
+        pulling=_pulling(parts, seen),
+        truncated=truncated(trajectory),
+        reported=_largest([-trajectory.deepest_gap(contact.name) for contact in parts]),
         samples=len(look.times),
         covered=look.covered,
     )
@@ -106,21 +115,35 @@ def _share(part: float, whole: float) -> float:
     return abs(part) / whole if whole > 0 else abs(part)
 
 
-def _beyond(contact: UnilateralContact, seen: ContactSamples) -> np.ndarray:
+def _beyond(contact: Contact, seen: ContactSamples) -> np.ndarray:
     """Distance from the contact law (k,)."""
     if contact.rigid:
         closed = np.abs(seen.gap)
     else:
-        closed = np.maximum(seen.gap, np.abs(seen.force / contact.stiffness + seen.gap))
-    return np.maximum(0.0, np.where(seen.closed, closed, -seen.gap))
+        closed = np.maximum(seen.gap, np.abs(seen.force / contact.stiffness + seen.gap + seen.slowed))
+    return np.maximum(0.0, np.where(seen.closed, closed, -seen.apart))
 
 
-def _pulling(contacts: Sequence[UnilateralContact], seen: Sequence[ContactSamples]) -> float:
+def _beyond_law(law: ForceLaw, trajectory: Trajectory, times: np.ndarray) -> float:
+    """Largest distance from a force law: what its springs together are off by, over its steepest slope [m]."""
+    q, forces = np.asarray(trajectory.at(law.at, times)), np.full(len(times), law.constant)
+    for spring in law.springs:
+        forces += spring.side * np.asarray(trajectory.contact_force(spring.name, times))
+    return float(np.max(np.abs(forces - law.force(q))) / np.max(np.abs(law.slopes)))
+
+
+def _pulling(contacts: Sequence[Contact], seen: Sequence[ContactSamples]) -> float:
     worst = 0.0
     for contact, found in zip(contacts, seen, strict=True):
-        if contact.rigid and np.any(found.closed):
+        if (contact.rigid or contact.damping > 0) and np.any(found.closed):
             worst = max(worst, _share(min(0.0, float(np.min(found.force))), float(np.max(np.abs(found.force)))))
     return worst
+
+
+def _largest_kinetic(trajectory: Trajectory, times: np.ndarray) -> float:
+    """The size of the energy where strain may be negative: kinetic energy [J] of a motion that swaps much of it."""
+    v = trajectory.velocity(times)
+    return float(np.max(np.sum(v * (trajectory.model.structure.mass @ v), axis=0))) / 2
 
 
 def _energies(trajectory: Trajectory, table: SegmentTable) -> tuple[float, float]:
@@ -138,6 +161,8 @@ def _energies(trajectory: Trajectory, table: SegmentTable) -> tuple[float, float
     lost = np.cumsum([0.0, *(event.energy_loss for event in trajectory.events)]) + trajectory.start_loss.total
     before = lost[np.searchsorted(at, times, side="left")]
     after = lost[np.searchsorted(at, times, side="right")]
-    largest = max(float(np.max(energy)), ledger.initial, abs(ledger.work_of_loads))
+    largest = max(float(np.max(np.abs(energy))), abs(ledger.initial), abs(ledger.work_of_loads))
+    if trajectory.model.force_laws:
+        largest = max(largest, _largest_kinetic(trajectory, times))
     drift = np.abs(energy + np.where(right, after, before) - ledger.initial)
     return largest, _share(float(np.max(drift)), largest)
