@@ -4,7 +4,8 @@
 
 ObjectGenericODE2 holds M, C, K and static loads, its user function force laws (by their segments) and viscous
 contacts, lambda_i = max(0, -k_i g_i - c_i g_i') where g_i < 0; ObjectContactCoordinate every other contact; the
-trapezoidal rule with a fixed step integrates. No modes, no levels: what is left against a reduced model is time integration and reduction.
+trapezoidal rule with a fixed step integrates. No modes, no levels: what is left against a reduced model is time
+integration and reduction.
 """
 
 from __future__ import annotations
@@ -37,14 +38,16 @@ NEWTON = 1e-10  # relative and absolute: linear but for the contacts, an iterati
 
 @dataclass(frozen=True)
 class MatrixRun:
-    """k samples, one a step: time [s], gaps: contact -> (k,) [m], energy, work (k,) [J].
+    """k samples, one a step: time [s], gaps: contact -> (k,) [m], energy, kinetic, work (k,) [J].
 
-    energy: kinetic, strain, contact springs and force laws; work: of the loads since the start. wall_s: of the solver [s].
+    energy: kinetic, strain, contact springs and force laws; work: of the loads since the start.
+    wall_s: of the solver [s].
     """
 
     time: np.ndarray
     gaps: dict[str, np.ndarray]
     energy: np.ndarray
+    kinetic: np.ndarray
     work: np.ndarray
     wall_s: float
 
@@ -69,7 +72,8 @@ def run_matrices(
     damping: C (n, n), in place of the structure's own description of it.
     laws: force laws; gaps are given of their springs.
 
-    Every contact has a finite stiffness and, unless it is viscous, acts on one coordinate, or between two with opposite coefficients.
+    Every contact has a finite stiffness and, unless it is viscous, acts on one coordinate, or between two with opposite
+    coefficients.
     Raises MultiPhiValueError for another contact, NumericalFailure where the solver stops early.
     """
     zero = np.zeros(structure.n)
@@ -90,10 +94,11 @@ def run_matrices(
     if varying is not None:
         power = np.sum(varying(q[:, 0]).T * q_t[:, 1:], axis=1)
         work = work + cumulative_trapezoid(power, q[:, 0], initial=0)
-    energy = _energy(structure, springs, gaps, q[:, 1:], q_t[:, 1:])
+    kinetic = np.sum(q_t[:, 1:] * (structure.mass @ q_t[:, 1:].T).T, axis=1) / 2
+    energy = kinetic + _strain(structure, springs, gaps, q[:, 1:])
     for law in laws:
         energy = energy + law.constant * (q[:, 1:] @ structure.row(law.at) - law.centre)
-    return MatrixRun(q[:, 0], gaps, energy, work, wall_s)
+    return MatrixRun(q[:, 0], gaps, energy, kinetic, work, wall_s)
 
 
 def _local_forces(
@@ -214,17 +219,15 @@ def _solve(mbs: Any, t_end: float, steps: int, cpu_limit_s: float | None) -> Non
         raise NumericalFailure(f"CPU limit of {cpu_limit_s:g} s reached")
 
 
-def _energy(
+def _strain(
     structure: LinearStructure,
     contacts: Sequence[Contact],
     gaps: dict[str, np.ndarray],
     q: np.ndarray,
-    q_t: np.ndarray,
 ) -> np.ndarray:
-    kinetic = np.sum(q_t * (structure.mass @ q_t.T).T, axis=1) / 2
     strain = np.sum(q * (structure.stiffness @ q.T).T, axis=1) / 2
     springs = [c.stiffness * np.minimum(0.0, gaps[c.name]) ** 2 / 2 for c in contacts]
-    return np.asarray(kinetic + strain + sum(springs))
+    return np.asarray(strain + sum(springs))
 
 
 def _dense(matrix: Any) -> np.ndarray:

@@ -88,5 +88,7 @@ def _natives(case: Case, problem: Problem, limits: Limits) -> Iterator[Native]:
         yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "numba is not installed"))
     elif problem.driven:
         yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "takes loads that do not vary"))
+    elif problem.laws or any(contact.damping for contact in problem.parts):
+        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "takes neither force laws nor viscous contacts"))
     else:
         yield run_native(case, problem, COMPILED_LOOP, True, limits.native_limit_s, limits.budget)

@@ -106,7 +106,7 @@ def _full_matrices(
     outcome = Outcome(
         FULL_MODEL,
         message="; ".join(filter(None, (_stands_in(problem), coarse))),
-        energy=_drift(found.energy, found.work, not problem.damped),
+        energy=_drift(found.energy, found.work, found.kinetic, not problem.damped),
         steps=steps,
         time_s=found.wall_s,
     )
@@ -139,7 +139,7 @@ def _full_beam(
     outcome = Outcome(FULL_MODEL, found.status, found.message or _stands_in(problem), steps=found.steps)
     if found.status != OK or found.balance is None:
         return outcome
-    drift = _drift(found.energy, np.zeros(1), not problem.damped)
+    drift = _drift(found.energy, np.zeros(1), found.energy, not problem.damped)
     outcome = replace(outcome, energy=drift, time_s=found.online_s)
     return _compared(outcome, problem, native, found.time, found.gaps)
 
@@ -149,14 +149,14 @@ def _stands_in(problem: Problem) -> str:
     return f"penalty of {problem.penalty:g} for the rigid contact: another law" if rigid else ""
 
 
-def _drift(energy: np.ndarray, work: np.ndarray, conservative: bool) -> float:
+def _drift(energy: np.ndarray, work: np.ndarray, kinetic: np.ndarray, conservative: bool) -> float:
     """Of energies less work (k,): the largest deviation from the first, of a damped system the largest gain.
 
-    Both as a share of the largest energy.
+    Both as a share of the largest energy, the kinetic one where force laws hold a negative one.
     """
     balance = energy - work
     away = np.abs(balance - balance[0]) if conservative else balance - np.minimum.accumulate(balance)
-    largest = float(np.max(energy))
+    largest = max(float(np.max(energy)), float(np.max(kinetic)))
     return float(np.max(away)) / largest if largest > 0 else float(np.max(away))
 
 
