@@ -40,7 +40,8 @@ class Problem:
     """What a run is given.
 
     structure, contacts (force laws among them), modes: of the model.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: of loads.py. t_end: end of the run in the case's unit of time.
+    displacement, velocity: x, x' (n,) at the start, None for zero.
+    loads: of loads.py. t_end: end of the run in the case's unit of time.
     pull: the same problem for the full nonlinear beam; without one the full model has the structure's matrices.
     penalty: stiffness of the full model's contact elements where the contacts are rigid, None: it cannot be run.
     metre: length units in one metre (1e3 where lengths are in mm).
