@@ -110,6 +110,54 @@ class TestTheJudgeSees:
         assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=tuple(pulled)))
 
 
+class TestTheJudgeKnowsLaws:
+    """Each case is right, and wrong as soon as the problem's law is another than the trajectory's."""
+
+    @staticmethod
+    def run(name):
+        problem = BY_NAME[name].build(True)
+        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads, compiled=False)
+        assert complaints(problem, trajectory) == ""
+        assert len(trajectory.events) > 2
+        return problem, trajectory
+
+    def told_of(self, name, **changed):
+        problem, trajectory = self.run(name)
+        contacts = [dataclasses.replace(problem.contacts[0], **changed), *problem.contacts[1:]]
+        return complaints(dataclasses.replace(problem, contacts=contacts), trajectory)
+
+    @pytest.mark.parametrize("damping", [40.0, 60.0])
+    def test_of_a_damper_that_is_another(self, damping):
+        told = self.told_of("viscous-closes-again-inside", damping=damping)
+        assert "m beyond the contact law" in told
+        assert "without an event" in told
+
+    def test_of_a_viscous_contact_that_pulls(self):
+        problem, trajectory = self.run("viscous-closes-again-inside")
+        i = next(i for i, s in enumerate(trajectory.segments) if s.level.level.indices and s.end < trajectory.t_end)
+        held = dataclasses.replace(trajectory.segments[i], end=trajectory.segments[i + 1].end)
+        segments = (*trajectory.segments[:i], held, *trajectory.segments[i + 2 :])
+        told = complaints(problem, dataclasses.replace(trajectory, segments=segments))
+        assert "a contact pulls" in told
+
+    def test_of_a_force_law_whose_springs_are_not_its_own(self):
+        problem, trajectory = self.run("law-clearance-both-sides")
+        knots, forces = problem.contacts[0].law
+        harder = dataclasses.replace(problem.contacts[0], law=(knots, 1.001 * forces))
+        assert "m beyond the contact law" in complaints(dataclasses.replace(problem, contacts=[harder]), trajectory)
+
+    @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-base-fixed-rigid-stop"])
+    def test_of_a_stop_that_moves_otherwise(self, name):
+        problem, trajectory = self.run(name)
+        assert "m beyond the contact law" in complaints(dataclasses.replace(problem, loads=[]), trajectory)
+
+    def test_of_an_energy_below_zero(self):
+        problem, trajectory = self.run("law-leaves-unstable-rest")
+        assert trajectory.ledger.initial < 0
+        start = dataclasses.replace(trajectory.start, velocity=trajectory.start.velocity + 1e-4)
+        assert "ledger residual" in complaints(problem, dataclasses.replace(trajectory, start=start))
+
+
 def _with_forces(loaded, factor):
     rest = dataclasses.replace(loaded.asymptotic, forces=factor * loaded.asymptotic.forces)
     return dataclasses.replace(loaded, asymptotic=rest)
@@ -204,6 +252,28 @@ class TestFullMatrices:
             errors.append(np.max(np.abs(run.gaps["stop"] - exact.gap("stop", np.minimum(run.time, 12.0)))))
         assert errors[-1] < 5e-6
         assert errors[0] / errors[-1] > 100  # second order but for the instants of contact: 256
+
+    @pytest.mark.parametrize("name", ["law-clearance-both-sides", "viscous-closes-again-inside"])
+    def test_laws_and_viscous_contacts_converge_to_the_native_answer(self, name):
+        problem = BY_NAME[name].build(True)
+        start, end = problem.displacement, 0.1
+        exact = simulate(problem.model(), end, start)
+        assert len(exact.events) > 1
+        given = problem.structure, problem.penalty_contacts, end
+        errors, part = [], problem.parts[0].name
+        for steps in (1000, 8000):
+            run = run_matrices(*given, steps, displacement=start, laws=problem.laws)
+            errors.append(np.max(np.abs(run.gaps[part] - exact.gap(part, np.minimum(run.time, end)))))
+        assert errors[-1] < 2e-3 * np.max(np.abs(start))
+        assert errors[0] / errors[-1] > 20  # second order but for the instants of contact: 64
+
+    def test_a_law_s_energy_is_kept(self):
+        problem = BY_NAME["law-magnet"].build(True)
+        start = problem.displacement
+        run = run_matrices(problem.structure, [], 0.1, 2000, displacement=start, laws=problem.laws)
+        assert np.ptp(run.energy) < 1e-5 * np.max(run.kinetic)
+        exact = simulate(problem.model(), 0.1, start)
+        assert_allclose(run.energy[0], exact.ledger.initial, rtol=1e-9)
 
     def test_a_load_that_varies_does_the_work_that_the_energy_shows(self):
         structure = chain(2)

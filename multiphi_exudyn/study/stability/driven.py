@@ -75,6 +75,7 @@ CASES = (
         "load-jumps-rigid",
         "A sampled load that presses onto a rigid stop jumps: so does the reaction.",
         lambda quick: _jumping(math.inf),
+        quick=False,
     ),
     Case(
         "moving-stop-compliant",
@@ -90,6 +91,7 @@ CASES = (
         "moving-base-compliant",
         "The base shakes, its stop with it.",
         lambda quick: _moving_base(1e5),
+        quick=False,
     ),
     Case(
         "moving-base-fixed-rigid-stop",

@@ -73,6 +73,7 @@ CASES = (
         "law-hertz",
         "A Hertz contact: its stiffness begins at zero.",
         lambda quick: _two_masses(6e-3, _law(_hertz)),
+        quick=False,
     ),
     Case(
         "law-softening-indefinite",
@@ -93,6 +94,7 @@ CASES = (
         "law-magnet-behind-rigid-stop",
         "A magnet draws the mass onto a rigid stop and keeps it there: a growing level, impacts, a reaction.",
         lambda quick: _two_masses(-8e-3, _law(partial(_magnet, 5e-4), high=8e-3), stop({"m1": -1.0}, 7e-3)),
+        quick=False,
     ),
     Case(
         "law-clearance-both-sides",
@@ -103,11 +105,13 @@ CASES = (
         "law-beside-compliant-contact",
         "A cubic spring and a contact on one point, the contact across knots of the law.",
         lambda quick: _two_masses(6e-3, _law(_hardening), stop("m1", 1e-3, 1e5)),
+        quick=False,
     ),
     Case(
         "law-beside-rigid-contact",
         "A cubic spring and a rigid contact on neighbours: impacts among the knots of the law.",
         lambda quick: _two_masses(6e-3, _law(_hardening), stop("m0", 1e-3, math.inf)),
+        quick=False,
     ),
     Case(
         "viscous-light",
