@@ -146,6 +146,13 @@ class TestTheJudgeKnowsLaws:
         harder = dataclasses.replace(problem.contacts[0], law=(knots, 1.001 * forces))
         assert "m beyond the contact law" in complaints(dataclasses.replace(problem, contacts=[harder]), trajectory)
 
+    def test_of_springs_that_do_not_add_up_to_their_law(self):
+        problem = BY_NAME["law-clearance-both-sides"].build(True)
+        law = problem.contacts[0]
+        vars(law)["springs"] = law.springs[:1]
+        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, compiled=False)
+        assert "m beyond the contact law" in complaints(problem, trajectory)
+
     @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-base-fixed-rigid-stop"])
     def test_of_a_stop_that_moves_otherwise(self, name):
         problem, trajectory = self.run(name)
