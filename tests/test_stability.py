@@ -153,7 +153,7 @@ class TestTheJudgeKnowsLaws:
         trajectory = simulate(problem.model(), problem.t_end, problem.displacement, compiled=False)
         assert "m beyond the contact law" in complaints(problem, trajectory)
 
-    @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-base-fixed-rigid-stop"])
+    @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-stop-viscous", "moving-base-fixed-rigid-stop"])
     def test_of_a_stop_that_moves_otherwise(self, name):
         problem, trajectory = self.run(name)
         assert "m beyond the contact law" in complaints(dataclasses.replace(problem, loads=[]), trajectory)

@@ -135,6 +135,7 @@ def sample_contact(
     slowed, excused = np.zeros(len(times)), times <= table.excused[owner, i]
     if contact.damping > 0:
         rate = np.concatenate([row @ trajectory.velocity(chunk) for chunk in chunks])
+        rate = rate - _way(trajectory, contact, row, times, loads, derivative=True)
         slowed, excused = contact.damping / contact.stiffness * rate, excused & truncated(trajectory)
     return ContactSamples(times, gap, gap + np.maximum(0.0, slowed), slowed, force, table.closed[owner, i], excused)
 
@@ -145,16 +146,23 @@ def truncated(trajectory: Trajectory) -> bool:
 
 
 def _way(
-    trajectory: Trajectory, contact: Contact, row: np.ndarray, times: np.ndarray, loads: Sequence[Load]
+    trajectory: Trajectory,
+    contact: Contact,
+    row: np.ndarray,
+    times: np.ndarray,
+    loads: Sequence[Load],
+    derivative: bool = False,
 ) -> np.ndarray:
-    """z (k,) [m] of a contact's stop, away from it, seen from the base."""
+    """z (k,) [m] of a contact's stop, away from it, seen from the base, or z' [m/s]."""
     way = np.zeros(len(times))
     for load in loads:
         if isinstance(load, StopMotion) and load.contact == contact.name:
-            way += load.course.history(trajectory.t_end).at(times)
+            history = load.course.history(trajectory.t_end)
+            way += (history.derivative if derivative else history).at(times)
         if isinstance(load, BaseMotion) and contact.name in load.fixed_stops:
             carried = float(row @ trajectory.model.structure.row(load.direction))
-            way -= carried * load.course.history(trajectory.t_end).at(times)
+            history = load.course.history(trajectory.t_end)
+            way -= carried * (history.derivative if derivative else history).at(times)
     return way
 
 

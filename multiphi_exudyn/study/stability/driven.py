@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.loads import BaseMotion, Harmonic, HarmonicLoad, SampledLoad, StopMotion
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
@@ -37,11 +38,12 @@ def _jumping(stiffness: float) -> Problem:
     return Problem(chain([1.0, 1.0], [1e4, 1e4]), [stop("m1", 2e-3, stiffness)], 1.0, loads=[load])
 
 
-def _moving_stop(stiffness: float) -> Problem:
+def _moving_stop(stiffness: float, damping: float = 0.0) -> Problem:
     """Two masses let go above a stop that goes up and down."""
     moving = StopMotion(STOP, Harmonic(2e-3, 7.0))
     structure, start = chain([1.0, 1.0], [1e4, 1e4]), np.array([2e-3, 5e-3])
-    return Problem(structure, [stop("m1", 3e-3, stiffness)], 1.0, displacement=start, loads=[moving])
+    contact = UnilateralContact(STOP, "m1", 3e-3, stiffness, damping)
+    return Problem(structure, [contact], 1.0, displacement=start, loads=[moving])
 
 
 def _moving_base(stiffness: float, fixed: tuple[str, ...] = ()) -> Problem:
@@ -81,6 +83,11 @@ CASES = (
         "moving-stop-compliant",
         "The stop goes up and down: it does work on what it touches.",
         lambda quick: _moving_stop(1e5),
+    ),
+    Case(
+        "moving-stop-viscous",
+        "A soft stop with a strong damper goes up and down: its damper presses by its own speed too.",
+        lambda quick: _moving_stop(1e4, 100.0),
     ),
     Case(
         "moving-stop-rigid",
