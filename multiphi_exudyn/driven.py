@@ -35,7 +35,7 @@ from multiphi_exudyn.state import Phase, SignalTable, State
 from multiphi_exudyn.trajectory import Segment, Trajectory
 from multiphi_exudyn.transition import LoadedLevel, Transition
 
-__all__ = ["DrivenMotion", "DrivenRule", "DrivenState", "to_tolerance"]
+__all__ = ["DrivenMotion", "DrivenRule", "DrivenSegment", "DrivenState", "to_tolerance"]
 
 NODES = 20  # of the quadrature on a panel
 PANEL = 6.0  # rad, the phase of the fastest exponential on it: products of two have twice that
@@ -80,9 +80,14 @@ class Flow:
         coefficients = np.concatenate([free, np.ones(forced.shape[1])])
         return cls(_basis(response.basis, tuple(key)), shapes, coefficients, tuple(key))
 
+    @property
+    def rows(self) -> np.ndarray:
+        """xi = Re rows phi(t), (r + q, p)."""
+        return self.shapes * self.coefficients
+
     def at(self, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """xi or a derivative, (r + q,) for a scalar, (r + q, k) for (k,) times from the state on."""
-        rows = self.shapes * self.coefficients
+        rows = self.rows
         for _ in range(derivative):
             rows = self.basis.derivative(rows)
         return np.asarray((rows @ self.basis.at(t).T).real)
@@ -231,9 +236,15 @@ class DrivenSegment(Segment):
     flow: Flow
     entry_work: float
 
-    def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """xi or its first or second derivative, (r + q, k) at times (k,)."""
-        return self.flow.at(t - self.start, derivative)
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials phi (p,) of the motion."""
+        return self.flow.basis
+
+    @property
+    def rows(self) -> np.ndarray:
+        """xi = Re rows phi(t - start), (r + q, p)."""
+        return self.flow.rows
 
     def force_integral(self, contact: int, start: float, end: float) -> float:
         """Integral of the force of a closed contact [N s]."""

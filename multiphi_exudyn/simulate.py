@@ -83,7 +83,9 @@ def started(
         start = _start(model, displacement, velocity, *np.zeros((2, len(model.contacts))))
         return _motion(model, _rule(model, excitation.static), start, compiled)
     if compiled:
-        raise MultiPhiValueError("compiled: got True with loads that vary in time, need None or False")
+        raise MultiPhiValueError(
+            "compiled: got True with loads that vary in time (or pull at damped rigid-body motion), need None or False"
+        )
     rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
     moved = excitation.stops @ rule.drive.values[0]
     return DrivenMotion(model, rule, _start(model, displacement, velocity, moved, excitation.stop_ways))

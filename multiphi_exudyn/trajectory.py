@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Event, Loss, Phase, State
 from multiphi_exudyn.structure import At
@@ -52,11 +53,20 @@ class Segment:
 
     def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """eta or its first or second derivative, (r, k) at times (k,)."""
-        response = self.level.level.response
-        coefficients = self.coefficients
+        rows = self.rows
         for _ in range(derivative):
-            coefficients = response.basis.derivative(coefficients)
-        return (response.shapes @ (coefficients * response.basis.at(t - self.start)).T).real
+            rows = self.basis.derivative(rows)
+        return np.asarray((rows @ self.basis.at(t - self.start).T).real)
+
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials phi (p,) of the motion."""
+        return self.level.level.response.basis
+
+    @property
+    def rows(self) -> np.ndarray:
+        """eta = Re rows phi(t - start), (r, p)."""
+        return self.level.level.response.shapes * self.coefficients
 
     def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
         """Gap (k,) [m] of a contact at times (k,)."""

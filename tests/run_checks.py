@@ -7,6 +7,7 @@ extended precision.
 
 import numpy as np
 
+from multiphi_exudyn.driven import DrivenSegment
 from multiphi_exudyn.state import Phase
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
@@ -93,7 +94,7 @@ def missed(run, segments, samples):
         key = contact, contact in segment.level.level.indices
         own = signal.size(segment.end - segment.start)
         largest[key] = max(
-            largest.get(key, 0.0), own, signal.arm * (np.max(np.abs(run.load)) if signal.held else reach)
+            largest.get(key, 0.0), own, signal.arm * (np.max(np.abs(_load(run, segment))) if signal.held else reach)
         )
     for segment, contact, heard, signal in looked_at:
         size = largest[contact, contact in segment.level.level.indices]
@@ -128,14 +129,13 @@ class Signal:
 
     def __init__(self, segment, contact, rigid):
         level = segment.level
-        own, self.basis = level.level, level.level.response.basis
-        modal = own.response.shapes * segment.coefficients
+        own, self.basis, modal = level.level, segment.basis, segment.rows
         if rigid and contact in own.indices:
             row = own.base.directions[:, contact]
             self.held, self.arm = True, float(np.sum(np.abs(row)) / (row @ row))
             k = own.indices.index(contact)
-            rates = self.basis.derivative(segment.coefficients)
-            self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ (own.response.shapes * rates)
+            rates = self.basis.derivative(modal)
+            self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ rates
             self.constant = float(level.asymptotic.forces[k])
             self.terms = 0.0
         else:
@@ -202,8 +202,16 @@ def _complete(run):
     return run.model.modes == "all"
 
 
+def _load(run, segment):
+    """Constant loads (m,); those that pull at damped rigid-body motion are a channel (excitation.py)."""
+    if not isinstance(segment, DrivenSegment):
+        return run.load
+    _, w = segment.level.split(segment.modal(np.array([segment.start])))
+    return segment.level.excitation.load(w[:, 0])
+
+
 def _work(run, times):
-    """Work of the static loads since the start [J]."""
+    """Work of the constant loads since the start [J]."""
     starts = np.array([segment.start for segment in run.segments])
     owner = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
     work = np.empty(len(times))
@@ -213,5 +221,5 @@ def _work(run, times):
             segment.level.level.vectors @ segment.modal(times[part])
             + (segment.level.asymptotic.configuration - run.start.displacement)[:, None]
         )
-        work[part] = run.load @ moved
+        work[part] = _load(run, segment) @ moved
     return work
