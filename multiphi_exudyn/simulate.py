@@ -84,7 +84,8 @@ def started(
         return _motion(model, _rule(model, excitation.static), start, compiled)
     if compiled:
         raise MultiPhiValueError(
-            "compiled: got True with loads that vary in time (or pull at damped rigid-body motion), need None or False"
+            "compiled: got True with loads that vary in time, or that pull at damped rigid-body motion, "
+            "need None or False"
         )
     rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
     moved = excitation.stops @ rule.drive.values[0]
