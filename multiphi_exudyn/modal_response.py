@@ -23,8 +23,8 @@ __all__ = ["Exponentials", "ModalResponse", "modal_response"]
 
 DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
-SERIES_BELOW = 0.5  # |s T| under which exp is integrated by its series, to SERIES_TERMS terms
-SERIES_TERMS = 20
+SERIES_BELOW = 0.5  # |s T| - d under which t^d exp is integrated by its series: by parts d! / |s T|^d is lost
+SERIES_ROUND_OFF = 1e-18  # of 1: terms of that series below it are left out
 WORST_CONDITION = 1e7  # of the scaled eigenvectors; times round-off it is the motion's error (a double root has 1e8)
 
 
@@ -89,14 +89,16 @@ def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float
     By parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
     """
     exponents = rates * duration
-    small = np.abs(exponents) < SERIES_BELOW
+    small = np.abs(exponents) < SERIES_BELOW + powers
     safe = np.where(small, 1.0, rates)
     by_parts = np.where(small, 0.0, np.expm1(exponents) / safe)
     series = np.zeros_like(by_parts)
+    near, n = np.where(small, exponents, 0.0), 0
     term = np.ones_like(by_parts)
-    for n in range(SERIES_TERMS):
+    while np.any(np.abs(term) > SERIES_ROUND_OFF):
         series += term / (n + 1 + powers)
-        term = term * exponents / (n + 1)
+        term = term * near / (n + 1)
+        n += 1
     for degree in range(1, int(np.max(powers, initial=0)) + 1):
         raised = (duration**degree * np.exp(exponents) - degree * by_parts) / safe
         by_parts = np.where(powers >= degree, raised, by_parts)
