@@ -28,6 +28,7 @@ from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.excitation import Drive, DrivenLevel, DrivenTransition, Excitation
 from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.forced_response import particular
+from multiphi_exudyn.history import differentiated
 from multiphi_exudyn.loads import Load, Smooth, Sweep
 from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.motion import Motion
@@ -64,14 +65,14 @@ class Flow:
         for rate, given in drive.terms:
             forces = given @ level.force.T
             if np.any(level.force_rate):
-                forces = forces + _rate_of(rate, given) @ level.force_rate.T
+                forces = forces + differentiated(rate, given) @ level.force_rate.T
             x = particular(own.squares, own.damping, response, rate, forces, horizon)
             block = np.zeros((max(len(x), len(given)), own.modes + q), complex)
             block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
             blocks.append(block)
             key.append((rate, len(block)))
         at_once = sum(block[0] for block in blocks).real
-        rate_at_once = sum(_rate_of(k[0], block)[0] for k, block in zip(key, blocks, strict=True)).real
+        rate_at_once = sum(differentiated(k[0], block)[0] for k, block in zip(key, blocks, strict=True)).real
         (eta, _), (eta_t, _) = level.split(xi - at_once), level.split(xi_t - rate_at_once)
         steady = level.plain.asymptotic.drive if level.plain.driven else None
         free = response.coefficients(eta, eta_t, steady)
@@ -409,13 +410,6 @@ def _interpolation_error(trajectory: Trajectory) -> float:
 
 def _energy(state: DrivenState) -> float:
     return float(state.level.kinetic(state.velocity) + state.level.strain(state.displacement))
-
-
-def _rate_of(rate: complex, given: np.ndarray) -> np.ndarray:
-    """Time derivative of exp(rate t) sum_d given_d t^d, as such a sum (D + 1, q)."""
-    result = rate * given
-    result[:-1] += np.arange(1, len(given))[:, None] * given[1:]
-    return result
 
 
 def _basis(free: Exponentials, key: Basis) -> Exponentials:

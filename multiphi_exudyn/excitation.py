@@ -31,7 +31,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.force_law import LawSpring
-from multiphi_exudyn.history import History, translated
+from multiphi_exudyn.history import History, differentiated, translated
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.loads import (
     BaseMotion,
@@ -68,9 +68,8 @@ class Drive:
         """w, w', w'' (3, q) at the instant."""
         result = np.zeros((3, self.terms[0][1].shape[1]))
         for rate, given in self.terms:
-            a = np.zeros((3, given.shape[1]), complex)
-            a[: min(3, len(given))] = given[:3]
-            result += np.array([a[0], rate * a[0] + a[1], rate**2 * a[0] + 2 * rate * a[1] + 2 * a[2]]).real
+            first = differentiated(rate, given)
+            result += np.array([given[0], first[0], differentiated(rate, first)[0]]).real
         return result
 
     def after(self, t: float) -> Drive:
@@ -226,11 +225,10 @@ class _Channels:
 
 def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:
     """The constant loads among ``loads``, (m,) in base coordinates."""
-    total = np.zeros(model.structure.n)
-    for load in loads:
-        if isinstance(load, (ConstantLoad, Gravity)):
-            total += load.row(model.structure)
-    return np.asarray(model.base.modes.shapes.T @ total)
+    rows = [load.row(model.structure) for load in loads if isinstance(load, (ConstantLoad, Gravity))]
+    if not rows:
+        return np.zeros(model.base.modes.count)
+    return np.asarray(model.base.modes.shapes.T @ np.sum(rows, axis=0))
 
 
 @dataclass(frozen=True)
@@ -253,14 +251,13 @@ class DrivenLevel(LoadedLevel):
     """A level under static and varying loads, in the coordinates xi = (eta, w).
 
     plain: the level under the static loads alone. force, force_rate: P, Q (r, q). carried: Y (m, q).
-    stop_force: Psi^T k h s (r, q). excitation: of the run.
+    excitation: of the run.
     """
 
     plain: LoadedLevel
     force: np.ndarray
     force_rate: np.ndarray
     carried: np.ndarray
-    stop_force: np.ndarray
     excitation: Excitation
 
     @classmethod
@@ -292,7 +289,6 @@ class DrivenLevel(LoadedLevel):
             force=parts.force,
             force_rate=parts.force_rate,
             carried=parts.carried,
-            stop_force=parts.stop_force,
             excitation=excitation,
         )
 
@@ -381,7 +377,6 @@ class _Prescribed:
     carried: np.ndarray
     force: np.ndarray
     force_rate: np.ndarray
-    stop_force: np.ndarray
     contact_force: np.ndarray
     contact_force_rate: np.ndarray
 
@@ -391,8 +386,7 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     rigid = np.isinf(base.stiffnesses[index])
     stops, directions = excitation.stops[index], base.directions[:, index]
     springs = np.where(rigid, 0.0, base.stiffnesses[index])
-    stop_force = level.vectors.T @ (directions @ (springs[:, None] * stops))
-    force = level.vectors.T @ excitation.patterns + stop_force
+    force = level.vectors.T @ excitation.patterns + level.vectors.T @ (directions @ (springs[:, None] * stops))
     squares = level.squares[:, None]
     centre = np.divide(force, squares, out=np.zeros_like(force), where=squares != 0)
     at_rest = [level.rest(excitation.patterns[:, k], -stops[:, k]) for k in range(excitation.channels)]
@@ -412,7 +406,7 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
             contact_force[~rigid, derivative] += pressed[~rigid]
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
-    return _Prescribed(shapes, carried, force, rate, stop_force, contact_force, contact_rate)
+    return _Prescribed(shapes, carried, force, rate, contact_force, contact_rate)
 
 
 def _columns(vectors: list[np.ndarray], length: int) -> np.ndarray:

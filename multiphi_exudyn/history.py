@@ -24,7 +24,7 @@ import numpy.polynomial.chebyshev as chebyshev
 
 from multiphi_exudyn.errors import NumericalFailure
 
-__all__ = ["History", "Piece", "translated"]
+__all__ = ["History", "Piece", "differentiated", "translated"]
 
 DEGREE = 8  # of the polynomials that stand for smooth functions
 MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
@@ -121,11 +121,8 @@ class History:
     @functools.cached_property
     def derivative(self) -> History:
         """u', piece by piece."""
-        degrees = np.arange(1, self.coefficients.shape[1])
-        moved = np.zeros_like(self.coefficients)
-        moved[:, :-1] = degrees * self.coefficients[:, 1:]
         steepest = float(np.max(np.abs(self.rates) + 2 * DEGREE**2 / np.diff(self.breaks)))  # Markov's inequality
-        changed = self.rates[:, None] * self.coefficients + moved
+        changed = differentiated(self.rates, self.coefficients.T).T
         return History(self.breaks, self.rates, changed, self.error * steepest if self.error else 0.0)
 
     def local(self, t: float) -> Piece:
@@ -167,6 +164,13 @@ class History:
         for column in self.coefficients.T[::-1]:
             values = values * s + column[i]
         return np.where(inside, (values * np.exp(self.rates[i] * s)).real, 0.0)
+
+
+def differentiated(rate: complex | np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Time derivative of exp(rate s) sum_d a_d s^d, as coefficients (D + 1, ...) of such a sum."""
+    result = np.asarray(rate * coefficients)
+    result[:-1] += (np.arange(1, len(coefficients)) * coefficients[1:].T).T
+    return result
 
 
 def translated(rate: complex, coefficients: np.ndarray, delay: float) -> np.ndarray:
