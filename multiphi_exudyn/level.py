@@ -9,8 +9,9 @@ mass is the identity and the stiffness diag(Omega^2). A level is then a small de
     closed rigid contacts      H_r^T y = -gap           modes in the null space of H_r^T
     closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
 
-Closed springs of one direction p, the chain of a force law, are one spring K q + G, q = p.y. Its total stiffness may
-be negative, and the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ exp(+-|omega| t)).
+Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
+K q + G, q = p.y. The total stiffness of a law may be negative, and the level indefinite: then omega^2 < 0, the square
+of a rate of growth (eta ~ exp(+-|omega| t)).
 
 The omega of springs K > 0 are singular values of [diag(Omega) Z; sqrt(K) P^T Z], Z an orthonormal null space: as
 accurate as the base's own (see modes.py). Springs K < 0 follow on these modes, w = sqrt|K| Phi^T p, as
@@ -67,6 +68,7 @@ ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 INDEPENDENT = 1e-10  # of the largest: singular values of contact directions below it are dependent contacts
+PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
@@ -129,14 +131,24 @@ class Base:
 
     @functools.cached_property
     def rays(self) -> list[int]:
-        """``rays_of`` the contacts."""
-        return rays_of(self.contacts)
+        """``rays_of`` the contacts, compliant contacts of one direction up to its sign taken together as well."""
+        first = rays_of(self.contacts)
+        plain = [i for i, c in enumerate(self.contacts) if not c.rigid and not isinstance(c, LawSpring)]
+        for k, i in enumerate(plain):
+            first[i] = next((j for j in plain[:k] if first[j] == j and self._parallel(i, j)), i)
+        return first
+
+    def _parallel(self, i: int, j: int) -> bool:
+        """Whether two contacts have one direction up to its sign, and the same measure of a gap along it."""
+        one, other = self.directions[:, i], self.directions[:, j]
+        apart = min(float(np.max(np.abs(one - other))), float(np.max(np.abs(one + other))))
+        return apart <= PARALLEL * float(np.max(np.abs(other)))
 
     @functools.cached_property
     def signs(self) -> np.ndarray:
         """Sign (c,) of every contact's direction to the one of its ray."""
-        sides = [c.side if isinstance(c, LawSpring) else 1 for c in self.contacts]
-        return np.array([side * sides[ray] for side, ray in zip(sides, self.rays, strict=True)])
+        along = np.sum(self.directions * self.directions[:, self.rays], axis=0)
+        return np.where(along < 0, -1, 1)
 
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:
@@ -422,7 +434,7 @@ def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: i
 
 
 def rays_of(contacts: Sequence[Contact]) -> list[int]:
-    """For every contact the first one of the same direction up to its sign: itself, or its law's first spring."""
+    """For every contact itself, or its law's first spring, which has the same direction up to its sign."""
     first: dict[ForceLaw, int] = {}
     return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
 

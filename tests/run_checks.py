@@ -14,8 +14,10 @@ CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
-SMALLEST = 1e-6  # J: less is round-off in cases whose masses, stiffnesses and gaps are about 1
+DIFFERENCE = 1e-3  # of a level's potential at rest: energies are differences of it, with 1e-3 of CLOSES for round-off
+SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
+INSIDE = 5  # instants of a segment at which its reach is read
 BLOCK = 2**18  # samples held at one time
 POLISH = 41  # samples around a lowest one, ROUNDS times over
 ROUNDS = 4
@@ -48,7 +50,8 @@ def largest_energy(run, segments):
     times = np.unique([time for segment in segments for time in (segment.start, segment.end)])
     stored = np.max(np.abs(run.energy(times)))
     work = np.max(np.abs(_work(run, times)))
-    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST)
+    rests = max(abs(segment.level.asymptotic.potential) for segment in segments)
+    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST, DIFFERENCE * rests)
 
 
 def ledger(run, scale):
@@ -116,9 +119,10 @@ def _signals(segments, run, complete):
 
 
 def _reach(segments):
-    """The largest coordinate y of the run: what a gap that never moves is the difference of."""
-    starts = [segment.level.configuration(segment.modal(np.array([segment.start]))) for segment in segments]
-    return max((float(np.max(np.abs(y))) for y in starts), default=0.0)
+    """The largest coordinate y of the run, within segments too: what a gap that never moves is the difference of."""
+    times = [np.linspace(segment.start, segment.end, INSIDE) for segment in segments]
+    places = [segment.level.configuration(segment.modal(t)) for segment, t in zip(segments, times, strict=True)]
+    return max([SMALLEST, *(float(np.max(np.abs(y), initial=0.0)) for y in places)])
 
 
 class Signal:

@@ -44,6 +44,21 @@ FOUND = {
     "a held contact beside another one": Recipe(
         286, "dense", 3, "modal", 4, "mixed", "zero", "mixed", "all", "striking", "point"
     ),
+    "stiff springs beside each other, one in preload": Recipe(
+        4970, "repeated", 3, "none", 3, "compliant", "preload", "above", "half", "random", "none"
+    ),
+    "a soft spring beside a stiff one on a body that hardly anything holds": Recipe(
+        5656, "free dense", 3, "none", 3, "compliant", "zero", "below", "all", "static", "gravity"
+    ),
+    "little energy far from rest": Recipe(
+        3718, "unconnected", 6, "heavy", 3, "compliant", "zero", "between", "all", "static", "gravity"
+    ),
+    "every segment starts at zero": Recipe(
+        15520, "repeated", 1, "rayleigh", 2, "mixed", "zero", "rows", "all", "leaving", "none"
+    ),
+    "a load that a stop carries without any motion": Recipe(
+        16004, "free dense", 3, "heavy", 4, "rigid", "zero", "mixed", "few", "static", "point"
+    ),
 }
 
 

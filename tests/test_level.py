@@ -188,3 +188,20 @@ class TestLevelOverride:
         assert_allclose(theirs.damping[0, 1:], 0)
         assert_allclose(theirs.shapes, own.shapes)
         assert_allclose(given_model.level(()).omega, plain.level(()).omega)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_stiff_springs_in_preload_at_one_place_are_one_spring_to_round_off(side):
+    """The level of both rests as one mass on k1 + k2 does; solved one by one they lose k / K of all digits."""
+    structure = LinearStructure(mass=np.eye(1), stiffness=np.eye(1), points={"m": 0})
+    stiffness, gaps, way = np.array([2.2e7, 4.1e7]), np.array([-0.018, side * -0.094]), np.array([1.0, side])
+    contacts = [
+        UnilateralContact(f"c{i}", {"m": way[i]}, gap=gaps[i], stiffness=stiffness[i]) for i in range(len(gaps))
+    ]
+    level = MultiPhiModel(structure, contacts, modes="all").level_at((0, 1))
+    rest = -np.sum(stiffness * way * gaps) / (1 + np.sum(stiffness))
+    strain = 0.5 * rest**2 + 0.5 * np.sum(stiffness * (way * rest + gaps) ** 2)
+    found = level.asymptotic(np.zeros(1))
+    assert found.configuration == pytest.approx([rest], rel=1e-14)
+    assert found.strain == pytest.approx(strain, rel=1e-13)
+    assert found.forces == pytest.approx(-stiffness * (way * rest + gaps), rel=1e-13)
