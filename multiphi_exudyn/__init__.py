@@ -4,6 +4,7 @@ A structure (M, C, K, named points) and its contacts make levels, one for each s
 own modes and asymptotic configuration; transitions carry the motion from level to level.
 """
 
+from multiphi_exudyn.assemble import Assembly, assemble
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
@@ -33,6 +34,7 @@ from multiphi_exudyn.trajectory import Ledger, Trajectory
 from multiphi_exudyn.truncation import truncation_indicator
 
 __all__ = [
+    "Assembly",
     "BaseMotion",
     "Beam",
     "Clamp",
@@ -68,6 +70,7 @@ __all__ = [
     "Trajectory",
     "UnilateralContact",
     "UpTo",
+    "assemble",
     "frequency_response",
     "planar_beam",
     "simulate",

@@ -19,8 +19,18 @@ import scipy.linalg
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.modes import complete_modes
 
-__all__ = ["At", "LinearStructure", "Matrix", "ModalDamping", "RayleighDamping", "is_real", "real_array"]
+__all__ = [
+    "At",
+    "LinearStructure",
+    "Matrix",
+    "ModalDamping",
+    "RayleighDamping",
+    "damping_matrix",
+    "is_real",
+    "real_array",
+]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
@@ -118,6 +128,20 @@ class LinearStructure:
     def vector(self, name: str, given: Any) -> np.ndarray:
         """A copy of ``given`` as finite (n,) numbers; ``name`` is what an error calls it."""
         return _vector(name, given, self.n)
+
+
+def damping_matrix(structure: LinearStructure) -> Matrix | None:
+    """C (n, n) [N s/m] of a structure's damping, however it is given; modal damping needs dense matrices."""
+    given = structure.damping
+    if isinstance(given, ModalDamping):
+        if scipy.sparse.issparse(structure.mass) or scipy.sparse.issparse(structure.stiffness):
+            raise MultiPhiValueError("damping: got ModalDamping of sparse matrices as one matrix, need dense ones")
+        modes = complete_modes(structure.mass, structure.stiffness)
+        momenta = structure.mass @ modes.shapes
+        return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T
+    if isinstance(given, RayleighDamping):
+        return given.alpha * structure.mass + given.beta * structure.stiffness
+    return given
 
 
 def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:

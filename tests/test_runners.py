@@ -13,13 +13,14 @@ from multiphi_exudyn import (
     planar_beam,
     simulate,
 )
+from multiphi_exudyn.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import damping_matrix, prepare, start_configuration
+from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 from reference_models.rig import rig_beam
 
 MODELS = [

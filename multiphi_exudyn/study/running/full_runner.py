@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.structure import damping_matrix
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel
-from multiphi_exudyn.study.scene.workbench import Workbench, damping_matrix, start_configuration
+from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from reference_models.full_beam import FullBeam, FullRun
 from reference_models.gentler import Attempt, attempts
 

@@ -22,8 +22,7 @@ from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
-from multiphi_exudyn.modes import complete_modes
-from multiphi_exudyn.structure import At, LinearStructure, ModalDamping, RayleighDamping
+from multiphi_exudyn.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics
 from multiphi_exudyn.study.scene.scene_file import (
@@ -40,7 +39,7 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ROUND_OFF", "Workbench", "damping_matrix", "prepare", "start_configuration"]
+__all__ = ["ROUND_OFF", "Workbench", "prepare", "start_configuration"]
 
 _Mesh = tuple[
     tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp, str | None, int
@@ -176,18 +175,6 @@ def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
             f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
         )
     return model.static_equilibrium({start.load_at: root.root * needed})
-
-
-def damping_matrix(structure: LinearStructure) -> np.ndarray | None:
-    """C (n, n) [N s/m] of a structure's damping, however it is given."""
-    given = structure.damping
-    if isinstance(given, ModalDamping):
-        modes = complete_modes(np.asarray(structure.mass), np.asarray(structure.stiffness))
-        momenta = structure.mass @ modes.shapes
-        return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T
-    if isinstance(given, RayleighDamping):
-        return given.alpha * structure.mass + given.beta * structure.stiffness
-    return given
 
 
 def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:

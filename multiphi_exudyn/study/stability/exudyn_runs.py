@@ -15,8 +15,8 @@ import numpy as np
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.scene.workbench import damping_matrix
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
 from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, Outcome
