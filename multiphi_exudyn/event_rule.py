@@ -50,7 +50,7 @@ from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissib
 __all__ = ["EventRule"]
 
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
-RESTING = 1e-12  # of the same: a gap velocity below it is zero right after an impact
+RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
 
 
 class EventRule:
@@ -423,14 +423,22 @@ class EventRule:
         """
         own = state.level.level
         rows = own.speed_rows[touching]
-        speeds = np.abs(released.velocity) + np.abs(state.velocity)
-        resting = np.abs(rows @ state.velocity) <= RESTING * np.abs(rows) @ speeds
+        resting = np.abs(rows @ state.velocity) <= RESTING * self._sizes(rows, released, state)
         if not np.any(resting):
             return set()
         _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         return pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
+
+    def _sizes(self, rows: np.ndarray, *states: State) -> np.ndarray:
+        """What gap velocities (k,) could be at the speeds of these states, whose directions an impact mixes."""
+        free = self._free(states[0].level)
+        lengths, sizes = np.linalg.norm(rows[:, :free], axis=1), np.zeros(len(rows))
+        for state in states:
+            prescribed = np.abs(rows[:, free:]) @ np.abs(state.velocity[free:])
+            sizes += lengths * np.linalg.norm(state.velocity[:free]) + prescribed
+        return sizes
 
     def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
         """The state in another level (eq. 38.6), and what truncation took."""

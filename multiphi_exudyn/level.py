@@ -426,7 +426,7 @@ def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: i
     return Base(
         modes=found,
         damping=_base_damping(structure, found),
-        directions=found.shapes.T @ rows.T,
+        directions=cleared(found.shapes.T @ rows.T, np.abs(found.shapes.T) @ np.abs(rows.T)),
         contacts=tuple(contacts),
         complete=complete,
         weights=(structure.mass @ found.shapes).T,

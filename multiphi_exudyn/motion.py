@@ -23,6 +23,7 @@ __all__ = ["CHATTER_WINDOW", "CompiledMotion", "Motion"]
 
 EVENTS_PER_PERIOD = 20  # of the highest kept mode: more, over CHATTER_WINDOW events, is chatter
 CHATTER_WINDOW = 200
+ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
 
 
 @dataclass
@@ -163,10 +164,10 @@ class Motion:
         starts, frequencies = zip(*self._recent(), strict=True)
         elapsed, highest = self.time - starts[0], max(frequencies)
         allowed = EVENTS_PER_PERIOD + 2 * sum(map(len, self.model.chains))  # a swing passes every spring of a law twice
-        if elapsed == 0 or 0 < highest * elapsed < CHATTER_WINDOW / allowed:
+        if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < CHATTER_WINDOW / allowed:
             raise NumericalFailure(
                 f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {allowed} "
-                f"in a period of the highest kept mode ({highest:g} Hz)"
+                f"in a period of the highest kept mode ({highest:g} Hz) or all within {ACCUMULATED:g} of the time so far"
             )
 
 
@@ -182,7 +183,7 @@ class CompiledMotion(Motion):
         super().__post_init__()
 
     def _continue(self, end: float) -> None:
-        given = self.state, self.time, end, self.record, CHATTER_WINDOW, EVENTS_PER_PERIOD
+        given = self.state, self.time, end, self.record, CHATTER_WINDOW, EVENTS_PER_PERIOD, ACCUMULATED
         self.state, self.time, chatter = self.loop.advance(*given)
         if chatter:
             self._check_chatter()

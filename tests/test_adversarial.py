@@ -95,6 +95,31 @@ def test_what_went_wrong_once_stays_right(name, compiled):
     assert complaints(run_of(built(FOUND[name]), compiled=compiled)) == []
 
 
+RESTS = {
+    "falling into a corner": (
+        Recipe(15717, "free dense", 2, "modal", 4, "rigid", "mixed", "mixed", "half", "rest", "gravity"),
+        8,
+    ),
+}
+
+
+@pytest.mark.parametrize("compiled", [False, None])
+@pytest.mark.parametrize("name", RESTS)
+def test_what_could_bounce_for_ever_comes_to_rest(name, compiled):
+    """At speeds of the round-off of an impact it is still one: which contacts are at rest is told by all of them."""
+    recipe, most = RESTS[name]
+    run = run_of(built(recipe), compiled=compiled)
+    assert run.status == "ok"
+    assert 2 <= run.stats.events <= most
+
+
+@pytest.mark.parametrize("compiled", [False, None])
+def test_a_contact_between_parts_is_blind_to_their_common_motion(compiled):
+    """What round-off leaves of it in the direction of a contact would be an effective mass of 1e30 kg."""
+    case = built(Recipe(22821, "free chain", 5, "modal", 2, "mixed", "zero", "between", "one", "moving", "gravity"))
+    assert np.all(case.model.base.directions[0] == 0)
+
+
 @settings(max_examples=40)
 @given(cases())
 def test_every_run_keeps_energy_ledger_and_events(case):

@@ -63,14 +63,18 @@ def watch(
 
 
 @jit
-def crowded(spans: np.ndarray, n: int, time: float, window: int, period: float) -> bool:
-    """Whether the last ``window`` segments, of n, are more than ``period`` in a period of the highest kept mode."""
+def crowded(spans: np.ndarray, n: int, time: float, window: int, period: float, within: float) -> bool:
+    """Whether the last ``window`` segments, of n, are chatter.
+
+    They are where they lie ``within`` a share of the time so far, or are more than ``period`` in a period of the
+    highest kept mode.
+    """
     if n <= window:
         return False
     elapsed, highest = time - spans[n - window, 0], 0.0
     for i in range(n - window, n):
         highest = max(highest, spans[i, 3])
-    return elapsed == 0 or 0 < highest * elapsed < window / period
+    return elapsed <= within * time or 0 < highest * elapsed < window / period
 
 
 @jit
@@ -100,12 +104,13 @@ def run(
     kinds: np.ndarray,
     window: int,
     period: float,
+    within: float,
 ) -> tuple[int, int, float, int, int, int, int]:
     """(DONE | LEFT | FULL | CHATTER, level, time [s], segments, events, samples, transitions) from a state to ``end``.
 
     x, v, phases: the state in level a, replaced. n, m: rows taken so far of spans (n, 4): start, end, armed at,
     highest frequency; levels (n,), coefficients (n, 2, p), standings (n, c); events (m, 5): time, losses, impulse;
-    kinds (m, 2): contact, CLOSE | OPEN. window, period: of the chatter check.
+    kinds (m, 2): contact, CLOSE | OPEN. window, period, within: of the chatter check.
     """
     p_most, r_most, c_count = k.rates.shape[2], k.squared.shape[1], len(phases)
     signals, slopes = np.empty((2 * c_count, 2, p_most)), np.empty((2 * c_count, 2, p_most))
@@ -188,6 +193,6 @@ def run(
         copy(follow, c_count, phases)
         copy(next_c[0], k.sizes[a, 1], c[0])
         copy(next_c[1], k.sizes[a, 1], c[1])
-        if asking >= 0 and crowded(spans, n, time, window, period):
+        if asking >= 0 and crowded(spans, n, time, window, period, within):
             return CHATTER, a, time, n, m, samples, transitions
     return DONE, a, time, n, m, samples, transitions

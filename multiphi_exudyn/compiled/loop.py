@@ -24,11 +24,11 @@ class CompiledLoop:
         return Record(self._pack)
 
     def advance(
-        self, state: State, time: float, end: float, record: Record, window: int, period: float
+        self, state: State, time: float, end: float, record: Record, window: int, period: float, within: float
     ) -> tuple[State, float, bool]:
         """(state, time [s], whether it was chatter that stopped it) as far as the kernel comes from a state.
 
-        window, period: the chatter check of simulate.py.
+        window, period, within: of the chatter check of motion.py.
         """
         position = self._pack.position(state.level)
         if position is None:
@@ -60,6 +60,7 @@ class CompiledLoop:
                 record.kinds,
                 window,
                 period,
+                within,
             )
             state.level.level.finder.evaluations += samples
             self._pack.rule.transitions += transitions
