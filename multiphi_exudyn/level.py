@@ -18,7 +18,16 @@ accurate as the base's own (see modes.py). Springs K < 0 follow on these modes, 
 
     omega^2 + mu - W W^T = (R B)^T R B,   B = diag(omega^2 + mu)^1/2,   R^T R = I - (B^-1 W)(B^-1 W)^T
 
-again by singular values; mu = 0 unless the level is indefinite or nearly so. The asymptotic configuration x_inf,l
+again by singular values; mu = 0 unless the level is indefinite or nearly so.
+
+Where a quarter of the modes or fewer are asked for, in a base without rigid-body modes and with no K < 0, they are the
+largest eigenvectors of the level's compliance, a matrix of rank d away from the base's,
+
+    A = Omega^-2 - Omega^-2 P (1/K + P^T Omega^-2 P)^-1 P^T Omega^-2            (rigid: 1/K = 0)
+
+and their omega the singular values in the space of these few: the cost is that of a few vectors, the accuracy stays.
+
+The asymptotic configuration x_inf,l
 holds gaps and static loads (38.5, completed by the static force), with the forces f along the directions:
 
     y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
@@ -71,6 +80,7 @@ INDEPENDENT = 1e-10  # of the largest: singular values of contact directions bel
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
+FEW = 4  # modes of the base for each mode asked for: from there on the compliance is the cheaper way to them
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
 
 
@@ -439,13 +449,18 @@ def rays_of(contacts: Sequence[Contact]) -> list[int]:
     return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
 
 
-def build_level(base: Base, indices: tuple[int, ...]) -> Level:
-    """The level with these contacts closed, with every mode the base can give."""
+def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) -> Level:
+    """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
     closed = list(indices)
     supports = base.supports(closed, base.gaps[closed])
     pinned = supports.directions[:, supports.rigid]
-    free = _null_space(base, pinned, [base.contacts[i].name for i in closed if base.contacts[i].rigid])
-    squares, vectors, accuracy = _modes(base, supports, free) if closed else (base.modes.omega**2, free, 0.0)
+    _independent(base, pinned, [base.contacts[i].name for i in closed if base.contacts[i].rigid])
+    if not closed:
+        squares, vectors, accuracy = base.modes.omega[:modes] ** 2, np.eye(base.modes.count, modes), 0.0
+    elif modes is not None and _few(base, supports, modes):
+        squares, vectors, accuracy = _lowest(base, supports, modes)
+    else:
+        squares, vectors, accuracy = _modes(base, supports, _null_space(pinned))
     rigid_body = _rigid_body_modes(base, supports)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
@@ -460,7 +475,7 @@ def build_level(base: Base, indices: tuple[int, ...]) -> Level:
         squares=squares,
         vectors=vectors,
         damping=_projected_damping(damping, squares, vectors),
-        gap_rows=cleared(base.directions.T @ vectors, np.abs(base.directions.T) @ np.abs(vectors)),
+        gap_rows=cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors)),
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
@@ -485,6 +500,31 @@ def _modes(base: Base, supports: Supports, free: np.ndarray) -> tuple[np.ndarray
     if not np.any(softening):
         return squares, vectors, 0.0
     return _softened(squares, vectors, (vectors.T @ directions[:, softening]) * np.sqrt(-stiffness[softening]))
+
+
+def _few(base: Base, supports: Supports, modes: int) -> bool:
+    """Whether the compliance gives that many modes cheaply."""
+    left = base.modes.count - int(np.sum(supports.rigid))
+    return not base.modes.rigid and bool(np.all(supports.stiffness >= 0)) and FEW * modes <= left
+
+
+def _lowest(base: Base, supports: Supports, modes: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """``_modes``, the lowest ones only, by way of the level's compliance."""
+    sprung = supports.stiffness != 0
+    directions, stiffness = supports.directions[:, sprung], supports.stiffness[sprung]
+    compliance = base.modes.omega**-2.0
+    lengths = np.linalg.norm(directions / base.modes.omega[:, None], axis=0)
+    bent = compliance[:, None] * directions / lengths
+    flexibility = directions.T @ bent / lengths[:, None] + np.diag(1 / stiffness / lengths**2)
+    taken = scipy.linalg.solve_triangular(np.linalg.cholesky(flexibility), bent.T, lower=True)
+    own = np.diag(compliance) - taken.T @ taken
+    count = base.modes.count
+    _, vectors = scipy.linalg.eigh(own, subset_by_index=[count - modes, count - 1], check_finite=False)
+    pinned = directions[:, np.isinf(stiffness)]
+    if pinned.shape[1]:
+        held = np.linalg.qr(pinned)[0]
+        vectors = vectors - held @ (held.T @ vectors)
+    return _modes(base, supports, np.linalg.qr(vectors)[0])
 
 
 def _softened(squares: np.ndarray, vectors: np.ndarray, pull: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -552,15 +592,20 @@ def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.nda
     return projected
 
 
-def _null_space(base: Base, pinned: np.ndarray, names: list[str]) -> np.ndarray:
-    """Orthonormal basis (m, m - c) of the motions that leave the rigid contacts' gaps unchanged."""
+def _independent(base: Base, pinned: np.ndarray, names: list[str]) -> None:
+    """Raises NumericalFailure for rigid contacts (m, k) of which one follows from the others."""
     if pinned.shape[1] == 0:
-        return np.eye(base.modes.count)
-    orthogonal, triangular = scipy.linalg.qr(pinned)
-    diagonal = np.abs(np.diagonal(triangular))
+        return
+    diagonal = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
     if pinned.shape[1] > base.modes.count or np.min(diagonal) <= INDEPENDENT * np.max(diagonal):
         raise NumericalFailure(f"level: rigid contacts {', '.join(names)} are not independent of each other")
-    return orthogonal[:, pinned.shape[1] :]
+
+
+def _null_space(pinned: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (m, m - c) of the motions that leave the gaps of rigid contacts (m, c) unchanged."""
+    if pinned.shape[1] == 0:
+        return np.eye(len(pinned))
+    return np.asarray(scipy.linalg.qr(pinned)[0][:, pinned.shape[1] :])
 
 
 def _rigid_body_modes(base: Base, supports: Supports) -> int:
@@ -580,14 +625,13 @@ def _reaction_rows(
     Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
     """
     squared = base.modes.omega[:, None] ** 2
-    rows = np.zeros((pinned.shape[1], len(squares)))
-    for k in range(len(squares)):
-        total = squared[:, 0] + abs(squares[k])
-        weight = 1 / np.where(total > 0, total, np.min(total[total > 0], initial=np.inf))
-        weight = np.where(np.any(total > 0), weight, 1.0)
-        residual = (squared[:, 0] - squares[k]) * vectors[:, k] - spring_forces[:, k]
-        rows[:, k] = np.linalg.solve(pinned.T @ (weight[:, None] * pinned), pinned.T @ (weight * residual))
-    return rows
+    total = squared + np.abs(squares)
+    smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
+    weights = 1 / np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
+    residuals = (squared - squares) * vectors - spring_forces
+    grams = np.array([(pinned.T * weight) @ pinned for weight in weights.T])
+    given = (pinned.T @ (weights * residuals)).T
+    return np.asarray(np.linalg.solve(grams, given[:, :, None])[:, :, 0].T)
 
 
 def _check(base: Base, squares: np.ndarray, vectors: np.ndarray, supports: Supports, accuracy: float) -> None:

@@ -165,8 +165,8 @@ class MultiPhiModel:
         if indices not in self._levels:
             base = self.base
             full = self._shared["levels"].get(indices)
-            if full is None:
-                full = self._shared["levels"][indices] = build_level(base, indices)
+            if full is None or full.modes < self._needed(indices):
+                full = self._shared["levels"][indices] = build_level(base, indices, self.most_modes)
             level = full.truncated(self._modes_of(full))
             override = self.overrides.get(level.closed)
             self._levels[indices] = level if override is None else level.overridden(override)
@@ -215,8 +215,13 @@ class MultiPhiModel:
     def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self.contacts[i].name for i in indices)
 
+    def _needed(self, indices: tuple[int, ...]) -> int:
+        """Number of modes that a level has to be built with, for a base that has them."""
+        all_of_it = self.base.modes.count - int(np.sum(np.isinf(self.base.stiffnesses[list(indices)])))
+        return all_of_it if self.most_modes is None else min(self.most_modes, all_of_it)
+
     def _modes_of(self, full: Level) -> int:
-        """Number of modes of a level that has been built with all it can have."""
+        """Number of modes of a level that has been built with all it may have."""
         most = min(self.most_modes or full.modes, full.modes)
         if not isinstance(self.modes, UpTo):
             return most

@@ -1,0 +1,87 @@
+"""Many contacts: only the levels visited are built, each with the few modes asked for, and symmetry stays."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn.level import build_level
+
+FREQUENCIES = 1e-12  # relative, between two routes to the same modes
+SUBSPACES = 1e-9  # sine of the angle between them: what 1e-16 of the softest compliance is to the stiffest mode kept
+SYMMETRIC = 1e-12  # of the largest displacement
+
+
+def bed(stiffness, *, n=160, stops=40, modes=12, twins=False):
+    """A bending chain, pinned at its ends, over a bed of stops; ``twins``: two with nearly the same frequencies."""
+    second = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    bending = 1e8 * second @ second
+    if twins:
+        bending = np.kron(np.diag([1.0, 1 + 1e-10]), bending)
+    count = len(bending)
+    places = np.linspace(2, count - 3, stops).astype(int)
+    contacts = [UnilateralContact(f"c{i}", f"p{i}", 1e-3, stiffness) for i in range(stops)]
+    structure = LinearStructure(np.eye(count), bending, points={f"p{i}": int(k) for i, k in enumerate(places)})
+    return MultiPhiModel(structure, contacts, modes=modes)
+
+
+SETS = [(), (3,), (3, 4), (3, 4, 20, 33), tuple(range(10, 30))]
+
+
+class TestFewModesOfALevel:
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, 1e12, math.inf])
+    @pytest.mark.parametrize("twins", [False, True])
+    def test_equal_the_lowest_of_all_its_modes(self, stiffness, twins):
+        base = bed(stiffness, n=80 if twins else 160, twins=twins).base
+        for indices in SETS:
+            few, full = build_level(base, indices, 12), build_level(base, indices)
+            assert few.modes == 12
+            assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
+            wanted = full.vectors[:, :12]
+            assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < SUBSPACES
+            shown = few.force_rows @ few.vectors.T - full.force_rows[:, :12] @ wanted.T
+            assert np.abs(shown).max(initial=0) <= SUBSPACES * np.abs(full.force_rows).max(initial=0)
+
+    def test_rigid_contacts_do_not_move_in_them(self):
+        level = bed(math.inf).level(("c3", "c20"))
+        assert np.abs(level.base.directions[:, level.indices].T @ level.vectors).max() < 1e-14
+
+    def test_fewer_are_taken_from_them_and_more_are_built(self):
+        some = bed(math.inf)
+        held = some.level(("c3",))
+        fewer = dataclasses.replace(some, modes=3)
+        assert np.shares_memory(fewer.level(("c3",)).vectors, held.vectors)
+        more = dataclasses.replace(some, modes="all")
+        assert more.level(("c3",)).modes == some.base.modes.count - 1
+        assert_allclose(more.level(("c3",)).omega[:12], held.omega, rtol=FREQUENCIES)
+
+
+class TestStopsStruckAtOnce:
+    @pytest.mark.parametrize("stiffness", [1e4, math.inf])
+    @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (3, 0, 4, 2, 1)])
+    def test_in_a_mirror_symmetric_scene_close_together_and_keep_it_symmetric(self, stiffness, order):
+        n, places = 21, [2, 6, 10, 14, 18]
+        chain = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        chain[0, 0] = chain[-1, -1] = 1.0
+        structure = LinearStructure(np.eye(n), 1e3 * chain @ chain, points={f"p{k}": k for k in places})
+        stops = [UnilateralContact(f"c{places[i]}", f"p{places[i]}", 0.1, stiffness) for i in order]
+        run = simulate(MultiPhiModel(structure, stops, modes="all"), 0.13, velocity=-np.ones(n), compiled=False)
+        assert run.status == "ok", run.message
+        first = [event.time for event in run.events if event.kind == "close"][:5]
+        assert len(first) == 5
+        assert_allclose(first, 0.1, rtol=1e-12)
+        x = run.displacement(np.linspace(0, 0.13, 200))
+        assert np.abs(x - x[::-1]).max() < SYMMETRIC * np.abs(x).max()
+
+
+def test_forty_stops_build_the_levels_visited_only():
+    model = bed(1e7, stops=40)
+    mode = model.level(()).shapes[:, 0]
+    run = simulate(model, 0.02, velocity=-3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2]))
+    assert run.status == "ok", run.message
+    assert len(run.events) > 10
+    assert model.levels_possible == 2**40
+    assert model.levels_built <= 2 * len(run.events) + 1
