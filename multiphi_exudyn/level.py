@@ -629,7 +629,7 @@ def _reaction_rows(
     smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
     weights = 1 / np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
     residuals = (squared - squares) * vectors - spring_forces
-    grams = np.array([(pinned.T * weight) @ pinned for weight in weights.T])
+    grams = np.array([(pinned.T * weight) @ pinned for weight in weights.T]).reshape(-1, *2 * pinned.shape[1:])
     given = (pinned.T @ (weights * residuals)).T
     return np.asarray(np.linalg.solve(grams, given[:, :, None])[:, :, 0].T)
 
