@@ -26,6 +26,7 @@ __all__ = ["Modes", "complete_modes", "lowest_modes", "right_singular_vectors"]
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of |phi|^T |K| |phi|: strain energy below it is round-off, not stiffness
 FIRST_SHIFT = 1e-8  # of the largest K_ii / M_ii: regularises K until the first elastic mode is known
+DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it is round-off below
 
 
 @dataclass(frozen=True)
@@ -68,27 +69,34 @@ def complete_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
 def lowest_modes(mass: Any, stiffness: Any, count: int, rows: np.ndarray) -> Modes:
     """Basis of the ``count`` lowest modes and the static shapes of ``rows`` (k, n), for sparse matrices.
 
-    A Rayleigh-Ritz basis: the lowest modes by shift-invert Lanczos, completed by the static response to a
-    unit force on each row, so that a contact or a load there has its exact static flexibility.
+    A Rayleigh-Ritz basis: the lowest modes V by shift-invert Lanczos, completed by the static response to a
+    unit force on each row, so that a contact or a load there has its exact static flexibility. With
+    A = K + s M and S = A^-1 R^T, what V leaves of the static shapes, S - V (Lambda + s)^-1 V^T R^T, is
+    orthogonal to V in M and in K, so the frequencies of V stay as accurate as Lanczos gives them.
+
+    The stiffness is factorised once (s = 0); for a structure with rigid-body modes three times: it is singular,
+    then s is small, then the first elastic omega^2. A mass that is not diagonal is factorised for its definiteness.
+
+    Raises MultiPhiValueError for an indefinite mass or stiffness, NumericalFailure if Lanczos does not converge.
     """
     mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
-    shift = FIRST_SHIFT * _largest_ratio(mass, stiffness)
-    for _ in range(2):  # the second pass shifts by the first elastic omega^2, so that low modes stay accurate
-        shifted = scipy.sparse.csc_array(stiffness + shift * mass)
-        factor = scipy.sparse.linalg.splu(shifted)
-        operator = scipy.sparse.linalg.LinearOperator(shifted.shape, factor.solve)
-        values, vectors = scipy.sparse.linalg.eigsh(
-            stiffness, count, mass, sigma=-shift, OPinv=operator, v0=np.ones(shifted.shape[0])
-        )
+    _check_mass(mass)
+    rows = rows[np.any(rows, axis=1)]
+    shift = 0.0
+    factor = _definite_factor(stiffness)
+    if factor is not None:
+        values, vectors = _lanczos(mass, stiffness, count, shift, factor)
+    if factor is None or np.any(values <= _round_off_energy(stiffness, vectors)):
+        shift = FIRST_SHIFT * _largest_ratio(mass, stiffness)
+        factor = _shifted_factor(mass, stiffness, shift)
+        values, vectors = _lanczos(mass, stiffness, count, shift, factor)
         elastic = values > _round_off_energy(stiffness, vectors)
-        if np.all(elastic) or not np.any(elastic):
-            break
-        shift = float(np.min(values[elastic]))
-    statics = factor.solve(rows.T) if len(rows) else np.zeros((mass.shape[0], 0))
-    basis = _orthonormal(mass, np.column_stack([vectors, statics]))
-    reduced = basis.T @ (stiffness @ basis)
-    omega_squared, rotation = scipy.linalg.eigh((reduced + reduced.T) / 2)
-    return _classified(stiffness, omega_squared, basis @ rotation, 0.0)
+        if np.any(elastic):
+            shift = float(np.min(values[elastic]))
+            factor = _shifted_factor(mass, stiffness, shift)
+            values, vectors = _lanczos(mass, stiffness, count, shift, factor)
+    added, residual = _residual_shapes(mass, rows, values + shift, vectors, factor)
+    return _classified(stiffness, np.r_[values, added - shift], np.column_stack([vectors, residual]), shift)
 
 
 def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,11 +145,64 @@ def _largest_ratio(mass: Any, stiffness: Any) -> float:
     return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift serves where nothing is stiff
 
 
-def _orthonormal(mass: Any, basis: np.ndarray) -> np.ndarray:
-    """M-orthonormal basis of the same span, dependent directions left out."""
-    scaled = basis / np.sqrt(np.einsum("ij,ij->j", basis, mass @ basis))
-    values, vectors = scipy.linalg.eigh(scaled.T @ (mass @ scaled))
-    kept = values > 1e-12  # squared sine of the angle to the others: below it a direction is round-off
-    basis = scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
-    upper = scipy.linalg.cholesky(basis.T @ (mass @ basis))  # once more: orthonormal to round-off
-    return scipy.linalg.solve_triangular(upper, basis.T, trans="T").T
+def _definite_factor(matrix: Any) -> Any | None:
+    """Sparse triangular factors of a symmetric matrix; None where it is not positive definite to round-off.
+
+    Pivots are taken from the diagonal, so that their signs are those of the eigenvalues (Sylvester).
+    """
+    try:
+        factor = scipy.sparse.linalg.splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:  # "Factor is exactly singular"
+        return None
+    pivots = factor.U.diagonal()[factor.perm_c]
+    definite = np.array_equal(factor.perm_r, factor.perm_c) and np.all(pivots > ROUND_OFF * matrix.diagonal())
+    return factor if definite else None
+
+
+def _shifted_factor(mass: Any, stiffness: Any, shift: float) -> Any:
+    factor = _definite_factor(scipy.sparse.csc_array(stiffness + shift * mass))
+    if factor is None:
+        raise MultiPhiValueError(
+            f"stiffness: indefinite, lowest eigenvalue omega^2 below {-shift:g}; need a positive semidefinite matrix"
+        )
+    return factor
+
+
+def _check_mass(mass: Any) -> None:
+    diagonal = scipy.sparse.diags_array(mass.diagonal())
+    if (mass != diagonal).nnz and _definite_factor(mass) is None:
+        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix")
+
+
+def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, factor: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The ``count`` lowest omega^2, ascending, and their shapes; factor: of K + shift M."""
+    n = stiffness.shape[0]
+    start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
+    operator = scipy.sparse.linalg.LinearOperator((n, n), factor.solve)
+    try:
+        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=-shift, OPinv=operator, v0=start)
+    except scipy.sparse.linalg.ArpackError as error:
+        raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
+    order = np.argsort(values)
+    return values[order], vectors[:, order]
+
+
+def _residual_shapes(
+    mass: Any, rows: np.ndarray, values: np.ndarray, modes: np.ndarray, factor: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (m,) of A and shapes (n, m) of what ``modes``, eigenvalues ``values`` of A, leave of A^-1 rows^T."""
+    if not len(rows):
+        return np.zeros(0), np.zeros((mass.shape[0], 0))
+    statics = factor.solve(np.ascontiguousarray(rows.T))
+    size = np.sqrt(np.einsum("ij,ji->i", rows, statics))  # each row's own flexibility becomes 1
+    residual = (statics - modes @ ((rows @ modes).T / values[:, None])) / size
+    residual -= modes @ (modes.T @ (mass @ residual))
+    flexibility = (rows / size[:, None]) @ residual
+    kept, turn = scipy.linalg.eigh((flexibility + flexibility.T) / 2)
+    residual = residual @ (turn / np.sqrt(np.abs(kept)))[:, kept > DEPENDENT]  # A-orthonormal
+    inverse, rotation = scipy.linalg.eigh(residual.T @ (mass @ residual))
+    residual = residual @ (rotation / np.sqrt(inverse))
+    upper = scipy.linalg.cholesky(residual.T @ (mass @ residual))  # once more: orthonormal to round-off
+    return 1 / inverse, scipy.linalg.solve_triangular(upper, residual.T, trans="T").T

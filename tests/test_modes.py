@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, Section, planar_beam
+from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, planar_beam
 from multiphi_exudyn.modes import complete_modes, lowest_modes, right_singular_vectors
 
 
@@ -137,6 +137,58 @@ class TestLowestModes:
         found = lowest_modes(mass, stiffness, 8, rows)
         flexibility = (found.shapes / found.omega**2) @ found.shapes.T
         assert_allclose(rows @ flexibility @ rows.T, [[101, 101], [101, 451]], rtol=1e-6)
+
+    @pytest.mark.parametrize("rows", [0, 2, 60])
+    @pytest.mark.parametrize("held", [1e6, 0.0], ids=["clamped", "free"])
+    def test_of_a_fine_beam_are_the_complete_ones_and_its_static_shapes_exact(self, held, rows):
+        structure = planar_beam(
+            Beam(
+                [Section.rectangle(0.0, 1.0, width=0.02, height=0.005, youngs_modulus=2.1e11, density=7800)],
+                {"tip": 1.0},
+                clamp=Clamp(held, held),
+            ),
+            elements=80,
+        )
+        exact = complete_modes(structure.mass, structure.stiffness)
+        at = np.eye(structure.n)[np.linspace(20, structure.n - 1, rows).astype(int)]
+        found = lowest_modes(scipy.sparse.csr_array(structure.mass), structure.stiffness, 20, at)
+        assert found.rigid == exact.rigid
+        assert_allclose(found.omega[:20], exact.omega[:20], rtol=1e-8, atol=0)
+        assert_allclose(found.shapes.T @ (structure.mass @ found.shapes), np.eye(found.count), atol=1e-9)
+        if not exact.rigid:
+            expected, flexibility = (at @ (m.shapes / m.omega**2) @ m.shapes.T @ at.T for m in (exact, found))
+            assert_allclose(flexibility, expected, rtol=0, atol=1e-8 * np.max(np.abs(expected), initial=0))
+
+    def test_repeated_and_antisymmetric_modes_are_all_there(self):
+        """Three equal chains side by side: every frequency three times."""
+        mass, stiffness = (scipy.sparse.block_diag([m] * 3, format="csr") for m in chain(250, ends=2))
+        found = lowest_modes(mass, stiffness, 9, np.zeros((0, 750)))
+        assert_allclose(found.omega, np.repeat(chain_frequencies(250, ends=2)[:3], 3), rtol=1e-11)
+
+    def test_without_rigid_body_modes_cost_one_factorisation(self, monkeypatch):
+        calls, splu = [], scipy.sparse.linalg.splu
+        monkeypatch.setattr(scipy.sparse.linalg, "splu", lambda *a, **k: calls.append(1) or splu(*a, **k))
+        mass, stiffness = (scipy.sparse.csr_array(matrix) for matrix in chain(100))
+        lowest_modes(mass, stiffness, 5, np.zeros((0, 100)))
+        assert len(calls) == 1
+
+    @pytest.mark.parametrize("lowest", [-3.0, -1e-3])
+    def test_an_indefinite_stiffness_is_refused(self, lowest):
+        stiffness = scipy.sparse.diags_array(np.r_[np.arange(1.0, 90), lowest])
+        with pytest.raises(MultiPhiValueError, match="stiffness: indefinite"):
+            lowest_modes(scipy.sparse.eye_array(90), stiffness, 4, np.zeros((0, 90)))
+
+    def test_an_indefinite_mass_is_refused(self):
+        mass = scipy.sparse.block_diag([np.eye(60), [[1.0, 2.0], [2.0, 1.0]]])
+        with pytest.raises(MultiPhiValueError, match="mass: indefinite"):
+            lowest_modes(mass, scipy.sparse.eye_array(62), 4, np.zeros((0, 62)))
+
+    def test_that_do_not_converge_are_a_failure_with_its_cause(self, monkeypatch):
+        eigsh = scipy.sparse.linalg.eigsh
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lambda *a, **k: eigsh(*a, **k, maxiter=1, ncv=5))
+        mass, stiffness = (scipy.sparse.csr_array(matrix) for matrix in chain(400))
+        with pytest.raises(NumericalFailure, match="Lanczos iteration for 4 of 400 modes failed"):
+            lowest_modes(mass, stiffness, 4, np.zeros((0, 400)))
 
 
 class TestRightSingularVectors:
