@@ -201,7 +201,8 @@ def _residual_shapes(
     residual -= modes @ (modes.T @ (mass @ residual))
     flexibility = (rows / size[:, None]) @ residual
     kept, turn = scipy.linalg.eigh((flexibility + flexibility.T) / 2)
-    residual = residual @ (turn / np.sqrt(np.abs(kept)))[:, kept > DEPENDENT]  # A-orthonormal
+    turn, kept = turn[:, kept > DEPENDENT], kept[kept > DEPENDENT]
+    residual = residual @ (turn / np.sqrt(kept))  # A-orthonormal
     inverse, rotation = scipy.linalg.eigh(residual.T @ (mass @ residual))
     residual = residual @ (rotation / np.sqrt(inverse))
     upper = scipy.linalg.cholesky(residual.T @ (mass @ residual))  # once more: orthonormal to round-off

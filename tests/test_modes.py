@@ -159,6 +159,10 @@ class TestLowestModes:
             expected, flexibility = (at @ (m.shapes / m.omega**2) @ m.shapes.T @ at.T for m in (exact, found))
             assert_allclose(flexibility, expected, rtol=0, atol=1e-8 * np.max(np.abs(expected), initial=0))
 
+    def test_the_same_row_twice_adds_one_shape(self):
+        mass, stiffness = (scipy.sparse.csr_array(matrix) for matrix in chain(300))
+        assert lowest_modes(mass, stiffness, 8, np.eye(300)[[100, 100, 200]]).count == 8 + 2
+
     def test_repeated_and_antisymmetric_modes_are_all_there(self):
         """Three equal chains side by side: every frequency three times."""
         mass, stiffness = (scipy.sparse.block_diag([m] * 3, format="csr") for m in chain(250, ends=2))
