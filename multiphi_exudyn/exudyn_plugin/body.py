@@ -25,6 +25,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.exudyn_plugin.interface import Interface
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
@@ -53,6 +54,7 @@ class MultiPhiBody:
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
         self.time = math.nan
+        self.interface: Interface | None = None
         self._motion = motion
         self._rule = self._plain_rule()
         self._size = self._rule.level(()).level.modes
@@ -191,7 +193,7 @@ class MultiPhiBody:
         own, start, known = self._in_solver, self._state, len(self.events)
         given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
         force = self._significant((own.force(before) + own.force(after) - given) / 2, after)
-        state = self._travel(before, begun, force, force)
+        state = self._travel(before, begun, force, force, own)
         if len(self.events) == known and state.closed == start.closed:
             self._keep(replace(start, phases=state.phases))
             return
@@ -199,24 +201,34 @@ class MultiPhiBody:
             self._write(mbs, state, force)
             return
         reaction = own.force(after) - self._applied(mbs)  # of constraints: known from the level before
-        self._write(mbs, state, force)
-        outside = self._applied(mbs) + reaction - self._own_force(state.closed, self.time)
+        entered = self._stepped(state.closed)
+        self._write(mbs, state, self._carried(force, own, entered))
+        outside = self._applied(mbs) + self._carried(reaction, own, entered) - self._own_force(state.closed, self.time)
         present = self._significant(outside, after)
         if np.any(present != force):
             del self.events[known:]
             self._state = start
-            self._write(mbs, self._travel(before, begun, force, present), present)
+            self._write(mbs, self._travel(before, begun, force, present, entered), present)
 
     def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q', q'' of x = (q, q', q'', 1)."""
         s = self._size
         return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
-    def _travel(self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray) -> State:
-        """State now, of the exact motion from ``before`` under ``force`` in its level and ``entered`` in others."""
+    def _travel(
+        self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray, given: SteppedLevel
+    ) -> State:
+        """State now, of the exact motion from ``before`` under ``force`` in its level and ``entered`` in others.
+
+        given: the level in whose modes ``entered`` is told.
+        """
         closed, motion, rule = self._state.closed, self._motion, self._rule
+
+        def force_in(level: tuple[int, ...]) -> np.ndarray:
+            return force if level == closed else self._carried(entered, given, self._stepped(level))
+
         if np.any(force) or np.any(entered):
-            rule = ForcedRule(rule, lambda level: force if level == closed else entered)
+            rule = ForcedRule(rule, force_in)
         q, q_t, _ = self._split(before)
         loaded = rule.level(closed)
         total = force + self._own_force(closed, begun)
@@ -229,7 +241,7 @@ class MultiPhiBody:
         motion.segments.pop()  # those that remain end with events: the chatter check counts them
         del motion.segments[: -CHATTER_WINDOW - 1]
         end = self._plain(motion.state)
-        centre = shift(end.level.level, force if end.closed == closed else entered)
+        centre = shift(end.level.level, force_in(end.closed))
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
 
     def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
@@ -243,11 +255,16 @@ class MultiPhiBody:
         return force if acts else np.zeros(self._size)
 
     def _applied(self, mbs: Any) -> np.ndarray:
-        """Modal force (s,) of loads and connectors in the present state of the system."""
+        """Modal force (s,) of loads and connectors in the present state of the system, those on the interface too."""
         solver = mbs.sys["dynamicSolver"]
         solver.ComputeODE2RHS(mbs)
-        unbalanced = np.array(solver.GetSystemResidual())[self._first : self._first + self._size]
-        return unbalanced + self._in_solver.resisting(*self._views[:2])
+        unbalanced = np.array(solver.GetSystemResidual())
+        force = unbalanced[self._first : self._first + self._size] + self._in_solver.resisting(*self._views[:2])
+        return force if self.interface is None else force + self.interface.modal(self._in_solver, unbalanced)
+
+    def _carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
+        """A modal force (s,) of one level in another."""
+        return force if self.interface is None else self.interface.carried(force, given, wanted)
 
     # ------------------------------------------------------------------ start of a run
 
@@ -261,8 +278,8 @@ class MultiPhiBody:
         own, (q, q_t, q_tt) = self._in_solver, self._views
         closed, phases = self._stored_level()
         if closed != own.closed:  # the accelerations have been computed with stale matrices
-            force = self._applied(mbs)
             own = self._load_matrices(mbs, closed)
+            force = self._applied(mbs)
             q_tt[:] = own.acceleration(q, q_t, force)
         force = own.force(self._read())
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
@@ -270,6 +287,8 @@ class MultiPhiBody:
         if fresh:  # only now the force is known, which the velocity of matched modes contains
             q_t += own.from_force @ force
             q_tt[:] = own.acceleration(q, q_t, force)
+        if self.interface is not None:
+            self.interface.write(own, self._views)
         r, eta_t = own.loaded.level.modes, own.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
         self._x = self._read()
@@ -284,6 +303,8 @@ class MultiPhiBody:
         own = slice(self._first, self._first + self._size)
         self._views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
         self._copies = tuple((x, *self._split(x)) for x in np.ones((2, 3 * self._size + 1)))
+        if self.interface is not None:
+            self.interface.attach(state)
         if "nGenericData" in self.items:
             places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][places[0] : places[0] + len(places)]
@@ -294,6 +315,10 @@ class MultiPhiBody:
             raise MultiPhiValueError(
                 f"spectralRadius: got {integration.spectralRadius:g}, need 1 (or TrapezoidalIndex2) "
                 f"with the Multi-Phi body {self.name!r}"
+            )
+        if self.interface is not None and not integration.useIndex2Constraints:
+            raise MultiPhiValueError(
+                f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )
 
     def check_called(self, mbs: Any, t: float) -> None:
@@ -316,6 +341,8 @@ class MultiPhiBody:
         force = force + self._own_force(state.closed, self.time)
         for view, values in zip(self._views, stepped.state(state.displacement, state.velocity, force), strict=True):
             view[:] = values
+        if self.interface is not None:
+            self.interface.write(stepped, self._views)
         self._keep(state)
 
     def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
@@ -323,6 +350,8 @@ class MultiPhiBody:
         stepped = self._in_solver = self._stepped(closed)
         for parameter, value in matrices(stepped, self.force_vector(stepped)).items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
+        if self.interface is not None:
+            self.interface.load(stepped)
         if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
         mbs.solverSignalJacobianUpdate = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import exudyn as exu
@@ -15,13 +15,14 @@ from multiphi_exudyn.driven import DrivenMotion
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
 from multiphi_exudyn.exudyn_plugin.driven_body import DrivenBody
+from multiphi_exudyn.exudyn_plugin.interface import Interface, interface_rows
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.simulate import started
-from multiphi_exudyn.structure import is_real
+from multiphi_exudyn.structure import At, is_real
 
 __all__ = ["CreateMultiPhiBody"]
 
@@ -36,6 +37,7 @@ def CreateMultiPhiBody(
     velocity: np.ndarray | None = None,
     loads: Sequence[Load] = (),
     matchedStepSize: float | None = None,
+    interface: Iterable[str] | Mapping[str, At] = (),
     show: bool = True,
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
@@ -44,9 +46,10 @@ def CreateMultiPhiBody(
     displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``.
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
-    stepped_level.py. show: as in other Create functions.
+    stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
+    (interface.py); needs TrapezoidalIndex2 and constant loads. show: as in other Create functions.
 
-    Returns typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
+    Returns typed indices: nInterface, {name: NodeIndex} of nodes with one coordinate (only if asked for), nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
     sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
     and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
     """
@@ -63,11 +66,16 @@ def CreateMultiPhiBody(
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
+    rows = interface_rows(model.structure, interface)
     body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
+    if rows and isinstance(body, DrivenBody):
+        raise MultiPhiValueError("loads: got some that vary in time, need constant ones with interface coordinates")
     body.items.update(_add_items(mbs, body, show))
+    if rows:
+        _add_interface(mbs, body, rows)
     body.items.update(add_sensors(mbs, body))
     bodies[name] = body
-    if model.contacts or matchedStepSize is not None or isinstance(body, DrivenBody):
+    if model.contacts or rows or matchedStepSize is not None or isinstance(body, DrivenBody):
         bodies.install(mbs)
     if isinstance(body, DrivenBody):
         bodies.install_before(mbs)
@@ -130,3 +138,9 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
             )
         )
     return items
+
+
+def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
+    body.interface = Interface(mbs, body.name, rows)
+    body.interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
+    body.items["nInterface"] = body.interface.nodes

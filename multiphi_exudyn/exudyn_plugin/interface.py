@@ -1,0 +1,115 @@
+"""Interface coordinates: points of a body that connectors, loads and sensors of an Exudyn system can act on.
+
+    y = R q + c,   0 = f + reaction of the tie,   p = R^T f
+
+y displacements (or rotations) of the points, each the coordinate of a massless NodeGenericODE2, so that
+MarkerNodeCoordinate(node, 0) works as for any other item. R (m, s) rows of the points in the modes of the present
+level, c (m,) its asymptotic configuration there [m]; f (m,) what acts on y [N], p its modal force. One
+ObjectConnectorCoordinateVector per point holds the equation. At a transition R and c are exchanged and y, y', y'' are
+written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
+velocity (stepped_level.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.structure import At, LinearStructure
+
+__all__ = ["Interface", "interface_rows"]
+
+
+def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[str, At]) -> dict[str, np.ndarray]:
+    """Rows (n,) by the names of interface coordinates, from names of points or {name: point or row}."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
+    points = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
+    for name in points:
+        if not isinstance(name, str):
+            raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
+    rows = {name: structure.row(at) for name, at in points.items()}
+    for name, row in rows.items():
+        if not np.any(row):
+            raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
+    return rows
+
+
+class Interface:
+    """The interface coordinates of one body in one system. nodes: NodeIndex by name."""
+
+    def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray]) -> None:
+        self.nodes: dict[str, Any] = {}
+        self._name = name
+        self._rows = np.array(list(rows.values()))
+        self._names = tuple(rows)
+        self._ties: list[Any] = []
+        self._known: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
+        self._mbs = mbs
+
+    def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
+        """Add nodes and ties for a body whose node holds q, q' (s,) in a level."""
+        (rows, offset), mbs = self.of(stepped), self._mbs
+        own = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node))
+        for name, row, constant in zip(self._names, rows, offset, strict=True):
+            point = mbs.AddNode(
+                NodeGenericODE2(
+                    name=f"Node:{self._name}.{name}",
+                    referenceCoordinates=[0.0],
+                    initialCoordinates=[row @ q + constant],
+                    initialCoordinates_t=[row @ q_t],
+                    numberOfODE2Coordinates=1,
+                )
+            )
+            marker = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=point))
+            tie = ObjectConnectorCoordinateVector(
+                name=f"{self._name}.{name}",
+                markerNumbers=[own, marker],
+                scalingMarker0=row[None, :],
+                scalingMarker1=np.eye(1),
+                offset=[constant],
+            )
+            self.nodes[name] = point
+            self._ties.append(mbs.AddObject(tie))
+
+    def of(self, stepped: SteppedLevel) -> tuple[np.ndarray, np.ndarray]:
+        """R (m, s) and c (m,) of a level."""
+        if stepped.closed not in self._known:
+            level = stepped.loaded.level
+            rows = np.zeros((len(self._rows), stepped.size))
+            rows[:, : level.modes] = self._rows @ level.shapes
+            offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
+            self._known[stepped.closed] = rows, offset
+        return self._known[stepped.closed]
+
+    def attach(self, state: Mapping[str, np.ndarray]) -> None:
+        """Views of the interface coordinates in the system's current state; they hold for one run."""
+        self.places = np.array([self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()])
+        self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+
+    def load(self, stepped: SteppedLevel) -> None:
+        """Give the ties R and c of a level."""
+        for tie, row, constant in zip(self._ties, *self.of(stepped), strict=True):
+            self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
+            self._mbs.SetObjectParameter(tie, "offset", [constant])
+
+    def write(self, stepped: SteppedLevel, coordinates: Iterable[np.ndarray]) -> None:
+        """Write y, y', y'' of q, q', q'' (s,)."""
+        rows, offset = self.of(stepped)
+        for view, values, constant in zip(self._views, coordinates, (offset, 0.0, 0.0), strict=True):
+            view[self.places] = rows @ values + constant
+
+    def modal(self, stepped: SteppedLevel, residual: np.ndarray) -> np.ndarray:
+        """Modal force (s,) of what acts on y, from the forces on all coordinates of the system."""
+        return np.asarray(residual[self.places] @ self.of(stepped)[0])
+
+    def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
+        """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
+        (old, _), (new, _) = self.of(given), self.of(wanted)
+        acting = np.linalg.lstsq(old.T, force, rcond=None)[0]
+        return np.asarray(force + acting @ (new - old))

@@ -1,0 +1,122 @@
+"""Interface coordinates: what acts on points of a body acts as on the structure itself, across level changes."""
+
+import math
+
+import exudyn as exu
+import numpy as np
+import pytest
+from exudyn.itemInterface import (
+    CoordinateSpringDamper,
+    LoadCoordinate,
+    MarkerNodeCoordinate,
+    Mass1D,
+    Node1D,
+    NodePointGround,
+    SensorNode,
+)
+from scipy.integrate import solve_ivp
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
+
+TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
+STEP, END = 1e-3, 0.25  # s
+SPRING, DAMPER, MASS = 800.0, 2.0, 0.4  # N/m, N s/m, kg
+GAP, STIFFNESS = 1e-3, 3e4  # m, N/m
+START = np.array([0.0, 0.0, 0.01])  # m
+
+
+@pytest.fixture(autouse=True)
+def _quiet():
+    printed, exu.config.printToConsole = exu.config.printToConsole, False
+    yield
+    exu.config.printToConsole = printed
+
+
+def chain(stiffness):
+    """Three masses of 1 kg in a row with a stop at the second, all modes."""
+    matrix = 1e4 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+    structure = mp.LinearStructure(np.eye(3), matrix, mp.RayleighDamping(0.5, 1e-5), {f"m{i}": i for i in range(3)})
+    return mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m1", GAP, stiffness)], modes="all")
+
+
+def settings(step):
+    chosen = exu.SimulationSettings()
+    chosen.timeIntegration.numberOfSteps = round(END / step)
+    chosen.timeIntegration.endTime = END
+    chosen.timeIntegration.verboseMode = 0
+    chosen.timeIntegration.newton.relativeTolerance = 1e-12
+    chosen.solution.file.write = False
+    chosen.solution.sensors.writePeriod = step
+    return chosen
+
+
+def coordinate(mbs, node):
+    return mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+
+
+def watch(mbs, node):
+    kind = exu.OutputVariableType.Coordinates
+    return mbs.AddSensor(SensorNode(nodeNumber=node, outputVariableType=kind, storeInternal=True))
+
+
+def spring(mbs, items):
+    ground = coordinate(mbs, mbs.AddNode(NodePointGround()))
+    ends = [ground, coordinate(mbs, items["nInterface"]["m2"])]
+    mbs.AddObject(CoordinateSpringDamper(markerNumbers=ends, stiffness=SPRING, damping=DAMPER))
+
+
+def spring_and_mass(mbs, items):
+    node = mbs.AddNode(Node1D(referenceCoordinates=[0.0]))
+    mbs.AddObject(Mass1D(nodeNumber=node, mass=MASS))
+    ends = [coordinate(mbs, node), coordinate(mbs, items["nInterface"]["m2"])]
+    mbs.AddObject(CoordinateSpringDamper(markerNumbers=ends, stiffness=SPRING, damping=DAMPER))
+
+
+def run(model, step, add, interface=("m2",), solver=TRAPEZOIDAL, **given):
+    """Interface coordinates (steps, m) by sensors, those of the body itself, and the body's events."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, name="b", displacement=START, interface=interface, **given)
+    sensors = [watch(mbs, node) for node in items["nInterface"].values()]
+    add(mbs, items)
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(step), solverType=solver)
+    body = mbs.variables["multiPhi"]["b"]
+    eta = mbs.GetSensorStoredData(items["sCoordinates"])[:, 1:]
+    level = mbs.GetSensorStoredData(items["sLevel"])[:, 1] > 0.5
+    shown = np.empty((len(eta), len(sensors)))
+    for k, (values, closed) in enumerate(zip(eta, level, strict=True)):
+        loaded = body.stepped_level((0,) if closed else ()).loaded
+        x = model.base.modes.shapes @ loaded.configuration(values[: loaded.level.modes])
+        shown[k] = [model.structure.row(name) @ x for name in items["nInterface"]]
+    return np.column_stack([mbs.GetSensorStoredData(s)[:, 1] for s in sensors]), shown, body.events
+
+
+def integrated(model, step):
+    """m2 of the chain with the penalty stop, and a mass on a spring-damper, by DOP853."""
+    s = model.structure
+
+    def rate(t, z):
+        x, v, u, w = z[:3], z[3:6], z[6], z[7]
+        pull = SPRING * (x[2] - u) + DAMPER * (v[2] - w)
+        stop = STIFFNESS * max(0.0, -(x[1] + GAP))
+        damping = 0.5 * v + 1e-5 * s.stiffness @ v
+        return np.concatenate([v, np.array([0, stop, -pull]) - s.stiffness @ x - damping, [w, pull / MASS]])
+
+    times = np.arange(round(END / step) + 1) * step
+    start = np.concatenate([START, np.zeros(5)])
+    found = solve_ivp(rate, (0, times[-1]), start, "DOP853", times, rtol=1e-10, atol=1e-13, max_step=5e-4)
+    return found.y[2]
+
+
+@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
+def test_spring_and_mass_on_a_point_converge_with_order_two_to_an_integrator(matched):
+    model, errors = chain(STIFFNESS), []
+    for step in (STEP, STEP / 2, STEP / 4):
+        y, _, events = run(model, step, spring_and_mass, matchedStepSize=step if matched else None)
+        expected = integrated(model, step)
+        errors.append(np.linalg.norm(y[:, 0] - expected) / np.linalg.norm(expected))
+    assert len(events) >= 4
+    assert math.log2(errors[0] / errors[2]) / 2 > 1.8
+    assert errors[2] < (1e-4 if matched else 2e-2)
