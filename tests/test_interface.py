@@ -46,6 +46,7 @@ def settings(step):
     chosen.timeIntegration.endTime = END
     chosen.timeIntegration.verboseMode = 0
     chosen.timeIntegration.newton.relativeTolerance = 1e-12
+    chosen.timeIntegration.generalizedAlpha.spectralRadius = 1.0
     chosen.solution.file.write = False
     chosen.solution.sensors.writePeriod = step
     return chosen
@@ -120,3 +121,56 @@ def test_spring_and_mass_on_a_point_converge_with_order_two_to_an_integrator(mat
     assert len(events) >= 4
     assert math.log2(errors[0] / errors[2]) / 2 > 1.8
     assert errors[2] < (1e-4 if matched else 2e-2)
+
+
+@pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf], ids=["compliant", "rigid"])
+def test_interface_coordinates_are_the_displacements_of_the_body_at_every_step(stiffness):
+    y, shown, events = run(chain(stiffness), STEP, spring_and_mass, interface={"m2": "m2", "m1": "m1", "m0": "m0"})
+    assert len(events) >= 4
+    assert np.max(np.abs(y - shown)) < 1e-12
+
+
+def test_a_user_load_on_an_interface_coordinate_agrees_with_the_harmonic_load_to_1e_5():
+    def push(mbs, items):
+        def load(mbs, t, amplitude):
+            return amplitude * math.cos(2 * math.pi * 7.0 * t)
+
+        marker = coordinate(mbs, items["nInterface"]["m2"])
+        mbs.AddLoad(LoadCoordinate(markerNumber=marker, load=8.0, loadUserFunction=load))
+
+    model, step = chain(STIFFNESS), STEP / 4
+    native = mp.simulate(model, END, displacement=START, loads=[mp.HarmonicLoad("m2", 8.0, 7.0)])
+    y, _, _ = run(model, step, push, matchedStepSize=step)
+    expected = native.at("m2", np.minimum(np.arange(len(y)) * step, END))
+    assert np.linalg.norm(y[:, 0] - expected) < 1e-5 * np.linalg.norm(expected)
+
+
+def test_a_second_run_of_one_system_begins_in_the_level_of_its_start():
+    model = chain(STIFFNESS)
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, displacement=-START, interface=("m2",))
+    sensor = watch(mbs, items["nInterface"]["m2"])
+    spring(mbs, items)
+    mbs.Assemble()
+    stored = []
+    for _ in range(2):
+        mbs.SolveDynamic(settings(STEP), solverType=TRAPEZOIDAL)
+        stored.append(mbs.GetSensorStoredData(sensor))
+    assert np.max(np.abs(stored[0] - stored[1])) < 1e-12
+
+
+def test_what_an_interface_cannot_hold_is_refused():
+    model, mbs = chain(STIFFNESS), exu.SystemContainer().AddSystem()
+    for interface, error, told in [
+        ("m2", mp.errors.MultiPhiTypeError, "interface: got 'm2', need names"),
+        (("m7",), mp.errors.MultiPhiValueError, "point: got 'm7'"),
+        ({"none": np.zeros(3)}, mp.errors.MultiPhiValueError, "a row of zeros"),
+        ({3: "m2"}, mp.errors.MultiPhiTypeError, "interface: got 3"),
+    ]:
+        with pytest.raises(error, match=told):
+            CreateMultiPhiBody(mbs, model, interface=interface)
+    with pytest.raises(mp.errors.MultiPhiValueError, match="need constant ones"):
+        CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
+    with pytest.raises(ValueError, match="need TrapezoidalIndex2"):
+        run(model, STEP, spring, solver=exu.DynamicSolverType.GeneralizedAlpha)

@@ -49,7 +49,8 @@ def CreateMultiPhiBody(
     stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
     (interface.py); needs TrapezoidalIndex2 and constant loads. show: as in other Create functions.
 
-    Returns typed indices: nInterface, {name: NodeIndex} of nodes with one coordinate (only if asked for), nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
+    Returns typed indices: nInterface ({name: NodeIndex}, one coordinate each, only if asked for), nGenericODE2,
+    oGenericODE2, nGenericData (not without contacts), sCoordinates,
     sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
     and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
     """
