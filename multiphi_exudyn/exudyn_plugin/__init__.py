@@ -9,15 +9,19 @@ from multiphi_exudyn.exudyn_plugin.binding import bind
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
+from multiphi_exudyn.exudyn_plugin.reduce import Item, Reduction, reduce
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
 
 __all__ = [
     "BodyHistories",
     "CreateMultiPhiBody",
+    "Item",
     "LinearizedStructure",
     "MultiPhiBody",
+    "Reduction",
     "body_histories",
     "linear_structure_from",
+    "reduce",
 ]
 
 bind(CreateMultiPhiBody)

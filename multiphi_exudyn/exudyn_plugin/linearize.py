@@ -73,14 +73,14 @@ def linear_structure_from(
 
     Raises MultiPhiValueError for a contact, a state or a matrix that a linear structure cannot hold.
     """
-    _check_system(mbs)
+    check_system(mbs)
     objects = _contact_objects(mbs)
-    with _initial_is_current(mbs):
+    with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
         with _inactive(mbs, objects):
-            mass, stiffness, dampers, basis = _projected_matrices(mbs)
+            mass, stiffness, dampers, basis = projected_matrices(mbs)
             _check_equilibrium(mbs, stiffness, basis)
-        rows = _default_points(mbs, basis) if points is None else _given_points(mbs, points, basis)
+        rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
     if damping is None and np.any(dampers):
         damping = dampers
@@ -88,7 +88,7 @@ def linear_structure_from(
     return structure, contacts
 
 
-def _check_system(mbs: Any) -> None:
+def check_system(mbs: Any) -> None:
     if not mbs.systemIsConsistent:
         raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
     if len(mbs.systemData.GetODE2Coordinates()) == 0:
@@ -126,7 +126,7 @@ def _check_law(item: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def _initial_is_current(mbs: Any) -> Iterator[None]:
+def initial_is_current(mbs: Any) -> Iterator[None]:
     """Make the current state the initial one, about which Exudyn linearises; restore both afterwards."""
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     stored, current = data.GetSystemState(initial), data.GetSystemState()
@@ -153,16 +153,50 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
             mbs.SetObjectParameter(index, "activeConnector", True)
 
 
-def _projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """M, K, C in z, (n, n), and the basis S, (n_full, n)."""
-    result = mbs.ComputeLinearizedSystem(
-        projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
-    )
-    mass, stiffness, damping = result[:3]
+    geared = _geared_springs(mbs)
+    with _slack(mbs, geared):
+        result = mbs.ComputeLinearizedSystem(
+            projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
+        )
+    mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
     basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
+    for item in geared.values():
+        first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
+        row = (item["factor1"] * second - item["factor0"] * first) @ basis
+        stiffness += item["stiffness"] * np.outer(row, row)
+        damping += item["damping"] * np.outer(row, row)
     if basis.shape[1] == 0:
         raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
     return _symmetric("mass", mass), _symmetric("stiffness", stiffness), _symmetric("damping", damping), basis
+
+
+def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
+    """Springs of coordinates with factors, of which Exudyn's tangent does not hold the factors."""
+    items = {i: mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())}
+    geared = {i: item for i, item in items.items() if (item.get("factor0", 1.0), item.get("factor1", 1.0)) != (1, 1)}
+    geared = {
+        i: item for i, item in geared.items() if item.get("activeConnector") and "springForceUserFunction" in item
+    }
+    for item in geared.values():
+        if item["springForceUserFunction"]:
+            raise MultiPhiValueError(f"spring {item['name']!r}: got a user function and factors, need one of both")
+    return geared
+
+
+@contextmanager
+def _slack(mbs: Any, springs: Mapping[int, Mapping[str, Any]]) -> Iterator[None]:
+    """Take stiffness and damping from springs and, whatever happens, give them back."""
+    try:
+        for i in springs:
+            for name in ("stiffness", "damping"):
+                mbs.SetObjectParameter(exu.ObjectIndex(i), name, 0.0)
+        yield
+    finally:
+        for i, item in springs.items():
+            for name in ("stiffness", "damping"):
+                mbs.SetObjectParameter(exu.ObjectIndex(i), name, item[name])
 
 
 def _symmetric(name: str, matrix: np.ndarray) -> np.ndarray:
@@ -175,7 +209,7 @@ def _symmetric(name: str, matrix: np.ndarray) -> np.ndarray:
 
 
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
-    unbalanced = np.abs(basis @ (basis.T @ _forces(mbs)))  # what constraint forces cannot balance
+    unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # what constraint forces cannot balance
     elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
     if np.max(unbalanced) > EQUILIBRIUM * elastic + PICOMETRE * np.max(np.abs(stiffness)):
         raise MultiPhiValueError(
@@ -184,7 +218,7 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
         )
 
 
-def _forces(mbs: Any) -> np.ndarray:
+def forces(mbs: Any) -> np.ndarray:
     """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
@@ -200,7 +234,7 @@ def _forces(mbs: Any) -> np.ndarray:
 
 def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:
     item = mbs.GetObject(index)
-    first, second = (_coordinate_row(mbs, exu.MarkerIndex(m)) @ basis for m in item["markerNumbers"])
+    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) @ basis for m in item["markerNumbers"])
     return UnilateralContact(item["name"], second - first, gap, float(item["contactStiffness"]))
 
 
@@ -208,11 +242,11 @@ def _gap(mbs: Any, index: Any) -> float:
     return float(mbs.GetObjectOutput(index, exu.OutputVariableType.Distance))
 
 
-def _coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
+def coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
     return next(iter(_marker_rows(mbs, "marker", marker).values()))
 
 
-def _default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
+def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
     rows: dict[str, np.ndarray] = {}
     for i in range(mbs.systemData.NumberOfMarkers()):
         marker = exu.MarkerIndex(i)
@@ -233,7 +267,7 @@ def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
         rows[name] = row
 
 
-def _given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
+def given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
     rows: dict[str, np.ndarray] = {}
     for name, given in points.items():
         _add(rows, _given_rows(mbs, name, given))
