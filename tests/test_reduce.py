@@ -161,3 +161,26 @@ def test_a_contact_that_is_no_linear_spring_is_left_out_with_its_reason():
     ((item, reason),) = reduction.left_out
     assert (item.name, item.type, reason) == ("hertz", "ObjectContactCoordinate", "stiffness exponent 1.5, need 1")
     assert reduction.model.contacts == ()
+
+
+def test_a_contact_of_spheres_is_left_out_and_stays_active():
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    nodes = [mbs.AddNode(eii.NodePoint(referenceCoordinates=[x, 0.0, 0.0])) for x in (0.0, 1.0)]
+    for node in nodes:
+        mbs.AddObject(eii.ObjectMassPoint(mass=1.0, nodeNumber=node))
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=4 * [0.0], numberOfDataCoordinates=4))
+    balls = mbs.AddObject(
+        eii.ObjectContactSphereSphere(
+            name="balls",
+            markerNumbers=[mbs.AddMarker(eii.MarkerNodePosition(nodeNumber=node)) for node in nodes],
+            nodeNumber=data,
+            spheresRadii=[0.1, 0.1],
+            contactStiffness=1e3,
+        )
+    )
+    mbs.Assemble()
+    ((item, reason),) = reduce(mbs).left_out
+    assert (item.name, item.type) == ("balls", "ObjectContactSphereSphere")
+    assert reason == "its gap is no linear function of coordinates"
+    assert mbs.GetObjectParameter(balls, "activeConnector") is True

@@ -114,7 +114,7 @@ def reduce(
     own = dampers if np.any(dampers) else None
     given = own if damping is None else damping
     structure = LinearizedStructure(mass, stiffness, given, rows, coordinates=basis)
-    moving = [c for c in contacts if np.any(c.direction)]
+    moving = [c for c in contacts if np.any(structure.row(c.direction))]
     names = {c.name for c in moving}
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving))),
