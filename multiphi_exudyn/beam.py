@@ -211,16 +211,25 @@ def planar_beam(
         dof = 2 * _node_at(nodes, point_mass.at)
         mass[dof, dof] += point_mass.mass
         mass[dof + 1, dof + 1] += point_mass.inertia
-    held = []
     for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)):
-        if math.isinf(spring):
-            held.append(dof)
-        else:
+        if not math.isinf(spring):
             stiffness[dof, dof] += spring
-    free = np.setdiff1d(np.arange(len(mass)), held)
-    rows = np.eye(len(mass))[:, free]
+    rows = _dof_rows(beam, nodes)
+    free = np.flatnonzero(np.any(rows, axis=1))
     points = {name: rows[2 * _node_at(nodes, x)] for name, x in beam.points.items()}
     return LinearStructure(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)], damping, points)
+
+
+def beam_deflections(beam: Beam, elements: int = 57) -> tuple[np.ndarray, np.ndarray]:
+    """Node positions x (k,) [m] and the rows (k, n) of their deflections w in ``planar_beam(beam, elements)``."""
+    nodes = beam_nodes(beam, elements)
+    return nodes, _dof_rows(beam, nodes)[::2]
+
+
+def _dof_rows(beam: Beam, nodes: np.ndarray) -> np.ndarray:
+    """Rows (2 k, n) of (w, theta) of every node in the free DoFs; zero where a rigid clamp holds."""
+    held = [dof for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)) if math.isinf(spring)]
+    return np.delete(np.eye(2 * len(nodes)), held, axis=1)
 
 
 def _node_at(nodes: np.ndarray, x: float) -> int:

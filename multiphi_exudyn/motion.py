@@ -167,7 +167,7 @@ class Motion:
         if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < CHATTER_WINDOW / allowed:
             raise NumericalFailure(
                 f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {allowed} "
-                f"in a period of the highest kept mode ({highest:g} Hz) or all within {ACCUMULATED:g} of the time so far"
+                f"in a period of the highest kept mode ({highest:g} Hz), or all within {ACCUMULATED:g} of the time"
             )
 
 

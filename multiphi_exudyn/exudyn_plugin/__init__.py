@@ -8,6 +8,7 @@ from __future__ import annotations
 from multiphi_exudyn.exudyn_plugin.binding import bind
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin.drawing import Drawing
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.reduce import Item, Reduction, reduce
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
@@ -15,6 +16,7 @@ from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
 __all__ = [
     "BodyHistories",
     "CreateMultiPhiBody",
+    "Drawing",
     "Item",
     "LinearizedStructure",
     "MultiPhiBody",

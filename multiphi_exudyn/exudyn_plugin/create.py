@@ -14,6 +14,7 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 from multiphi_exudyn.driven import DrivenMotion
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
+from multiphi_exudyn.exudyn_plugin.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.interface import Interface, interface_rows
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
@@ -39,6 +40,7 @@ def CreateMultiPhiBody(
     matchedStepSize: float | None = None,
     interface: Iterable[str] | Mapping[str, At] = (),
     show: bool = True,
+    drawing: Drawing | None = None,
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
 
@@ -47,7 +49,8 @@ def CreateMultiPhiBody(
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
     stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
-    (interface.py); needs TrapezoidalIndex2 and constant loads. show: as in other Create functions.
+    (interface.py); needs TrapezoidalIndex2 and constant loads. show: as in other Create functions. drawing: None, or
+    how the renderer shows the body.
 
     Returns typed indices: nInterface ({name: NodeIndex}, one coordinate each, only if asked for), nGenericODE2,
     oGenericODE2, nGenericData (not without contacts), sCoordinates,
@@ -67,11 +70,12 @@ def CreateMultiPhiBody(
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
+    check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
     body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
     if rows and isinstance(body, DrivenBody):
         raise MultiPhiValueError("loads: got some that vary in time, need constant ones with interface coordinates")
-    body.items.update(_add_items(mbs, body, show))
+    body.items.update(_add_items(mbs, body, show, drawing))
     if rows:
         _add_interface(mbs, body, rows)
     body.items.update(add_sensors(mbs, body))
@@ -111,7 +115,7 @@ def _motion(
     return motion
 
 
-def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
+def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None) -> dict[str, Any]:
     stepped, (q, q_t) = body.stepped_level(body.state.closed), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
@@ -128,7 +132,9 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool) -> dict[str, Any]:
             name=body.name,
             nodeNumbers=[node],
             **matrices(stepped, body.force_vector(stepped)),
-            visualization=VObjectGenericODE2(show=show),
+            visualization=VObjectGenericODE2(
+                show=show, graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing)
+            ),
         )
     )
     if body.model.contacts:

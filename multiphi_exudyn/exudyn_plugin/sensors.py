@@ -23,7 +23,7 @@ from multiphi_exudyn.state import Event
 if TYPE_CHECKING:
     from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 
-__all__ = ["BodyHistories", "add_sensors", "body_histories"]
+__all__ = ["BodyHistories", "add_sensors", "body_histories", "rebuilt"]
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in ("sCoordinates", "sCoordinates_t", "sCoordinates_tt")])
-    values = _rebuilt(body, rows, flags, time, stored)
+    values = rebuilt(body, rows, flags, time, stored)
     return BodyHistories(
         time=time,
         points=dict(zip(names, values[0], strict=True)),
@@ -119,7 +119,7 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
     raise MultiPhiValueError("items: got a dict of no Multi-Phi body of this system, need one it returned")
 
 
-def _rebuilt(
+def rebuilt(
     body: MultiPhiBody, rows: np.ndarray, flags: np.ndarray, time: np.ndarray, stored: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Displacements and velocities of points, gaps and contact forces, each (.., k), level by level."""
