@@ -20,9 +20,11 @@ from run_checks import complaints
 from strategies import built, recipe_of
 
 from multiphi_exudyn import MultiPhiError, simulate
+from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
 
 CHUNK = 100  # cases written at a time
 NEAR = 1e-6  # of the largest displacement: the two loops' motions
+LONGEST = 300.0  # s: most cases take a tenth of a second, the first one compiles; a run may never end
 NUDGE = 1e-13  # of the start: a run that it changes by more than NEAR is sensitive, not wrong
 
 
@@ -31,9 +33,11 @@ def verdicts(number):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            return _verdicts(number)
+            return call_within(LONGEST, lambda: _verdicts(number))
     except MultiPhiError as error:
         return [("refused", str(error))]
+    except TimeLimitExceeded:
+        return [("failure: endless", f"not finished after {LONGEST:g} s")]
     except Exception as error:
         return [("failure: exception", f"{type(error).__name__}: {error}")]
 

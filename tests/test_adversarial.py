@@ -323,6 +323,15 @@ class TestCampaign:
         monkeypatch.setattr("random_campaign.simulate", broken)
         assert verdicts(3) == [("failure: exception", "ZeroDivisionError: float division by zero")]
 
+    def test_names_a_run_that_does_not_end(self, monkeypatch):
+        def endless(*given, **named):
+            while True:
+                pass
+
+        monkeypatch.setattr("random_campaign.simulate", endless)
+        monkeypatch.setattr("random_campaign.LONGEST", 0.2)
+        assert verdicts(3) == [("failure: endless", "not finished after 0.2 s")]
+
 
 def _permuted(case, order):
     old = case.model.structure
