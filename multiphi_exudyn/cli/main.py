@@ -1,4 +1,4 @@
-"""Command line: ``multiphi-exudyn compare | budget | study | stability | scenes | studies``.
+"""Command line: ``multiphi-exudyn compare | budget | needs | study | stability | scenes | studies``.
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
@@ -17,6 +17,7 @@ from typing import NoReturn
 
 from multiphi_exudyn.cli.budget_command import run_budget
 from multiphi_exudyn.cli.compare_command import run_compare
+from multiphi_exudyn.cli.needs_command import run_needs
 from multiphi_exudyn.cli.stability_command import run_stability
 from multiphi_exudyn.cli.study_command import run_study_file
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
@@ -59,6 +60,8 @@ def _run(given: argparse.Namespace) -> bool:
         return run_compare(given.scene, given.t_end, given.modes, given.out)
     if given.command == "budget":
         return run_budget(given.scene, given.t_end, given.modes, given.out)
+    if given.command == "needs":
+        return run_needs(given.scenes)
     if given.command == "study":
         return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
     if given.command == "stability":
@@ -77,12 +80,14 @@ class _OneLineParser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="{compare,budget,study,stability,scenes,studies}"
+        dest="command", required=True, metavar="{compare,budget,needs,study,stability,scenes,studies}"
     )
     compare = commands.add_parser("compare", help="run all models of a scene and write a report")
     _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
     budget = commands.add_parser("budget", help="tell where the difference of a scene's reduced and full model is from")
     _scene_options(budget, "the truncated models instead of the scene's")
+    needs = commands.add_parser("needs", help="tell what reduced runs take: levels, coordinates, packages, memory")
+    needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")
     _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
     _stability_options(commands.add_parser("stability", help="run every model through a catalogue of extreme cases"))
     commands.add_parser("scenes", help="list the shipped scenes")

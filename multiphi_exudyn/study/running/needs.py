@@ -1,0 +1,101 @@
+"""Needs: what a scene's reduced run takes of what it could take.
+
+Levels built of levels possible, coordinates carried of those given, packages imported, memory. A process of its own
+makes the run from M, C, K and the contacts, so nothing that this process has already loaded is counted.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.study.running.run_alone import Task
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scene_file import ReducedModel
+from multiphi_exudyn.study.scene.scenes import Scene
+from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
+
+__all__ = ["Needs", "needs_of", "needs_table"]
+
+HEADS = ("scene", "model", "levels", "coordinates", "memory", "own modules", "packages")
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What the reduced run of a scene took.
+
+    levels_built of levels_possible; dofs_carried: coordinates of the largest level visited, those of varying loads
+    among them, of dofs_given. modules: of this package, packages: others beside the standard library, that the run
+    imported. memory: its peak [bytes], M and K themselves not counted.
+    """
+
+    scene: str
+    model: str
+    status: str
+    levels_built: int
+    levels_possible: int
+    dofs_carried: int
+    dofs_given: int
+    modules: int
+    packages: tuple[str, ...]
+    memory: int
+
+
+def needs_of(scene: Scene) -> Needs:
+    """Run the first reduced model of a scene in a process of its own."""
+    spec = next((s for s in scene.models.values() if isinstance(s, ReducedModel) and s.tolerance is None), None)
+    if spec is None:
+        raise MultiPhiValueError(f"{scene.path}: models: got none of kind 'reduced' with a number of modes, need one")
+    bench = prepare(scene, mechanics_of(scene))
+    model, given = bench.model(spec), bench.structure
+    task = Task(
+        structure=LinearStructure(given.mass, given.stiffness, given.damping, given.points),
+        contacts=bench.nonlinearities(spec.contact == "rigid"),
+        modes=model.modes if isinstance(model.modes, (int, str)) else "all",
+        overrides=bench.overrides,
+        start=start_configuration(bench, model),
+        loads=bench.loads,
+        t_end=bench.t_end,
+    )
+    told = json.loads(_in_a_process(pickle.dumps(task)))
+    return Needs(scene=scene.name, model=spec.name, **told | {"packages": tuple(told["packages"])})
+
+
+def needs_table(found: Sequence[Needs]) -> str:
+    """A line for every scene."""
+    rows = [HEADS, *(_cells(needs) for needs in found)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADS))]
+    return "\n".join("  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows)
+
+
+def _in_a_process(task: bytes) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "task"
+        file.write_bytes(task)
+        command = [sys.executable, "-m", "multiphi_exudyn.study.running.run_alone", str(file)]
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
+    if done.returncode:
+        raise NumericalFailure(f"the run in a process of its own ended with {done.stderr.strip().splitlines()[-1]}")
+    return done.stdout
+
+
+def _cells(needs: Needs) -> tuple[str, ...]:
+    possible = str(needs.levels_possible) if needs.levels_possible < 1e6 else f"{needs.levels_possible:.0e}"
+    return (
+        needs.scene,
+        needs.model,
+        f"{needs.levels_built} of {possible}",
+        f"{needs.dofs_carried} of {needs.dofs_given}",
+        f"{needs.memory / 1e6:.1f} MB",
+        str(needs.modules),
+        ", ".join(needs.packages),
+    )

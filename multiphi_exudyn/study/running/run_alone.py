@@ -1,0 +1,66 @@
+"""One reduced run in a process of its own, which tells what it took: ``python -m ...run_alone FILE``.
+
+FILE holds a pickled :class:`Task`. Nothing but the reduced model is imported here, so that the modules and the memory
+told are those that a run needs.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+import tracemalloc
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import packages_distributions
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.loads import Load
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.structure import LinearStructure
+
+__all__ = ["Task", "run_alone"]
+
+OURS = "multiphi_exudyn"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A reduced run: the arguments of MultiPhiModel and of simulate; start: x (n,)."""
+
+    structure: LinearStructure
+    contacts: Sequence[Any]
+    modes: int | str
+    overrides: Mapping[tuple[str, ...], Any]
+    start: np.ndarray
+    loads: Sequence[Load]
+    t_end: float
+
+
+def run_alone(task: Task) -> dict[str, Any]:
+    """What the run took, as ``needs.Needs`` names it; memory counted from before its model is made."""
+    tracemalloc.start()
+    model = MultiPhiModel(task.structure, task.contacts, modes=task.modes, overrides=task.overrides)
+    run = simulate(model, task.t_end, displacement=task.start, loads=task.loads, compiled=False)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    imported = [name.partition(".")[0] for name in sys.modules]
+    others = {name for name in packages_distributions() if not name.startswith("_")} - {OURS}
+    return {
+        "status": run.status,
+        "levels_built": run.stats.levels_built,
+        "levels_possible": run.stats.levels_possible,
+        "dofs_carried": max(segment.level.level.modes for segment in run.segments) if run.segments else 0,
+        "dofs_given": model.structure.n,
+        "modules": imported.count(OURS),
+        "packages": sorted(others & set(imported)),
+        "memory": peak,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(run_alone(pickle.loads(Path(sys.argv[1]).read_bytes()))))

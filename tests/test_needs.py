@@ -1,0 +1,43 @@
+"""What a scene does not need is left out: levels, coordinates, packages and memory of every shipped scene's run."""
+
+import pytest
+from small_scene import BEAM, changed, write
+
+from multiphi_exudyn import cli
+from multiphi_exudyn.study.running.needs import needs_of
+from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+
+LEVELS = {}  # built by the run of a scene; two for all others
+MOST_MODULES = 40  # of this package; a run without numba or loads of its own kind takes fewer
+MOST_MEMORY = 2e6  # bytes
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_scenes() if "hole" not in name])
+def test_a_shipped_scene_takes_what_it_visits(name):
+    needs = needs_of(load_scene(name))
+    assert needs.status == "ok"
+    assert needs.levels_built == LEVELS.get(name, 2) <= needs.levels_possible
+    assert needs.dofs_carried <= 0.1 * needs.dofs_given
+    assert needs.packages == ("numpy", "scipy")  # neither exudyn nor matplotlib, numba, pydantic
+    assert 10 < needs.modules <= MOST_MODULES
+    assert 0 < needs.memory <= MOST_MEMORY
+
+
+def test_a_contact_that_is_never_reached_costs_no_level(tmp_path):
+    far = changed(("contacts", 0, "gap"), 10.0)
+    needs = needs_of(load_scene(write(tmp_path / "far.toml", far)))
+    assert (needs.levels_built, needs.levels_possible) == (1, 2)
+
+
+def test_the_command_prints_a_line_for_every_scene(tmp_path, capsys):
+    assert cli.main(["needs", write(tmp_path / "small.toml", BEAM)]) == 0
+    heads, line = capsys.readouterr().out.splitlines()
+    assert heads.split()[:3] == ["scene", "model", "levels"]
+    assert "2 of 2" in line
+    assert line.split()[-2:] == ["numpy,", "scipy"]
+
+
+def test_a_scene_without_a_reduced_model_is_refused(tmp_path, capsys):
+    models = [{"kind": "full", "name": "all", "elements": 4, "step": 1e-4}]
+    assert cli.main(["needs", write(tmp_path / "full.toml", changed(("models",), models))]) == 2
+    assert "need one" in capsys.readouterr().err
