@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.optimize
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.equilibrium import equilibrium
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
 from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level, rays_of
+from multiphi_exudyn.nonnegative import nonnegative_least_squares
 from multiphi_exudyn.structure import LinearStructure, is_real
 
 __all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
@@ -284,7 +284,7 @@ def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
     system = np.vstack([(rows / lengths[:, None]).T, wanted / np.max(wanted)])
     target = np.zeros(len(system))
     target[-1] = 1.0
-    multipliers, residual = scipy.optimize.nnls(system, target)
-    if residual < INFEASIBLE:
+    multipliers = nonnegative_least_squares(system, target)
+    if np.linalg.norm(target - system @ multipliers) < INFEASIBLE:
         raise MultiPhiValueError("static equilibrium: got rigid contacts that exclude each other, need a way between")
     return np.asarray(multipliers > 0)

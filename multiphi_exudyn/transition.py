@@ -22,9 +22,9 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 
 from multiphi_exudyn.level import Asymptotic, Level, cleared
+from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
 __all__ = ["LoadedLevel", "Transition", "nearest_admissible"]
 
@@ -132,7 +132,7 @@ def nearest_admissible(rows: np.ndarray, vector: np.ndarray, free: int | None = 
     else:
         units = rows / lengths[:, None]
         same = vector if free == len(vector) else np.linalg.lstsq(units, given / lengths, rcond=None)[0]
-        multipliers = scipy.optimize.nnls(units.T, -same)[0] / lengths
+        multipliers = nonnegative_least_squares(units.T, -same) / lengths
     after = vector.copy()
     after[:free] += multipliers @ rows
     return after, multipliers

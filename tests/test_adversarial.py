@@ -56,6 +56,9 @@ FOUND = {
     "every segment starts at zero": Recipe(
         15520, "repeated", 1, "rayleigh", 2, "mixed", "zero", "rows", "all", "leaving", "none"
     ),
+    "a contact strikes at 1e-7 of the speed beside others at rest": Recipe(
+        21529, "free chain", 5, "none", 4, "rigid", "preload", "rows", "all", "rest", "gravity"
+    ),
     "a load that a stop carries without any motion": Recipe(
         16004, "free dense", 3, "heavy", 4, "rigid", "zero", "mixed", "few", "static", "point"
     ),

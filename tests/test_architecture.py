@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
-    ("modes", "modal_response", "first_root", "history", "forced_response"),
+    ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative"),
     ("structure", "assemble", "beam", "contact", "force_law", "loads"),
     ("level", "equilibrium", "transition", "model", "excitation"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
