@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 import pytest
+import random_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_campaign import main, recipe_of, verdicts
+from random_campaign import main, nudged, recipe_of, verdicts
 from run_checks import Signal, complaints, missed
 from strategies import CHOICES, Recipe, built, cases, recipes
 
@@ -83,9 +84,10 @@ def assert_near(found, expected, size=None):
 
 def sensitive(case, t, factor=1e-12):
     """Whether a start nudged by round-off gives another answer at t."""
-    runs = [
-        run_of(case, displacement=(1 + s) * case.displacement, velocity=(1 + s) * case.velocity) for s in (0, factor)
-    ]
+    first = run_of(case)
+    if not first.segments:
+        return True
+    runs = [first, run_of(nudged(case, first, factor))]
     if {run.status for run in runs} != {"ok"}:
         return True
     x, y = (run.displacement(t) for run in runs)
@@ -311,6 +313,26 @@ class TestCampaign:
         pair = [built(recipe_of(7)) for _ in range(2)]
         assert np.array_equal(pair[0].velocity, pair[1].velocity)
         assert {recipe_of(k).structure for k in range(100)} == set(CHOICES["structure"])
+
+    @pytest.mark.parametrize("number", [2316, 4785])
+    def test_a_start_at_rest_is_nudged_too(self, number):
+        """Two hundred events at the rate of one spring of 1e8 N/m and more: round-off grows to 1e-6."""
+        case = built(recipe_of(number))
+        assert not np.any(case.displacement)
+        assert not np.any(case.velocity)
+        assert {kind for kind, _ in verdicts(number)} <= {"ok", "sensitive"}
+
+    def test_loops_that_differ_are_told(self, monkeypatch):
+        """A compiled loop that is 1e-5 off, in a case that no nudge changes."""
+        run = random_campaign._run
+        monkeypatch.setattr(
+            random_campaign,
+            "_run",
+            lambda case, compiled: run(
+                case if compiled is False else dataclasses.replace(case, velocity=(1 + 1e-5) * case.velocity), compiled
+            ),
+        )
+        assert [kind for kind, _ in verdicts(9)] == ["failure: loops"]
 
     def test_goes_on_where_it_was(self, tmp_path, capsys):
         arguments = ["--processes", "1", "--out", str(tmp_path / "chunks"), "--count"]
