@@ -77,3 +77,16 @@ def test_frequency_response(capsys, tmp_path):
     assert found.up.duty("support")[0] > 0.02
     assert capsys.readouterr().out.count("node2") == 8
     assert picture.stat().st_size > 10_000
+
+
+def test_meshed_cantilever(capsys, tmp_path):
+    picture = tmp_path / "cantilever.png"
+    example = load("meshed_cantilever")
+    beam, (coarse, fine) = example.main([str(picture)])
+    off = [np.max(np.abs(found.bending / beam.bending - 1)) for found in (coarse, fine)]
+    assert off[1] < off[0] / 2 < 2e-3
+    assert example.difference(fine.tip, beam.tip) < min(0.015, example.difference(coarse.tip, beam.tip))
+    assert example.difference(fine.force, beam.force) < 0.05
+    assert len(fine.trajectory.events) == len(beam.trajectory.events) == 12
+    assert capsys.readouterr().out.count("12 events") == 2
+    assert picture.stat().st_size > 10_000
