@@ -25,6 +25,7 @@ from multiphi_exudyn.loads import (
     Sweep,
     SweepLoad,
 )
+from multiphi_exudyn.matrix_files import read_structure
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event
@@ -73,6 +74,7 @@ __all__ = [
     "assemble",
     "frequency_response",
     "planar_beam",
+    "read_structure",
     "simulate",
     "steady_state",
     "truncation_indicator",

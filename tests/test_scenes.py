@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+import scipy.io
+import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_scene import BEAM, changed, write
@@ -69,6 +71,36 @@ def test_a_scene_can_take_matrices_from_a_file(tmp_path):
     assert mechanics.damping == RayleighDamping(0.1, 0.0)
 
 
+def test_one_file_of_arrays_and_a_file_for_each_matrix_are_the_same_scene(tmp_path):
+    rows = {"mass": np.eye(2), "stiffness": np.diag([1.0, 4.0]), "damping": np.eye(2) / 10}
+    np.savez(tmp_path / "two.npz", difference=[1.0, -1.0], **rows)
+    np.save(tmp_path / "difference.npy", [1.0, -1.0])
+    scipy.sparse.save_npz(tmp_path / "mass.npz", scipy.sparse.csr_array(rows["mass"]))
+    for name in ("stiffness", "damping"):
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", scipy.sparse.csr_array(rows[name]))
+    files = {"mass": "mass.npz", "stiffness": "stiffness.mtx", "damping": "damping.mtx"}
+    found = []
+    for matrices, row in (("two.npz", "difference"), (files, "difference.npy")):
+        data = changed(["structure"], {"matrices": matrices, "points": {"middle": 0, "tip": 1, "d": row}})
+        data["models"] = [{"kind": "reduced", "name": "r1", "modes": 1, "contact": "rigid"}]
+        data["comparison"] = {"reference": "r1"}
+        found.append(mechanics_of(load_scene(write(tmp_path / "scene.toml", data))).matrices)
+    for name, need in rows.items():
+        np.testing.assert_array_equal(getattr(found[0], name), need)
+        np.testing.assert_array_equal(getattr(found[1], name).toarray(), need)
+    np.testing.assert_array_equal(found[0].row("d"), found[1].row("d"))
+
+
+def test_sparse_matrices_are_refused_to_a_model_that_takes_dense_ones(tmp_path):
+    for name in ("mass", "stiffness"):
+        scipy.sparse.save_npz(tmp_path / f"{name}.npz", scipy.sparse.eye_array(2).tocsr())
+    files = {"mass": "mass.npz", "stiffness": "stiffness.npz"}
+    data = changed(["structure"], {"matrices": files, "points": {"middle": 0, "tip": 1}})
+    data["models"] = [{"kind": "craig-bampton", "name": "cb", "modes": 1, "step": 1e-3}]
+    data["comparison"] = {"reference": "cb"}
+    assert "models[0].kind: got 'craig-bampton', need another kind: this one takes dense" in complaint(tmp_path, data)
+
+
 def test_a_variant_takes_what_it_does_not_say_from_its_base(tmp_path):
     variant = {"title": "longer", "base": "paper-rig", "outputs": {"t_end": 2.0, "points": ["node3"]}}
     scene, base = load_scene(write(tmp_path / "longer.toml", variant)), load_scene("paper-rig")
@@ -87,6 +119,7 @@ def test_end_time_and_modes_are_replaced_and_equal_models_run_once():
 COMPONENT = {"kind": "craig-bampton", "name": "cb", "modes": 2, "step": 1e-4}
 STEPWISE = {"kind": "solve-ivp", "name": "ivp", "method": "RK45", "rtol": 1e-4}
 
+FILES = {"mass": "m.mtx", "stiffness": "k.mtx"}
 BROKEN = {
     "unknown field": (["outputs", "steps"], 3, "outputs.steps: got 3, need no field of this name"),
     "missing table": (["start"], None, "start: got nothing, need a value"),
@@ -132,6 +165,8 @@ BROKEN = {
     "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need a name of its own"),
     "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),
     "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: matrices: got"),
+    "no matrix": (["structure"], {"matrices": FILES, "points": {"tip": 0}}, "structure: mass: got"),
+    "no stiffness": (["structure"], {"matrices": {"mass": "m.mtx"}, "points": {"tip": 0}}, "structure.matrices"),
     "unknown base": (["base"], "paper", "base: got 'paper', need one of: paper-rig"),
     "base of the wrong kind": (["base"], [1], "base: got [1], need one of: paper-rig"),
 }  # fmt: skip

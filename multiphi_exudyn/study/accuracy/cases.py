@@ -56,10 +56,13 @@ class Study:
     quick: bool = False
 
     @functools.cached_property
-    def _matrices(self) -> str:
-        """What stands in the file of matrices that the scene names; empty without such a file."""
-        named = self.scene_path.parent / str(self.scene.get("structure", {}).get("matrices", ""))
-        return hashlib.sha256(named.read_bytes()).hexdigest() if named.is_file() else ""
+    def _matrices(self) -> list[str]:
+        """What stands in the files of matrices and rows that the scene names; empty without such files."""
+        structure = self.scene.get("structure", {})
+        given = structure.get("matrices", "")
+        names = [given] if isinstance(given, str) else [*given.values(), *structure.get("points", {}).values()]
+        files = [self.scene_path.parent / name for name in names if isinstance(name, str)]
+        return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()]
 
     @property
     def _frequencies(self) -> dict[str, Any] | None:

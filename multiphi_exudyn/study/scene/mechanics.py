@@ -11,15 +11,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
-from zipfile import BadZipFile
 
 import numpy as np
+import scipy.sparse
 
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
+from multiphi_exudyn.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
@@ -29,6 +30,7 @@ from multiphi_exudyn.study.scene.scene_file import (
     DisplacedStart,
     FullModel,
     GlobalBasisModel,
+    MatrixFiles,
     MatrixStructure,
     ModalDampingSpec,
     RectangleSection,
@@ -150,18 +152,23 @@ def _section(spec: SectionSpec) -> Section:
 
 
 def _matrices(folder: Path, spec: MatrixStructure) -> LinearStructure:
-    path = folder / spec.matrices
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = dict(stored)
-    except (OSError, ValueError, EOFError, BadZipFile, TypeError, AttributeError) as error:
-        raise MultiPhiValueError(f"matrices: got {path}, need an .npz file of arrays: {error}") from error
+    files = spec.matrices
+    if isinstance(files, MatrixFiles):
+        rows = {name: _own_row(folder, name, at) if isinstance(at, str) else at for name, at in spec.points.items()}
+        damping = None if files.damping is None else folder / files.damping
+        return read_structure(folder / files.mass, folder / files.stiffness, damping, rows)
+    arrays = read_arrays("matrices", folder / files)
     return LinearStructure(
         _array(arrays, "mass"),
         _array(arrays, "stiffness"),
         arrays.get("damping"),
         {name: _array(arrays, at) if isinstance(at, str) else at for name, at in spec.points.items()},
     )
+
+
+def _own_row(folder: Path, name: str, path: str) -> np.ndarray:
+    row = read_array(f"points[{name!r}]", folder / path)
+    return np.squeeze(row.toarray() if scipy.sparse.issparse(row) else row)
 
 
 def _array(arrays: Mapping[str, np.ndarray], name: str) -> np.ndarray:
@@ -231,8 +238,14 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
     for i, model in enumerate(scene.file.models):
         if isinstance(model, FullModel) and mechanics.beam is None:
             refuse(scene, f"models[{i}].kind", "full", "another kind: matrices have no full model")
+        if isinstance(model, CraigBamptonModel) and _is_sparse(mechanics):
+            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one takes dense matrices")
         for contact in mechanics.contacts:
             _check_contact_of(scene, f"models[{i}].kind", model, contact)
+
+
+def _is_sparse(mechanics: Mechanics) -> bool:
+    return mechanics.matrices is not None and scipy.sparse.issparse(mechanics.matrices.stiffness)
 
 
 def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: UnilateralContact) -> None:

@@ -37,6 +37,7 @@ __all__ = [
     "FullModel",
     "GlobalBasisModel",
     "LoadedStart",
+    "MatrixFiles",
     "MatrixStructure",
     "ModalDampingSpec",
     "RectangleSection",
@@ -118,11 +119,23 @@ class BeamStructure(Table):
     beam: BeamSpec
 
 
-class MatrixStructure(Table):
-    """Matrices from an .npz file (arrays mass, stiffness, and optionally damping)."""
+class MatrixFiles(Table):
+    """One file for each matrix: .mtx, .mtx.gz, .npz of scipy.sparse, .npy."""
 
-    matrices: str  # path, relative to the scene file
-    points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]  # DoF, or a row's array
+    mass: str
+    stiffness: str
+    damping: str | None = None
+
+
+class MatrixStructure(Table):
+    """Matrices from one .npz file (arrays mass, stiffness, and optionally damping), or from a file for each.
+
+    Paths are relative to the scene file. points: a DoF, or a row: the name of its array in the one file, else the
+    path of its own.
+    """
+
+    matrices: str | MatrixFiles
+    points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]
 
 
 StructureSpec = Annotated[

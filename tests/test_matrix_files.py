@@ -1,0 +1,121 @@
+"""Matrices from files are those that were written, whatever the kind of file; a broken one is told in one line."""
+
+import gzip
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
+
+N = 5
+MASS = scipy.sparse.csc_array(np.diag(np.arange(1.0, N + 1)))
+STIFFNESS = scipy.sparse.csc_array(3 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
+HEADER = b"%%MatrixMarket matrix coordinate "
+ENDINGS = (".mtx", ".mtx.gz", ".npz", ".npy")
+
+
+def write(file, matrix):
+    """``matrix`` in the kind of file that its name says."""
+    if file.name.endswith(".npz"):
+        scipy.sparse.save_npz(file, matrix)
+    elif file.name.endswith(".npy"):
+        np.save(file, matrix.toarray())
+    else:
+        plain = file.with_name("plain.mtx")
+        scipy.io.mmwrite(plain, matrix, symmetry="symmetric")
+        content = plain.read_bytes()
+        file.write_bytes(gzip.compress(content, mtime=0) if file.name.endswith(".gz") else content)
+    return file
+
+
+@pytest.fixture
+def mass(tmp_path):
+    return write(tmp_path / "mass.npz", MASS)
+
+
+class TestMatrices:
+    @pytest.mark.parametrize("ending", ENDINGS)
+    def test_are_those_that_were_written(self, tmp_path, ending):
+        files = [write(tmp_path / f"{name}{ending}", a) for name, a in (("mass", MASS), ("stiffness", STIFFNESS))]
+        found = read_structure(*files, damping=files[1], points={"tip": N - 1})
+        assert scipy.sparse.issparse(found.stiffness) == (ending != ".npy")
+        for got, need in ((found.mass, MASS), (found.stiffness, STIFFNESS), (found.damping, STIFFNESS)):
+            np.testing.assert_array_equal(got.toarray() if ending != ".npy" else got, need.toarray())
+        assert MultiPhiModel(found, modes=1).level(()).frequencies[0] > 0
+
+    def test_of_one_symmetric_triangle_and_of_the_whole_are_the_same(self, tmp_path, mass):
+        half = write(tmp_path / "half.mtx", STIFFNESS)
+        scipy.io.mmwrite(tmp_path / "whole.mtx", STIFFNESS, symmetry="general")
+        assert b"symmetric" in half.read_bytes()
+        found = [read_structure(mass, file).stiffness for file in (half, tmp_path / "whole.mtx")]
+        assert abs(found[0] - found[1]).max() == 0
+
+
+BROKEN = {
+    "a.mtx": [
+        b"", b"text", HEADER + b"pattern symmetric\n5 5 1\n1 1\n", HEADER + b"complex general\n5 5 1\n1 1 1 1\n",
+        HEADER + b"real symmetric\n5 5 3\n1 1 1\n", HEADER + b"real symmetric\n5 5 1\n6 1 1\n",
+        HEADER + b"real general\n5 4 1\n1 1 1\n", HEADER + b"real general\n5 5 1\n1 1 nan\n",
+        HEADER + b"real general\n5 5 1\n1 2 1\n", HEADER + b"real general\n4 4 1\n1 1 1\n",
+        HEADER + b"real general\n5 5 1\n1 1 3e", HEADER + b"integer general\n5 5 1\n1 1 1.5\n",
+        HEADER + b"real general\n5 5 1\n1 1 1 2\n", b"%%MatrixMarket matrix array real general\n5 5\n1\n",
+    ],
+    "a.mtx.gz": [b"", b"text", gzip.compress(HEADER + b"real symmetric\n5 5 1\n1 1 1\n", mtime=0)[:-9]],
+    "a.npz": [b"", b"text", b"PK\x03\x04 broken"],
+    "a.npy": [b"", b"text", b"\x93NUMPY\x01\x00\x00\x00"],
+    "a.txt": [b"1 2 3"],
+    "none.mtx": [None],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content"), [(name, c) for name, contents in BROKEN.items() for c in contents])
+def test_a_broken_file_is_one_line(tmp_path, mass, name, content):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises((MultiPhiValueError, MultiPhiTypeError), match="stiffness: ") as caught:
+        read_structure(mass, tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_named_arrays_are_no_sparse_matrix(tmp_path, mass):
+    np.savez(tmp_path / "two.npz", mass=np.eye(N), stiffness=np.eye(N))
+    with pytest.raises(MultiPhiValueError, match="it holds the arrays mass, stiffness, not one sparse matrix"):
+        read_structure(mass, tmp_path / "two.npz")
+
+
+def test_places_outside_of_a_sparse_matrix_are_refused(tmp_path, mass):
+    parts = {"data": np.ones(1), "indices": np.array([10**6]), "indptr": np.array([0, 1, 1, 1, 1, 1])}
+    np.savez(tmp_path / "far.npz", format=np.array(b"csr"), shape=np.array([N, N]), **parts)
+    with pytest.raises(MultiPhiValueError, match="stiffness: got"):
+        read_structure(mass, tmp_path / "far.npz")
+
+
+def test_what_is_no_path_is_refused(mass):
+    with pytest.raises(MultiPhiTypeError, match="stiffness: got int, need the path of a file"):
+        read_structure(mass, 3)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_change_of_bytes_is_read_or_refused_in_one_line(tmp_path, ending, data):
+    file, mass = write(tmp_path / f"k{ending}", STIFFNESS), write(tmp_path / "m.npz", MASS)
+    whole = file.read_bytes()
+    place, length = data.draw(st.integers(0, len(whole))), data.draw(st.integers(0, 4))
+    tail = data.draw(st.sampled_from([whole[place + length :], b""]))
+    file.write_bytes(whole[:place] + data.draw(st.binary(max_size=4)) + tail)
+    line = refusal(mass, file)
+    assert line == "" or (line.startswith("stiffness: ") and "\n" not in line)
+
+
+def refusal(mass, file):
+    """The error's text, "" without one."""
+    try:
+        read_structure(mass, file)
+    except MultiPhiError as error:
+        return str(error)
+    return ""
