@@ -95,7 +95,7 @@ def actions_of(
             courses.append(history.derivative.derivative)
             for contact in contacts:
                 if contact.name in load.fixed_stops:
-                    along = contact.coefficient * float(structure.row(contact.point) @ moved)
+                    along = float(structure.row(contact.direction) @ moved)
                     ways.setdefault(contact.name, []).append((-along, history))
         else:
             raise MultiPhiTypeError(f"loads: got {type(load).__name__}, need loads of multiphi_exudyn.loads")

@@ -1,8 +1,8 @@
-"""The Exudyn system of a planar beam with contact elements: Exudyn's y is the beam's z.
+"""The Exudyn system of planar beams with contact elements: Exudyn's y is the beams' z.
 
 Elements are ANCFCable2D or ObjectBeamGeometricallyExact2D, point masses and the damping matrix are
 ObjectGenericODE2 items on the beam's own nodes, contacts are penalty elements on the node at their point.
-The beam's start is always held along its axis; a finite clamp stiffness acts through coordinate springs
+A beam's start is always held along its axis; a finite clamp stiffness acts through coordinate springs
 (on the slope y' in the ANCF beam, which is the sine of the rotation).
 
 A viscous contact and a force law are springs with a user function, ObjectConnectorCoordinateSpringDamper: the
@@ -21,7 +21,9 @@ import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
 
+from multiphi_exudyn.assemble import Tie
 from multiphi_exudyn.beam import Beam, Section, beam_nodes
+from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
 from reference_models.point_law import PointLaw
@@ -51,7 +53,7 @@ class Stop:
     def spring_force(
         self, mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float
     ) -> float:
-        """User function of a spring between ground and point."""
+        """User function of a spring between the point and what it meets."""
         return self.contact.spring_force(u, v, self.way, self.rate)
 
 
@@ -59,75 +61,126 @@ class Stop:
 class BeamSystem:
     """An assembled Exudyn system and where its items are.
 
-    container owns mbs and must live as long. positions: (nodes,) [m], of nodes and first_coordinates
-    (index of each node's first ODE2 coordinate). load: a LoadCoordinate along +z, zero, or None. driver: an
-    ObjectGenericODE2 on all nodes whose forceVector is zero, or None. stops: of the contacts, by name.
+    container owns mbs and must live as long. nodes of all beams, one beam after the other, and first_coordinates
+    (index of each node's first ODE2 coordinate). points: name -> number of its node. load: a LoadCoordinate along +z,
+    zero, or None. driver: an ObjectGenericODE2 on all nodes whose forceVector is zero, or None. stops: of the
+    contacts, by name.
     """
 
     container: Any
     mbs: Any
-    positions: np.ndarray
     nodes: tuple[Any, ...]
     first_coordinates: np.ndarray
+    points: Mapping[str, int]
     load: Any
     driver: Any
     stops: Mapping[str, Stop]
 
-    def node_at(self, x: float) -> int:
-        """Number along the beam of the node at x [m]."""
-        return _nearest(self.positions, x)
-
-    def coordinate(self, x: float, component: int = DEFLECTION) -> int:
-        """Index of a coordinate of the node at x [m] among the system's ODE2 coordinates."""
-        return int(self.first_coordinates[self.node_at(x)]) + component
+    def coordinate(self, point: str, component: int = DEFLECTION) -> int:
+        """Index of a coordinate of the node at a point among the system's ODE2 coordinates."""
+        return int(self.first_coordinates[self.points[point]]) + component
 
 
 def build_beam_system(
-    beam: Beam,
+    beams: Beams,
     settings: FullBeamSettings,
     contacts: Sequence[PointContact] = (),
     damping: np.ndarray | None = None,
-    load_at: float | None = None,
+    load_at: str | None = None,
     laws: Sequence[PointLaw] = (),
     driven: bool = False,
 ) -> BeamSystem:
-    """Build and assemble; damping: (n_full, n_full) on all coordinates; load_at: position [m] of a load.
+    """Build and assemble; damping: (n_full, n_full) on all coordinates; load_at: point of a load.
 
     driven: whether there is a driver.
     """
     container = exu.SystemContainer()
     mbs = container.AddSystem()
+    ground = _marker(mbs, mbs.AddNode(eii.NodePointGround()), AXIAL)
+    laid = {name: _add_beam(mbs, beam, settings, ground) for name, beam in beams.parts.items()}
+    places = {point: _Place(laid[name], x) for point, (name, x) in beams.points.items()}
+    for tie in beams.ties:
+        _add_tie(mbs, tie, ground, places)
+    stops = {contact.name: Stop(contact) for contact in contacts}
+    for contact in contacts:
+        _add_contact(mbs, stops[contact.name], settings, ground, places)
+    for law in laws:
+        _add_law(mbs, law, ground, places[law.point].node)
+    nodes = tuple(node for beam in laid.values() for node in beam.nodes)
+    if damping is not None:
+        mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes), dampingMatrix=damping))
+    driver = mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes))) if driven else None
+    load = None
+    if load_at is not None:
+        load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=_marker(mbs, places[load_at].node, DEFLECTION), load=0.0))
+    mbs.Assemble()
+    first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
+    points = {point: nodes.index(place.node) for point, place in places.items()}
+    return BeamSystem(container, mbs, nodes, first, points, load, driver, stops)
+
+
+@dataclass(frozen=True)
+class _LaidBeam:
+    """positions: (nodes,) [m]; elements between its nodes."""
+
+    positions: np.ndarray
+    nodes: tuple[Any, ...]
+    elements: list[Any]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Of a point: its beam and x [m]."""
+
+    beam: _LaidBeam
+    x: float
+
+    @property
+    def number(self) -> int:
+        """Number of its node along its beam."""
+        return _nearest(self.beam.positions, self.x)
+
+    @property
+    def node(self) -> Any:
+        """Its node."""
+        return self.beam.nodes[self.number]
+
+
+def _add_beam(mbs: Any, beam: Beam, settings: FullBeamSettings, ground: Any) -> _LaidBeam:
     positions = beam_nodes(beam, settings.elements)
     nodes = tuple(_add_node(mbs, settings.kind, x) for x in positions)
     elements = [
         _add_element(mbs, settings.kind, beam.section_at((left + right) / 2), right - left, nodes[i : i + 2])
         for i, (left, right) in enumerate(pairwise(positions))
     ]
-    ground = _marker(mbs, mbs.AddNode(eii.NodePointGround()), AXIAL)
     _add_point_masses(mbs, beam, settings.kind, positions, nodes)
     _add_clamp(mbs, beam, settings.kind, ground, nodes[0])
-    stops = {contact.name: Stop(contact) for contact in contacts}
-    for contact in contacts:
-        node = _nearest(positions, beam.points[contact.point])
-        if settings.contact == "circle":
-            near = elements[max(node - 1, 0) : node + 1]
-            _add_circle_contact(mbs, contact, settings.circle_radius, positions[node], near)
-        elif contact.damping:
-            _add_viscous_contact(mbs, stops[contact.name], ground, nodes[node])
-        else:
-            stops[contact.name].item = _add_coordinate_contact(mbs, contact, ground, nodes[node])
-    for law in laws:
-        _add_law(mbs, law, ground, nodes[_nearest(positions, beam.points[law.point])])
-    if damping is not None:
-        mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes), dampingMatrix=damping))
-    driver = mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes))) if driven else None
-    load = None
-    if load_at is not None:
-        marker = _marker(mbs, nodes[_nearest(positions, load_at)], DEFLECTION)
-        load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=marker, load=0.0))
-    mbs.Assemble()
-    first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
-    return BeamSystem(container, mbs, positions, nodes, first, load, driver, stops)
+    return _LaidBeam(positions, nodes, elements)
+
+
+def _add_tie(mbs: Any, tie: Tie, ground: Any, places: Mapping[str, _Place]) -> None:
+    """Exudyn holds factorValue1 q(marker 1) - q(marker 0) at zero."""
+    (tied, coefficient), *rest = tie.items()
+    markers = [_marker(mbs, places[point].node, DEFLECTION) for point, _ in rest] or [ground]
+    factor = -rest[0][1] / coefficient if rest else 1.0
+    mbs.AddObject(
+        eii.ObjectConnectorCoordinate(
+            markerNumbers=[_marker(mbs, places[tied].node, DEFLECTION), *markers], factorValue1=factor
+        )
+    )
+
+
+def _add_contact(mbs: Any, stop: Stop, settings: FullBeamSettings, ground: Any, places: Mapping[str, _Place]) -> None:
+    contact, place = stop.contact, places[stop.contact.point]
+    if settings.contact == "circle":
+        near = place.beam.elements[max(place.number - 1, 0) : place.number + 1]
+        _add_circle_contact(mbs, contact, settings.circle_radius, place.beam.positions[place.number], near)
+        return
+    other = ground if contact.other is None else _marker(mbs, places[contact.other].node, DEFLECTION)
+    if contact.damping:
+        _add_viscous_contact(mbs, stop, other, place.node)
+    else:
+        stop.item = _add_coordinate_contact(mbs, contact, other, place.node)
 
 
 def _nearest(positions: np.ndarray, x: float) -> int:
@@ -185,12 +238,12 @@ def _add_clamp(mbs: Any, beam: Beam, kind: str, ground: Any, node: Any) -> None:
             mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, stiffness=stiffness))
 
 
-def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: Any) -> Any:
+def _add_coordinate_contact(mbs: Any, contact: PointContact, other: Any, node: Any) -> Any:
     """Exudyn's gap is q(marker 1) - q(marker 0) - offset, its force acts along +q of marker 1."""
     point = _marker(mbs, node, DEFLECTION)
     return mbs.AddObject(
         eii.ObjectContactCoordinate(
-            markerNumbers=[point, ground] if contact.above else [ground, point],
+            markerNumbers=[point, other] if contact.above else [other, point],
             nodeNumber=_data_node(mbs, [contact.distance]),
             contactStiffness=contact.spring,
             offset=-contact.distance,
@@ -198,11 +251,11 @@ def _add_coordinate_contact(mbs: Any, contact: PointContact, ground: Any, node: 
     )
 
 
-def _add_viscous_contact(mbs: Any, stop: Stop, ground: Any, node: Any) -> None:
+def _add_viscous_contact(mbs: Any, stop: Stop, other: Any, node: Any) -> None:
     """A spring whose user function is the contact's law."""
     mbs.AddObject(
         eii.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=[ground, _marker(mbs, node, DEFLECTION)], springForceUserFunction=stop.spring_force
+            markerNumbers=[other, _marker(mbs, node, DEFLECTION)], springForceUserFunction=stop.spring_force
         )
     )
 

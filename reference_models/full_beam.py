@@ -1,4 +1,4 @@
-"""The full nonlinear model: an Exudyn beam with contact elements, from a beam's description.
+"""The full nonlinear model: Exudyn beams with contact elements, from the beams' description.
 
     M q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq - sum F_j d(q_j)/dq + f(t),   lambda_i = k_i max(0, -g_i)
 
@@ -27,6 +27,7 @@ from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_
 from multiphi_exudyn.loads import Load
 from reference_models.actions import Actions, actions_of
 from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
+from reference_models.beams import Beams, as_beams
 from reference_models.drive import Drive
 from reference_models.energy_history import contact_losses, dissipated_energy, energy_history, work_of
 from reference_models.exudyn_quiet import quiet
@@ -48,28 +49,30 @@ WHOLE_STEP = 1e-6  # of a step: how far the last sample of a grid may lie beyond
 
 
 class FullBeam:
-    """A beam and its contacts as an Exudyn model.
+    """A beam, or beams side by side, and their contacts as an Exudyn model.
 
-    contacts: each on one point of the beam, with a finite stiffness; the force of a viscous one, and every force law,
-    is a Python function that Exudyn calls several times a step (2 to 3 us a step more).
-    structure: the beam without contacts and laws, linearised where it is straight; its points are beam.points.
+    contacts: each on one point, or between two, with a finite stiffness; the force of a viscous one, and every force
+    law, is a Python function that Exudyn calls several times a step (2 to 3 us a step more).
+    settings: elements are those of each beam. structure: all of it without contacts and laws, linearised where it is
+    straight; its points are beams.points.
     """
 
     def __init__(
         self,
-        beam: Beam,
+        beam: Beam | Beams,
         contacts: Sequence[UnilateralContact],
         settings: FullBeamSettings = DEFAULT_SETTINGS,
         force_laws: Sequence[Law] = (),
     ) -> None:
-        self.beam = beam
-        self.contacts = point_contacts(beam, contacts)
-        self.laws = point_laws(beam, force_laws)
+        self.beams = as_beams(beam)
+        self.contacts = point_contacts(self.beams, contacts)
+        self.laws = point_laws(self.beams, force_laws)
         self.settings = settings
         self._check_round({contact.name for contact in self.contacts if contact.damping}, "no damping")
+        self._check_round({contact.name for contact in self.contacts if contact.other}, "one point")
         started = time.perf_counter()
         with quiet():
-            self.structure = _linearized(beam, settings)
+            self.structure = _linearized(self.beams, settings)
         self._building_s = time.perf_counter() - started
 
     @property
@@ -97,7 +100,7 @@ class FullBeam:
         free deflections leaves out; e is 1 at every point but for a few parts in 1e3 on the elements at the clamp.
         """
         with quiet():
-            system = build_beam_system(self.beam, self.settings)
+            system = build_beam_system(self.beams, self.settings)
             mass = system.mbs.ComputeLinearizedSystem()[0]
         moved = np.zeros(len(mass))
         moved[system.first_coordinates + DEFLECTION] = 1.0
@@ -128,9 +131,9 @@ class FullBeam:
         self._check_round(set(actions.ways), "a stop that does not move")
         with quiet():
             started = time.perf_counter()
-            load = None if start is None else self.beam.points[start.load_at]
+            load = None if start is None else start.load_at
             driven = bool(actions.courses)
-            system = build_beam_system(self.beam, self.settings, self.contacts, matrix, load, self.laws, driven)
+            system = build_beam_system(self.beams, self.settings, self.contacts, matrix, load, self.laws, driven)
             solver = simulation_settings(self.settings, t_end)
             try:
                 force = 0.0 if start is None else self._start_force(start, system, solver)
@@ -139,7 +142,7 @@ class FullBeam:
             steps = solver.timeIntegration.numberOfSteps
             drive = Drive(system, actions, self.structure.coordinates, t_end, steps)
             offline_s = self._building_s + time.perf_counter() - started
-            kept = watched(system, self.beam, self.contacts, drive.forces)
+            kept = watched(system, self.contacts, drive.forces)
             recorder = Recorder(system.mbs, kept, self.settings.output_step, t_end, progress)
             acting = None if actions.none else drive
             integration = integrate(system.mbs, solver, recorder, self.settings.cpu_limit_s, acting)
@@ -150,7 +153,7 @@ class FullBeam:
             raise MultiPhiValueError(f"contact {min(names)!r}: got a circle, need {needed} or contact 'coordinate'")
 
     def _start_force(self, start: _Start, system: BeamSystem, solver: Any) -> float:
-        measured = system.coordinate(self.beam.points[start.measured_at])
+        measured = system.coordinate(start.measured_at)
         guess = start.displacement / self._flexibility(start.load_at, start.measured_at)
         return static_start(system, measured, start.displacement, guess, solver)
 
@@ -160,10 +163,7 @@ class FullBeam:
         if displacement is None or not math.isfinite(displacement) or displacement == 0:
             raise MultiPhiValueError(f"displacement: got {displacement!r}, need a finite value, not zero")
         for name, point in (("load_at", load_at), ("measured_at", measured_at)):
-            if point is None or point not in self.beam.points:
-                known = ", ".join(sorted(self.beam.points)) or "none"
-                raise MultiPhiValueError(f"{name}: got {point!r}, need one of: {known}")
-            if not np.any(self.structure.row(point)):
+            if not np.any(self.structure.row(self.beams.check_point(name, point))):
                 raise MultiPhiValueError(f"{name}: got {point!r}, held by the clamp; need a point that moves")
         return _Start(str(load_at), str(measured_at), displacement)
 
@@ -191,7 +191,7 @@ class FullBeam:
         force: float,
         offline_s: float,
     ) -> FullRun:
-        steps = Histories.recorded(recorder, self.beam, self.contacts, self.settings, actions.ways)
+        steps = Histories.recorded(recorder, tuple(self.beams.points), self.contacts, self.settings, actions.ways)
         grid = steps.at(_grid(steps.time[-1], self.settings))
         energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
         lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
@@ -226,7 +226,7 @@ class FullBeam:
             message=message,
             failed_at=0.0,
             time=none,
-            points=dict.fromkeys(self.beam.points, none),
+            points=dict.fromkeys(self.beams.points, none),
             contact_force=contacts,
             gaps=contacts,
             contact_intervals=dict.fromkeys(contacts, ()),
@@ -249,9 +249,9 @@ class _Start:
     displacement: float
 
 
-def _linearized(beam: Beam, settings: FullBeamSettings) -> LinearizedStructure:
-    system = build_beam_system(beam, settings)
-    points = {name: (system.nodes[system.node_at(x)], DEFLECTION) for name, x in beam.points.items()}
+def _linearized(beams: Beams, settings: FullBeamSettings) -> LinearizedStructure:
+    system = build_beam_system(beams, settings)
+    points = {name: (system.nodes[number], DEFLECTION) for name, number in system.points.items()}
     return linear_structure_from(system.mbs, points)[0]
 
 

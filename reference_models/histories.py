@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from multiphi_exudyn.beam import Beam
 from reference_models.actions import Way
-from reference_models.beam_system import AXIAL, DEFLECTION, BeamSystem
+from reference_models.beam_system import AXIAL, BeamSystem
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
 from reference_models.recorder import Recorder, Watched
@@ -40,24 +39,24 @@ class Histories:
     def recorded(
         cls,
         recorder: Recorder,
-        beam: Beam,
+        names: Sequence[str],
         contacts: tuple[PointContact, ...],
         settings: FullBeamSettings,
         ways: Mapping[str, Way],
     ) -> Histories:
-        """The recorded steps, up to the last one at which everything is finite."""
+        """The recorded steps, up to the last one at which everything is finite; names: of all points."""
         time, watched = np.array(recorder.times), np.array(recorder.watched)
         count = np.argmin(np.append(np.all(np.isfinite(watched), axis=1), False))
         columns = watched[:count].T
-        points = dict(zip(beam.points, columns, strict=False))
-        pairs = columns[len(points) :].reshape(len(contacts), 2, count)
+        points = dict(zip(names, columns, strict=False))
         gaps = {
-            contact.name: contact.of_distance(_distance(contact, settings, *pair))
-            for contact, pair in zip(contacts, pairs, strict=True)
+            contact.name: contact.of_distance(_distance(contact, settings, axial, contact.between(points)))
+            for contact, axial in zip(contacts, columns[len(points) :], strict=True)
         }
-        viscous = [contact for contact in contacts if contact.damping]
-        speeds = np.array(recorder.speeds).reshape(len(time), len(viscous))[:count].T
-        rates = {c.name: c.coefficient * speed for c, speed in zip(viscous, speeds, strict=True)}
+        moving = viscous_points(contacts)
+        speeds = np.array(recorder.speeds).reshape(len(time), len(moving))[:count].T
+        speed = dict(zip(moving, speeds, strict=True))
+        rates = {c.name: c.coefficient * c.between(speed) for c in contacts if c.damping}
         for name, way in ways.items():
             gaps[name] = gaps[name] - way.at(time[:count])
             if name in rates:
@@ -75,16 +74,17 @@ class Histories:
         return {name: CubicSpline(self.time, values)(time) for name, values in given.items()}
 
 
-def watched(system: BeamSystem, beam: Beam, contacts: Sequence[PointContact], forces: np.ndarray) -> Watched:
-    """What a Histories needs: deflections, then (axial, deflection) of contacts; speeds of viscous contacts."""
-    points = [system.coordinate(x) for x in beam.points.values()]
-    touching = [
-        system.coordinate(beam.points[contact.point], component)
-        for contact in contacts
-        for component in (AXIAL, DEFLECTION)
-    ]
-    viscous = [system.coordinate(beam.points[contact.point]) for contact in contacts if contact.damping]
+def watched(system: BeamSystem, contacts: Sequence[PointContact], forces: np.ndarray) -> Watched:
+    """What a Histories needs: deflections of all points, axial motion of contacts; speeds of points of viscous ones."""
+    points = [system.coordinate(name) for name in system.points]
+    touching = [system.coordinate(contact.point, AXIAL) for contact in contacts]
+    viscous = [system.coordinate(name) for name in viscous_points(contacts)]
     return Watched(np.array([*points, *touching], dtype=int), np.array(viscous, dtype=int), forces)
+
+
+def viscous_points(contacts: Sequence[PointContact]) -> list[str]:
+    """Points that viscous contacts act on, each once."""
+    return list(dict.fromkeys(name for contact in contacts if contact.damping for name in contact.direction))
 
 
 def _distance(

@@ -1,6 +1,8 @@
-"""A unilateral contact of one point of the beam, in the coordinates of the Exudyn model.
+"""A unilateral contact of a point of a beam with the ground or with another point, in the Exudyn model's coordinates.
 
     g = c w + gap,   lambda = k max(0, -g) along c:   a spring c^2 k behind a distance gap / |c|
+
+w is the deflection of the point, less that of the other one.
 
 With damping d, lambda = max(0, -k g - d g') where g < 0: it never pulls. A stop that moves adds its way to the gap.
 """
@@ -12,17 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.structure import At
+from reference_models.beams import Beams
 
 __all__ = ["PointContact", "point_and_coefficient", "point_contacts"]
 
 
 @dataclass(frozen=True)
 class PointContact:
-    """name; point of the beam; c; gap [m], k [N/m] and damping d [N s/m] of the contact as given."""
+    """name; point; c; gap [m], k [N/m], damping d [N s/m] of the contact as given; other: point it meets, or None."""
 
     name: str
     point: str
@@ -30,20 +32,32 @@ class PointContact:
     gap: float
     stiffness: float
     damping: float = 0.0
+    other: str | None = None
+
+    @property
+    def direction(self) -> dict[str, float]:
+        """h as coefficients of points."""
+        opposite = {} if self.other is None else {self.other: -self.coefficient}
+        return {self.point: self.coefficient} | opposite
+
+    def between(self, of_points: Mapping[str, np.ndarray]) -> np.ndarray:
+        """w, or its rate, from those of the points by name."""
+        own = of_points[self.point]
+        return own if self.other is None else own - of_points[self.other]
 
     @property
     def distance(self) -> float:
-        """Distance [m] the point may travel before it touches."""
+        """Distance [m] that w may grow towards the other before they touch."""
         return self.gap / abs(self.coefficient)
 
     @property
     def spring(self) -> float:
-        """Stiffness [N/m] against the point's own travel."""
+        """Stiffness [N/m] against w."""
         return self.stiffness * self.coefficient**2
 
     @property
     def above(self) -> bool:
-        """True for a stop on the +z side."""
+        """True for a stop, or another point, on the +z side."""
         return self.coefficient < 0
 
     def of_distance(self, distance: np.ndarray) -> np.ndarray:
@@ -67,22 +81,32 @@ class PointContact:
         return self.stiffness * np.minimum(0.0, gap) ** 2 / 2
 
 
-def point_contacts(beam: Beam, contacts: Sequence[UnilateralContact]) -> tuple[PointContact, ...]:
+def point_contacts(beams: Beams, contacts: Sequence[UnilateralContact]) -> tuple[PointContact, ...]:
     """The contacts as point contacts; raises MultiPhiValueError where a full beam cannot have them."""
     names = [contact.name for contact in contacts]
     if len(set(names)) < len(names):
         raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
-    return tuple(_point_contact(beam, contact) for contact in contacts)
+    return tuple(_point_contact(beams, contact) for contact in contacts)
 
 
-def _point_contact(beam: Beam, contact: UnilateralContact) -> PointContact:
+def _point_contact(beams: Beams, contact: UnilateralContact) -> PointContact:
     if contact.rigid:
         raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one (a penalty spring)")
-    point, coefficient = point_and_coefficient(f"contact {contact.name!r} direction", contact.direction)
-    if point not in beam.points:
-        known = ", ".join(sorted(beam.points)) or "none"
-        raise MultiPhiValueError(f"contact {contact.name!r} direction: got {point!r}, need one of: {known}")
-    return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping)
+    what = f"contact {contact.name!r} direction"
+    point, coefficient, other = _pair(what, contact.direction)
+    for name in (point,) if other is None else (point, other):
+        beams.check_point(what, name)
+    return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping, other)
+
+
+def _pair(what: str, direction: At) -> tuple[str, float, str | None]:
+    """Point and coefficient of a direction, and the point of the opposite coefficient, if it has two."""
+    if not isinstance(direction, Mapping) or len(direction) != 2:
+        return *point_and_coefficient(what, direction), None
+    (point, coefficient), (other, opposite) = direction.items()
+    if not (np.isfinite(coefficient) and coefficient != 0 and opposite == -coefficient):
+        raise MultiPhiValueError(f"{what}: got {direction!r}, need two points with opposite coefficients, not zero")
+    return point, float(coefficient), other
 
 
 def point_and_coefficient(what: str, direction: At) -> tuple[str, float]:

@@ -11,8 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
-from multiphi_exudyn.errors import MultiPhiValueError
+from reference_models.beams import Beams
 from reference_models.point_contact import point_and_coefficient
 
 __all__ = ["Law", "PointLaw", "point_laws"]
@@ -55,14 +54,12 @@ class PointLaw:
         return np.array([self.spring_force(w) for w in deflection.tolist()])
 
 
-def point_laws(beam: Beam, laws: Sequence[Law]) -> tuple[PointLaw, ...]:
+def point_laws(beams: Beams, laws: Sequence[Law]) -> tuple[PointLaw, ...]:
     """The laws on points; raises MultiPhiValueError where a full beam cannot have them."""
-    return tuple(_point_law(beam, law) for law in laws)
+    return tuple(_point_law(beams, law) for law in laws)
 
 
-def _point_law(beam: Beam, law: Law) -> PointLaw:
-    point, coefficient = point_and_coefficient(f"force law {law.name!r} at", law.at)
-    if point not in beam.points:
-        known = ", ".join(sorted(beam.points)) or "none"
-        raise MultiPhiValueError(f"force law {law.name!r} at: got {point!r}, need one of: {known}")
-    return PointLaw(point, coefficient, law)
+def _point_law(beams: Beams, law: Law) -> PointLaw:
+    what = f"force law {law.name!r} at"
+    point, coefficient = point_and_coefficient(what, law.at)
+    return PointLaw(beams.check_point(what, point), coefficient, law)

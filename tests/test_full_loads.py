@@ -198,12 +198,12 @@ class TestPointLoads:
         loads = [HarmonicLoad("tip", 2.0, 20.0), StopMotion("stop", Harmonic(1e-3, 30.0))]
         actions = actions_of(full.structure, full.contacts, loads, 0.1)
         with quiet():
-            system = build_beam_system(BEAM, full.settings, full.contacts, driven=True)
+            system = build_beam_system(full.beams, full.settings, full.contacts, driven=True)
         drive = Drive(system, actions, full.structure.coordinates, 0.1, 10)
         for t in (0.0, 0.03, 0.0337, 0.1):
             assert drive(system.mbs, t)
             force = system.mbs.GetObject(system.driver)["forceVector"]
-            assert force[system.coordinate(0.5)] == pytest.approx(2 * np.cos(40 * np.pi * t), abs=1e-12)
+            assert force[system.coordinate("tip")] == pytest.approx(2 * np.cos(40 * np.pi * t), abs=1e-12)
             assert np.count_nonzero(np.abs(force) > 1e-9) == 1
             offset = system.mbs.GetObjectParameter(system.stops["stop"].item, "offset")
             assert offset == pytest.approx(1e-3 * np.cos(60 * np.pi * t) - STOP.gap, abs=1e-15)
@@ -251,7 +251,7 @@ class TestGravityAndBase:
         full, found = run(lambda full: [BaseMotion(full.transverse, Smooth(lambda t: size * (1 - np.cos(omega * t))))],
                           kind=kind, step=1e-4, damped=False)  # fmt: skip
         with quiet():
-            system = build_beam_system(BEAM, full.settings)
+            system = build_beam_system(full.beams, full.settings)
             mass, stiffness, *_ = system.mbs.ComputeLinearizedSystem()
         deflections = system.first_coordinates + DEFLECTION
         held = deflections[0]

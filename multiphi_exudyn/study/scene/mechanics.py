@@ -1,4 +1,4 @@
-"""What a scene file describes, as mechanics: beam or matrices, contacts, force laws, damping, and what is assumed.
+"""What a scene file describes, as mechanics: beams or matrices, contacts, force laws, damping, and what is assumed.
 
 Errors of the mechanical objects get the file and the field they came from.
 """
@@ -25,6 +25,7 @@ from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, Ray
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
     BeamSpec,
+    BeamsStructure,
     CraigBamptonModel,
     DampingSpec,
     DisplacedStart,
@@ -44,6 +45,7 @@ from multiphi_exudyn.study.scene.scene_file import (
 from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+from reference_models.beams import Beams, as_beams
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 
 __all__ = ["Mechanics", "mechanics_of"]
@@ -54,7 +56,7 @@ Damping = Matrix | ModalDamping | RayleighDamping | None
 
 @dataclass(frozen=True)
 class Mechanics:
-    """A scene's structure, given as a beam or as matrices, with its contacts, its force laws and its damping.
+    """A scene's structure, given as beams or as matrices, with its contacts, its force laws and its damping.
 
     parameter_set: of the paper's rig, None for any other structure.
     assumptions: what the scene rests on beyond what is known, one sentence each.
@@ -62,7 +64,7 @@ class Mechanics:
 
     contacts: tuple[UnilateralContact, ...]
     damping: Damping
-    beam: Beam | None = None
+    beams: Beams | None = None
     matrices: LinearStructure | None = None
     parameter_set: str | None = None
     assumptions: tuple[str, ...] = field(default=())
@@ -71,8 +73,13 @@ class Mechanics:
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the structure's points."""
-        given = self.beam.points if self.beam is not None else _known(self.matrices).points
+        given: Mapping[str, object] = _known(self.matrices).points if self.beams is None else self.beams.points
         return tuple(given)
+
+    @property
+    def beam(self) -> Beam | None:
+        """The beam, where there is one and only one."""
+        return None if self.beams is None else self.beams.only
 
     @property
     def directions(self) -> int:
@@ -104,14 +111,17 @@ def _structure(scene: Scene, spec: StructureSpec) -> Mechanics:
         return Mechanics(
             contacts=(rig_contact(spec.support_stiffness),),
             damping=rig_damping(),
-            beam=rig_beam(spec.rig, clamp),
+            beams=as_beams(rig_beam(spec.rig, clamp)),
             parameter_set=spec.rig,
             assumptions=(*assumptions(spec.rig, clamp), *_scene_assumptions(scene, spec)),
         )
     if isinstance(spec, MatrixStructure):
         matrices = _at(scene, "structure", lambda: _matrices(scene.path.parent, spec))
         return Mechanics((), matrices.damping, matrices=matrices)
-    return Mechanics((), None, beam=_at(scene, "structure.beam", lambda: _beam(spec.beam)))
+    if isinstance(spec, BeamsStructure):
+        parts = {n: _at(scene, f"structure.beams.{n}", partial(_beam, part)) for n, part in spec.beams.items()}
+        return Mechanics((), None, beams=_at(scene, "structure", lambda: Beams(parts, spec.ties)))
+    return Mechanics((), None, beams=as_beams(_at(scene, "structure.beam", lambda: _beam(spec.beam))))
 
 
 def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
@@ -207,7 +217,7 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
 
 def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
     """Loads are what they say, name contacts there are, and every model can take them."""
-    loads = loads_of(scene, None if mechanics.beam is None else "")
+    loads = loads_of(scene, None if mechanics.beams is None else "")
     names = [contact.name for contact in mechanics.contacts]
     for i, load in enumerate(scene.file.loads):
         moved = [("contact", load.contact)] if isinstance(load, StopMotionSpec) else []
@@ -236,7 +246,7 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
             refuse(scene, "contacts", name, "a name of its own for every contact")
     _check_published(scene, mechanics)
     for i, model in enumerate(scene.file.models):
-        if isinstance(model, FullModel) and mechanics.beam is None:
+        if isinstance(model, FullModel) and mechanics.beams is None:
             refuse(scene, f"models[{i}].kind", "full", "another kind: matrices have no full model")
         if isinstance(model, CraigBamptonModel) and _is_sparse(mechanics):
             refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one takes dense matrices")
@@ -261,10 +271,17 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
             )
         if getattr(model, "loop", "numpy") == "compiled" and getattr(model, "contact", "") != "rigid":
             refuse(scene, field_name.replace("kind", "loop"), "compiled", "'numpy': viscous contacts are not compiled")
-    points = 1 if isinstance(contact.direction, str) else len(contact.direction)
-    if points > 1 and isinstance(model, (FullModel, CraigBamptonModel)):
-        needed = f"another kind: its contacts act on single points, {contact.name} on {points}"
+    factors = list(contact.direction.values()) if isinstance(contact.direction, Mapping) else [1.0]
+    if len(factors) > 1 and isinstance(model, CraigBamptonModel):
+        needed = f"another kind: its contacts act on single points, {contact.name} on {len(factors)}"
         refuse(scene, field_name, model.kind, needed)
+    if isinstance(model, FullModel) and len(factors) > 1:
+        if len(factors) > 2 or sum(factors) != 0 or not factors[0]:
+            needed = f"another kind: its contacts act on a point, or between two, {contact.name} on {contact.direction}"
+            refuse(scene, field_name, model.kind, needed)
+        if model.contact == "circle":
+            needed = f"'coordinate': a round support does not move, {contact.name} is between two points"
+            refuse(scene, field_name.replace("kind", "contact"), "circle", needed)
 
 
 def _check_published(scene: Scene, mechanics: Mechanics) -> None:
@@ -295,5 +312,5 @@ def _at(scene: Scene, place: str, build: Callable[[], T]) -> T:
 
 
 def _known(matrices: LinearStructure | None) -> LinearStructure:
-    assert matrices is not None, "a structure is a beam or matrices"
+    assert matrices is not None, "a structure is beams or matrices"
     return matrices

@@ -31,6 +31,7 @@ from multiphi_exudyn.study.scene.load_tables import LoadSpec
 __all__ = [
     "BeamSpec",
     "BeamStructure",
+    "BeamsStructure",
     "ContactSpec",
     "CraigBamptonModel",
     "DisplacedStart",
@@ -47,6 +48,10 @@ __all__ = [
     "StepwiseModel",
     "UserObjectModel",
 ]
+
+
+PartName = Annotated[str, Field(min_length=1, pattern=r"^[\w-]+$")]
+TieSpec = Annotated[dict[Name, NotZero], Field(min_length=1, max_length=2)]  # the sum is zero; of one: held
 
 
 class RigStructure(Table):
@@ -119,6 +124,13 @@ class BeamStructure(Table):
     beam: BeamSpec
 
 
+class BeamsStructure(Table):
+    """Several beams, along x each; the point "tip" of the beam "a" is "a.tip"."""
+
+    beams: Annotated[dict[PartName, BeamSpec], Field(min_length=1)]
+    ties: tuple[TieSpec, ...] = ()
+
+
 class MatrixFiles(Table):
     """One file for each matrix: .mtx, .mtx.gz, .npz of scipy.sparse, .npy."""
 
@@ -141,8 +153,9 @@ class MatrixStructure(Table):
 StructureSpec = Annotated[
     Annotated[RigStructure, Tag("<rig>")]
     | Annotated[BeamStructure, Tag("<beam>")]
+    | Annotated[BeamsStructure, Tag("<beams>")]
     | Annotated[MatrixStructure, Tag("<matrices>")],
-    by_key("rig", "beam", "matrices"),
+    by_key("rig", "beam", "beams", "matrices"),
 ]
 
 
@@ -236,12 +249,12 @@ class UserObjectModel(Table):
 
 
 class FullModel(Table):
-    """The full nonlinear Exudyn beam with contact elements."""
+    """The full nonlinear Exudyn beam, or beams, with contact elements."""
 
     kind: Literal["full"]
     name: Name
     beam: Literal["ancf", "geometrically-exact"] = "ancf"
-    elements: Annotated[int, Field(ge=1)]
+    elements: Annotated[int, Field(ge=1)]  # of each beam
     step: Positive  # s
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
     newton_tolerance: Positive = 1e-5  # relative and absolute

@@ -1,6 +1,6 @@
 """What all models of a scene share: one (M, C, K), the contacts and force laws, the start and the time grid.
 
-The structure is the linearisation of the reference's full beam, so a reduced model and its reference
+The structure is the linearisation of the reference's full beams, so a reduced model and its reference
 differ in nothing but the reduction, the geometric nonlinearity and the time integration.
 """
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.optimize
 
+from multiphi_exudyn.assemble import Assembly, assemble
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
@@ -35,15 +36,16 @@ from multiphi_exudyn.study.scene.scene_file import (
 )
 from multiphi_exudyn.study.scene.scene_loads import loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
+from reference_models.beams import Beams
 from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
 __all__ = ["ROUND_OFF", "Workbench", "prepare", "start_configuration"]
 
-_Mesh = tuple[
-    tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp, str | None, int
-]  # what discretised beams are kept by
+_Part = tuple[str, tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp]
+_Ties = tuple[tuple[tuple[str, float], ...], ...]
+_Mesh = tuple[tuple[_Part, ...], _Ties, str | None, int]  # what discretised beams are kept by
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
@@ -121,7 +123,7 @@ class Workbench:
     def _transverse(self) -> At | None:
         """Unit rigid-body motion along +z (n,) of a beam that has a load along it."""
         along = any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.scene.file.loads)
-        if self.mechanics.beam is None or not along:
+        if self.mechanics.beams is None or not along:
             return None
         return _transverse(*_mesh(self.scene, self.mechanics))
 
@@ -185,55 +187,67 @@ def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, flo
 
 
 def _mesh(scene: Scene, mechanics: Mechanics) -> _Mesh:
-    """The beam, and what discretises it: kind and elements of the reference, or of another full model."""
+    """The beams, and what discretises them: kind and elements of the reference, or of another full model."""
     full = [model for model in scene.models.values() if isinstance(model, FullModel)]
     named = [model for model in full if model.name == scene.file.comparison.reference]
     kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
-    beam = mechanics.beam
-    assert beam is not None, "a structure is a beam or matrices"
-    return tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp, kind, elements
+    beams = mechanics.beams
+    assert beams is not None, "a structure is beams or matrices"
+    parts = tuple(
+        (name, tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp)
+        for name, beam in beams.parts.items()
+    )
+    return parts, tuple(tuple(tie.items()) for tie in beams.ties), kind, elements
+
+
+def _beams(parts: tuple[_Part, ...], ties: _Ties) -> Beams:
+    named = {name: Beam(sections, dict(points), masses, clamp) for name, sections, points, masses, clamp in parts}
+    return Beams(named, tuple(dict(tie) for tie in ties))
 
 
 @functools.lru_cache(maxsize=KEPT_STRUCTURES)
 def _discretised(
-    sections: tuple[Section, ...],
-    points: tuple[tuple[str, float], ...],
-    masses: tuple[PointMass, ...],
-    clamp: Clamp,
-    kind: str | None,
-    elements: int,
+    parts: tuple[_Part, ...], ties: _Ties, kind: str | None, elements: int
 ) -> tuple[LinearStructure, float]:
-    """A beam as the linearised full beam of a kind, or without one as linear elements; seconds of the first time."""
+    """Beams as the linearised full beams of a kind, or without one as linear elements; seconds of the first time."""
     started = time.perf_counter()
-    beam = Beam(sections, dict(points), masses, clamp)
+    beams = _beams(parts, ties)
     if kind is None:
-        structure = planar_beam(beam, elements)
+        structure = _linear(beams, elements)
     else:
-        structure = FullBeam(beam, (), FullBeamSettings(kind=kind, elements=elements)).structure
+        structure = FullBeam(beams, (), FullBeamSettings(kind=kind, elements=elements)).structure
     return structure, time.perf_counter() - started
 
 
+def _linear(beams: Beams, elements: int) -> LinearStructure:
+    if beams.only is not None:
+        return planar_beam(beams.only, elements)
+    return assemble({name: planar_beam(beam, elements) for name, beam in beams.parts.items()}, beams.ties)
+
+
 @functools.lru_cache(maxsize=KEPT_STRUCTURES)
-def _transverse(
-    sections: tuple[Section, ...],
-    points: tuple[tuple[str, float], ...],
-    masses: tuple[PointMass, ...],
-    clamp: Clamp,
-    kind: str | None,
-    elements: int,
-) -> np.ndarray:
-    """e (n,) of a discretised beam; M e is the inertia of the whole beam, see FullBeam.transverse."""
-    beam = Beam(sections, dict(points), masses, clamp)
+def _transverse(parts: tuple[_Part, ...], ties: _Ties, kind: str | None, elements: int) -> np.ndarray:
+    """e (n,) of discretised beams; M e is the inertia of the whole beams, see FullBeam.transverse."""
+    beams = _beams(parts, ties)
     if kind is not None:
-        return FullBeam(beam, (), FullBeamSettings(kind=kind, elements=elements)).transverse
+        return FullBeam(beams, (), FullBeamSettings(kind=kind, elements=elements)).transverse
+    inertia = np.concatenate([_inertia(beam, elements) for beam in beams.parts.values()])
+    structure = _linear(beams, elements)
+    if isinstance(structure, Assembly):
+        inertia = structure.transformation.T @ inertia
+    return np.asarray(np.linalg.solve(structure.mass, inertia))
+
+
+def _inertia(beam: Beam, elements: int) -> np.ndarray:
+    """Of the free coordinates of a beam as linear elements, moved by 1 as a whole."""
     free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
     inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations take turns
-    held = [dof for dof, spring in enumerate((clamp.translation, clamp.rotation)) if math.isinf(spring)]
-    return np.asarray(np.linalg.solve(planar_beam(beam, elements).mass, np.delete(inertia, held)))
+    springs = (beam.clamp.translation, beam.clamp.rotation)
+    return np.delete(inertia, [dof for dof, spring in enumerate(springs) if math.isinf(spring)])
 
 
 def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
-    assert mechanics.beam is not None, "checked where the scene was loaded"
+    assert mechanics.beams is not None, "checked where the scene was loaded"
     settings = FullBeamSettings(
         kind=spec.beam,
         elements=spec.elements,
@@ -243,7 +257,7 @@ def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
         newton_tolerance=spec.newton_tolerance,
         output_step=scene.file.outputs.interval,
     )
-    return FullBeam(mechanics.beam, mechanics.contacts, settings, mechanics.force_laws)
+    return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws)
 
 
 def _interface(structure: LinearStructure, mechanics: Mechanics, outputs: Sequence[str]) -> tuple[str, ...]:
