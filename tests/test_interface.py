@@ -125,9 +125,22 @@ def test_spring_and_mass_on_a_point_converge_with_order_two_to_an_integrator(mat
 
 @pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf], ids=["compliant", "rigid"])
 def test_interface_coordinates_are_the_displacements_of_the_body_at_every_step(stiffness):
-    y, shown, events = run(chain(stiffness), STEP, spring_and_mass, interface={"m2": "m2", "m1": "m1", "m0": "m0"})
+    y, shown, events = run(chain(stiffness), STEP, spring_and_mass, interface={"m2": "m2", "m0": "m0"})
     assert len(events) >= 4
     assert np.max(np.abs(y - shown)) < 1e-12
+
+
+@pytest.mark.parametrize(("stiffness", "at"), [(STIFFNESS, "m2"), (STIFFNESS, "m1"), (math.inf, "m2")])
+def test_a_constant_load_on_an_interface_coordinate_is_the_native_load(stiffness, at):
+    def push(mbs, items):
+        mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"][at]), load=-5.0))
+
+    model = chain(stiffness)
+    native = mp.simulate(model, END, displacement=START, loads=[mp.ConstantLoad(at, -5.0)])
+    y, _, events = run(model, STEP, push, interface=(at,), matchedStepSize=STEP)
+    expected = native.at(at, np.minimum(np.arange(len(y)) * STEP, END))
+    assert len(events) == len(native.events) >= 4
+    assert np.linalg.norm(y[:, 0] - expected) < 1e-7 * np.linalg.norm(expected)
 
 
 def test_a_user_load_on_an_interface_coordinate_agrees_with_the_harmonic_load_to_1e_5():
@@ -167,9 +180,15 @@ def test_what_an_interface_cannot_hold_is_refused():
         (("m7",), mp.errors.MultiPhiValueError, "point: got 'm7'"),
         ({"none": np.zeros(3)}, mp.errors.MultiPhiValueError, "a row of zeros"),
         ({3: "m2"}, mp.errors.MultiPhiTypeError, "interface: got 3"),
+        ({"a": "m2", "b": {"m2": 2.0}}, mp.errors.MultiPhiValueError, "depend neither on each other"),
     ]:
         with pytest.raises(error, match=told):
             CreateMultiPhiBody(mbs, model, interface=interface)
+    with pytest.raises(mp.errors.MultiPhiValueError, match="'m1', need points that depend"):
+        CreateMultiPhiBody(mbs, chain(math.inf), interface=("m1",))
+    few = mp.MultiPhiModel(model.structure, model.contacts, modes=1)
+    with pytest.raises(mp.errors.MultiPhiValueError, match="2 points that 1 modes do not tell apart"):
+        CreateMultiPhiBody(mbs, few, interface=("m0", "m2"))
     with pytest.raises(mp.errors.MultiPhiValueError, match="need constant ones"):
         CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
     with pytest.raises(ValueError, match="need TrapezoidalIndex2"):

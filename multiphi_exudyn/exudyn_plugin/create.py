@@ -71,7 +71,7 @@ def CreateMultiPhiBody(
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
-    rows = interface_rows(model.structure, interface)
+    rows = interface_rows(model.structure, model.contacts, interface)
     body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
     if rows and isinstance(body, DrivenBody):
         raise MultiPhiValueError("loads: got some that vary in time, need constant ones with interface coordinates")

@@ -8,24 +8,35 @@ level, c (m,) its asymptotic configuration there [m]; f (m,) what acts on y [N],
 ObjectConnectorCoordinateVector per point holds the equation. At a transition R and c are exchanged and y, y', y'' are
 written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
 velocity (stepped_level.py).
+
+Within the step of an event the f of its mean acts before the event, that of its end after it: of second order for a
+force that varies (single halvings of the step gain between 1.5 and 2.4 powers: where in its step an event falls changes with
+the step), exact for one that does not. f comes from p, so the rows must be independent in every level; a point
+that rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not. A mass tied
+to y by a constraint is no part of an impact: it meets a rigid contact after a step with the velocity it had before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector
 
+from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.structure import At, LinearStructure
 
 __all__ = ["Interface", "interface_rows"]
 
+INDEPENDENT = 1e-9  # of the largest singular value of rows of unit length: less is rounding of their coefficients
 
-def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[str, At]) -> dict[str, np.ndarray]:
+
+def interface_rows(
+    structure: LinearStructure, contacts: Iterable[UnilateralContact], given: Iterable[str] | Mapping[str, At]
+) -> dict[str, np.ndarray]:
     """Rows (n,) by the names of interface coordinates, from names of points or {name: point or row}."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
@@ -37,7 +48,21 @@ def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[st
     for name, row in rows.items():
         if not np.any(row):
             raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
+    held = [structure.row(contact.direction) for contact in contacts if contact.rigid]
+    if rows and _rank([*rows.values(), *held]) < len(rows) + _rank(held):
+        raise MultiPhiValueError(
+            f"interface: got {', '.join(map(repr, rows))}, need points that depend neither on each other nor on "
+            "those of rigid contacts (compliant ones may act there)"
+        )
     return rows
+
+
+def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
+    """How many rows (n,) are independent."""
+    if len(rows) == 0:
+        return 0
+    lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+    return int(np.linalg.matrix_rank(rows / np.where(lengths > 0, lengths, 1), rtol=INDEPENDENT))
 
 
 class Interface:
@@ -83,6 +108,11 @@ class Interface:
             level = stepped.loaded.level
             rows = np.zeros((len(self._rows), stepped.size))
             rows[:, : level.modes] = self._rows @ level.shapes
+            if _rank(rows) < len(rows):
+                raise MultiPhiValueError(
+                    f"interface of {self._name!r}: got {len(rows)} points that {level.modes} modes do not tell "
+                    f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
+                )
             offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
             self._known[stepped.closed] = rows, offset
         return self._known[stepped.closed]
