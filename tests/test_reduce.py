@@ -114,14 +114,17 @@ def test_a_load_out_of_balance_is_a_constant_load_and_the_fall_to_the_floor_is_e
 def test_the_report_names_what_was_taken_and_what_was_left_out():
     system = mass_between_limit_stops(friction=1.5)
     timed = eii.LoadCoordinate(
-        name="timed", markerNumber=system.markers[1], load=3.0, loadUserFunction=lambda mbs, t, load: load * t
+        name="timed",
+        markerNumber=system.markers[1],
+        load=3.0,
+        loadUserFunction=lambda mbs, t, load: load * mbs.systemData.GetTime(),
     )
     system.mbs.AddLoad(timed)
     system.mbs.Assemble()
     reduction = reduce(system.mbs)
     assert [(item.name, reason) for item, reason in reduction.left_out] == [
         ("slide", "friction"),
-        ("timed", "load by a user function"),
+        ("timed", "its user function is none of time alone (it reads mbs.systemData)"),
     ]
     assert reduction.loads == ()
     assert "contacts slide.upper, slide.lower, 10000 N/m and 10 N s/m" in reduction.report

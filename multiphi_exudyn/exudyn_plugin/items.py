@@ -1,0 +1,167 @@
+"""Items of an Exudyn system, as GetObject and GetLoad tell them, and what a reduction makes of each.
+
+Contacts of a model are ObjectContactCoordinate with a linear law and the limit stops of
+ObjectConnectorCoordinateSpringDamperExt; everything else is a matrix, a constraint, a load, or left out with a reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "Item",
+    "has_contact",
+    "has_stops",
+    "left_out_objects",
+    "load_item",
+    "rough_parameters",
+    "taken_objects",
+    "user_function",
+    "value_key",
+]
+
+_EXT = "ConnectorCoordinateSpringDamperExt"
+_FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor", "stickingStiffness")
+_LINEAR = {"Mass1D", "RotationalMass1D", "MassPoint", "MassPoint2D", "ConnectorCoordinateSpringDamper", _EXT}
+_LINEAR |= {"GenericODE2"}
+_CONSTRAINTS = ("Joint", "ConnectorDistance")
+_COORDINATE_CONSTRAINTS = {"ConnectorCoordinate", "ConnectorCoordinateVector"}
+
+
+@dataclass(frozen=True)
+class Item:
+    """One item of the system: its name, index among objects or loads, type, and what it became."""
+
+    name: str
+    index: int
+    type: str
+    became: str = ""
+
+
+def has_stops(item: Mapping[str, Any]) -> bool:
+    """True for an object with limit stops in use."""
+    return item["objectType"] == _EXT and item["useLimitStops"] and item["limitStopsStiffness"] > 0
+
+
+def has_contact(item: Mapping[str, Any]) -> bool:
+    """True for an active object that gives the model one contact or two."""
+    return _is_active(item) and (has_stops(item) or (_is_contact(item) and not _refusal(item)))
+
+
+def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Parameters that take contact and friction out of an object, and their values without."""
+    if _is_contact(item) and _is_active(item):
+        return [("activeConnector", False)]
+    if item["objectType"] != _EXT:
+        return []
+    return [("useLimitStops", False), *((name, 0.0) for name in _FRICTION)]
+
+
+def user_function(item: Mapping[str, Any]) -> str:
+    """Key of an item's first user function, empty without one."""
+    return next((key for key, value in item.items() if "UserFunction" in key and value), "")
+
+
+def value_key(load: Mapping[str, Any]) -> str:
+    """Key of a load's value."""
+    return "load" if "load" in load else "loadVector"
+
+
+def taken_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> Iterator[Item]:
+    """Objects of the model; contacts: the names of its contacts."""
+    for i, item in enumerate(objects):
+        if _is_active(item) and (not _is_contact(item) or item["name"] in contacts):
+            yield _object_item(i, item, _became(item, contacts))
+
+
+def left_out_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> Iterator[tuple[Item, str]]:
+    """Objects that are no part of the model, or not as a whole, with the reason."""
+    for i, item in enumerate(objects):
+        reason = _reason(item, contacts)
+        if reason:
+            yield _object_item(i, item), reason
+
+
+def load_item(index: int, load: Mapping[str, Any], became: str = "") -> Item:
+    return Item(load["name"], index, f"Load{load['loadType']}", became)
+
+
+def _object_item(index: int, item: Mapping[str, Any], became: str = "") -> Item:
+    return Item(item["name"], index, f"Object{item['objectType']}", became)
+
+
+def _is_active(item: Mapping[str, Any]) -> bool:
+    return bool(item.get("activeConnector", True))
+
+
+def _is_contact(item: Mapping[str, Any]) -> bool:
+    """True for a contact object of any law; limit stops are none."""
+    return str(item["objectType"]).startswith("Contact")
+
+
+def _is_constraint(item: Mapping[str, Any]) -> bool:
+    kind = str(item["objectType"])
+    return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
+
+
+def _refusal(item: Mapping[str, Any]) -> str:
+    """Why an active contact object is no unilateral spring; empty if it is one."""
+    if item["objectType"] != "ContactCoordinate":
+        return "its gap is no linear function of coordinates"
+    if item["impactModel"] != 0:
+        return f"impact model {item['impactModel']}, need 0"
+    if item["contactStiffnessExponent"] != 1.0:
+        return f"stiffness exponent {item['contactStiffnessExponent']:g}, need 1"
+    if not item["contactStiffness"] > 0:
+        return f"contact stiffness {item['contactStiffness']:g}, need a value > 0"
+    return ""
+
+
+def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
+    """Why an object, or a part of it, is left out; empty if it is not."""
+    if not _is_active(item):
+        return "not active"
+    if _is_contact(item) and item["name"] not in contacts:
+        return _refusal(item) or "constraints hold its gap"
+    if has_stops(item) and not _stops(item, contacts):
+        return "constraints hold the gaps of its limit stops"
+    if item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION):
+        return "friction"
+    if _is_constraint(item) and (user_function(item) or _prescribes_velocity(item)):
+        return "the motion it prescribes; its coordinate is held where it is"
+    return ""
+
+
+def _prescribes_velocity(item: Mapping[str, Any]) -> bool:
+    return bool(item.get("velocityLevel", False)) and bool(item.get("offset", 0.0))
+
+
+def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
+    if _is_contact(item):
+        return f"contact, {item['contactStiffness']:g} N/m{_damper(item['contactDamping'])}"
+    if item["objectType"] == "Ground":
+        return "ground"
+    if _is_constraint(item):
+        return "constraint, its directions taken out"
+    stops = _stops(item, contacts)
+    if not stops:
+        return _matrices(item)
+    law = f"{item['limitStopsStiffness']:g} N/m{_damper(item['limitStopsDamping'])}"
+    return f"{_matrices(item)}; contacts {', '.join(stops)}, {law}"
+
+
+def _stops(item: Mapping[str, Any], contacts: Collection[str]) -> list[str]:
+    """Names of the contacts that an object's limit stops became."""
+    return [name for name in (f"{item['name']}.upper", f"{item['name']}.lower") if name in contacts]
+
+
+def _matrices(item: Mapping[str, Any]) -> str:
+    if user_function(item):
+        return "its user function linearised at the current state"
+    return "its matrices" if item["objectType"] in _LINEAR else "linearised at the current state"
+
+
+def _damper(damping: float) -> str:
+    return f" and {damping:g} N s/m, which does not pull where it opens as Exudyn's does" if damping else ""
