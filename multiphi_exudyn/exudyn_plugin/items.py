@@ -60,8 +60,9 @@ def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
 
 
 def user_function(item: Mapping[str, Any]) -> str:
-    """Key of an item's first user function, empty without one."""
-    return next((key for key, value in item.items() if "UserFunction" in key and value), "")
+    """Key of an item's first user function that is not for graphics, empty without one."""
+    keys = (key for key, value in item.items() if "UserFunction" in key and value)
+    return next((key for key in keys if not key.startswith("V")), "")
 
 
 def value_key(load: Mapping[str, Any]) -> str:
@@ -131,6 +132,8 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return "friction"
     if _is_constraint(item) and (user_function(item) or _prescribes_velocity(item)):
         return "the motion it prescribes; its coordinate is held where it is"
+    if user_function(item):
+        return "what its user function does away from the current state"
     return ""
 
 
