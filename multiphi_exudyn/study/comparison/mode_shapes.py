@@ -42,12 +42,18 @@ class LevelModes:
 
 
 def level_modes(bench: Workbench) -> tuple[LevelModes, ...]:
-    """The open level and the one with every contact closed; none for matrices, which have no x."""
+    """The open level and the one with every contact closed; none for matrices or several beams, which have no one x.
+
+    Of contacts that cannot all be closed and rigid, each has its level: a stop below and one above the same point.
+    """
     beam = bench.mechanics.beam
     if beam is None:
         return ()
-    closed = tuple(contact.name for contact in bench.mechanics.contacts)
-    return tuple(_level_modes(bench, beam, each) for each in dict.fromkeys([(), closed]))
+    names = tuple(contact.name for contact in bench.mechanics.contacts)
+    rows = np.array([bench.structure.row(contact.direction) for contact in bench.mechanics.contacts])
+    together = not names or np.linalg.matrix_rank(rows) == len(names)
+    closed = [names] if together else [(name,) for name in names]
+    return tuple(_level_modes(bench, beam, each) for each in dict.fromkeys([(), *closed]))
 
 
 def _level_modes(bench: Workbench, beam: Beam, closed: tuple[str, ...]) -> LevelModes:

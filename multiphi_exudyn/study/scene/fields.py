@@ -21,6 +21,7 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
+    "numbered",
     "place_in_words",
 ]
 
@@ -54,6 +55,11 @@ def by_key(*keys: str) -> Discriminator:
 
     needed = "a table with the field " + " or ".join(keys)
     return Discriminator(choose, custom_error_type="form", custom_error_message=needed)
+
+
+def numbered(name: str, i: int) -> str:
+    """The name of the i-th of a row."""
+    return name.replace("{i}", str(i))
 
 
 def place_in_words(at: str | Mapping[str, float]) -> str:

@@ -22,6 +22,7 @@ from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
 from multiphi_exudyn.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.study.scene.fields import numbered
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
     BeamSpec,
@@ -34,6 +35,7 @@ from multiphi_exudyn.study.scene.scene_file import (
     MatrixFiles,
     MatrixStructure,
     ModalDampingSpec,
+    PointRow,
     RectangleSection,
     ReducedModel,
     RigStructure,
@@ -92,7 +94,8 @@ def mechanics_of(scene: Scene) -> Mechanics:
     mechanics = _structure(scene, scene.file.structure)
     own = tuple(
         _at(scene, f"contacts[{i}]", partial(UnilateralContact, **spec.model_dump(exclude_defaults=True)))
-        for i, spec in enumerate(scene.file.contacts)
+        for i, row in enumerate(scene.file.contacts)
+        for spec in row.row
     )
     laws = tuple(_at(scene, f"force_laws[{i}]", partial(law_of, spec)) for i, spec in enumerate(scene.file.force_laws))
     mechanics = replace(mechanics, contacts=mechanics.contacts + own, force_laws=laws)
@@ -149,10 +152,21 @@ def _assumed_start(size: str, load_at: str) -> str:
 def _beam(spec: BeamSpec) -> Beam:
     return Beam(
         [_section(section) for section in spec.sections],
-        spec.points,
+        dict(_points(spec)),
         [PointMass(mass.at, mass.mass, mass.inertia) for mass in spec.masses],
         Clamp(spec.clamp.translation, spec.clamp.rotation),
     )
+
+
+def _points(spec: BeamSpec) -> Iterator[tuple[str, float]]:
+    for name, at in spec.points.items():
+        if not isinstance(at, PointRow):
+            yield name, at
+        elif "{i}" not in name:
+            raise MultiPhiValueError(f"points: got the name {name!r} for {at.count} points, need one with {{i}}")
+        else:
+            places = np.linspace(at.first, at.last, at.count).tolist()
+            yield from ((numbered(name, i), x) for i, x in enumerate(places, start=1))
 
 
 def _section(spec: SectionSpec) -> Section:
@@ -201,9 +215,9 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
         named["start.measured_at"] = file.start.measured_at
     for group in ("points", "judged_points"):
         named |= {f"outputs.{group}[{i}]": name for i, name in enumerate(getattr(file.outputs, group))}
-    for i, contact in enumerate(file.contacts):
-        names = [contact.direction] if isinstance(contact.direction, str) else contact.direction
-        named |= {f"contacts[{i}].direction": name for name in names}
+    places = [(i, spec.direction) for i, row in enumerate(file.contacts) for spec in row.row]
+    for i, at in places:
+        named |= {f"contacts[{i}].direction": name for name in ([at] if isinstance(at, str) else at)}
     for i, law in enumerate(file.force_laws):
         named |= {f"force_laws[{i}].at": name for name in ([law.at] if isinstance(law.at, str) else law.at)}
     for i, load in enumerate(file.loads):

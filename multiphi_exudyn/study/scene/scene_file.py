@@ -24,6 +24,7 @@ from multiphi_exudyn.study.scene.fields import (
     Stiffness,
     Table,
     by_key,
+    numbered,
 )
 from multiphi_exudyn.study.scene.law_tables import LawSpec
 from multiphi_exudyn.study.scene.load_tables import LoadSpec
@@ -41,6 +42,7 @@ __all__ = [
     "MatrixFiles",
     "MatrixStructure",
     "ModalDampingSpec",
+    "PointRow",
     "RectangleSection",
     "ReducedModel",
     "RigStructure",
@@ -109,11 +111,19 @@ SectionSpec = Annotated[
 ]
 
 
+class PointRow(Table):
+    """``count`` points at equal distances; "{i}" in their name stands for 1, 2, ... count."""
+
+    first: Finite
+    last: Finite
+    count: Annotated[int, Field(ge=2)]
+
+
 class BeamSpec(Table):
     """A straight planar beam in full."""
 
     sections: Annotated[tuple[SectionSpec, ...], Field(min_length=1)]
-    points: Annotated[dict[Name, Finite], Field(min_length=1)]
+    points: Annotated[dict[Name, Finite | PointRow], Field(min_length=1)]
     masses: tuple[MassSpec, ...] = ()
     clamp: ClampSpec = ClampSpec()
 
@@ -160,13 +170,24 @@ StructureSpec = Annotated[
 
 
 class ContactSpec(Table):
-    """One unilateral contact: g = direction . x + gap."""
+    """A contact, g = direction . x + gap, or ``count`` of them: "{i}" in the names stands for 1, 2, ... count."""
 
     name: Name
     direction: Place
     gap: Finite
     stiffness: Stiffness
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
+    count: Annotated[int, Field(ge=1)] = 1
+
+    @property
+    def row(self) -> tuple[ContactSpec, ...]:
+        """The contacts one by one."""
+        return tuple(self._numbered(i) for i in range(1, self.count + 1))
+
+    def _numbered(self, i: int) -> ContactSpec:
+        own, at = numbered(self.name, i), self.direction
+        place = numbered(at, i) if isinstance(at, str) else {numbered(name, i): c for name, c in at.items()}
+        return self.model_copy(update={"name": own, "direction": place, "count": 1})
 
 
 class DisplacedStart(Table):
