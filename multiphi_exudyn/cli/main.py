@@ -1,4 +1,4 @@
-"""Command line: ``multiphi-exudyn compare | budget | needs | study | stability | scenes | studies``.
+"""Command line: ``multiphi-exudyn compare | animate | budget | needs | study | stability | scenes | studies``.
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from multiphi_exudyn.cli.animate_command import run_animate
 from multiphi_exudyn.cli.budget_command import run_budget
 from multiphi_exudyn.cli.compare_command import run_compare
 from multiphi_exudyn.cli.needs_command import run_needs
@@ -58,6 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(given: argparse.Namespace) -> bool:
     if given.command == "compare":
         return run_compare(given.scene, given.t_end, given.modes, given.out)
+    if given.command == "animate":
+        return run_animate(given.scene, given.t_end, given.model, given.reference, given.slow, given.out)
     if given.command == "budget":
         return run_budget(given.scene, given.t_end, given.modes, given.out)
     if given.command == "needs":
@@ -80,10 +83,11 @@ class _OneLineParser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="{compare,budget,needs,study,stability,scenes,studies}"
+        dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,scenes,studies}"
     )
     compare = commands.add_parser("compare", help="run all models of a scene and write a report")
     _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
+    _animate_options(commands.add_parser("animate", help="show a reduced model and the reference side by side, moving"))
     budget = commands.add_parser("budget", help="tell where the difference of a scene's reduced and full model is from")
     _scene_options(budget, "the truncated models instead of the scene's")
     needs = commands.add_parser("needs", help="tell what reduced runs take: levels, coordinates, packages, memory")
@@ -96,10 +100,24 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
-    parser.add_argument("scene", metavar="SCENE", help="a shipped scene (see: scenes) or a TOML file")
-    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] instead of the scene's")
+    _scene_option(parser)
     parser.add_argument("--modes", type=_count, metavar="R", help=f"number of modes of {whose}")
     _folder_option(parser, "SCENE")
+
+
+def _animate_options(parser: argparse.ArgumentParser) -> None:
+    _scene_option(parser)
+    parser.add_argument("--model", metavar="NAME", help="the reduced model (default: the scene's first)")
+    parser.add_argument("--reference", metavar="NAME", help="what it is shown beside (default: the scene's reference)")
+    parser.add_argument("--slow", type=_factor, metavar="FACTOR", help="how many times slower than it happens")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.gif", help="the animation (default: multiphi-SCENE/animation.gif)"
+    )
+
+
+def _scene_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="a shipped scene (see: scenes) or a TOML file")
+    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] instead of the scene's")
 
 
 def _study_options(parser: argparse.ArgumentParser) -> None:
@@ -126,12 +144,20 @@ def _folder_option(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def _time(text: str) -> float:
+    return _positive(text, "a time > 0 in s")
+
+
+def _factor(text: str) -> float:
+    return _positive(text, "a factor > 0")
+
+
+def _positive(text: str, need: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"got {text!r}, need a time > 0 in s")
+        raise argparse.ArgumentTypeError(f"got {text!r}, need {need}")
     return value
 
 

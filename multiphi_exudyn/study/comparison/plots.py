@@ -1,4 +1,4 @@
-"""The report's pictures, from the data of a comparison; the only module that needs matplotlib.
+"""The report's pictures, from the data of a comparison; nothing is computed here.
 
 Every function returns a Figure. One colour per model in all of them (Okabe and Ito's colour-blind-safe
 set), the reference black, its coarser copy and the other full runs grey. Grey areas: the reference is in
@@ -24,7 +24,7 @@ from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.running.runs import ModelRun
 
-__all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figure", "mode_figure", "png"]
+__all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figure", "mode_figure", "panels", "png"]
 
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#8A6D00", "#7F3C8D")
 REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
@@ -68,7 +68,7 @@ def styles(comparison: Comparison) -> dict[str, Style]:
 
 def history_figure(comparison: Comparison, point: str) -> Figure:
     """A point's history, its detail in the first contact, and its difference to the reference."""
-    figure, (whole, detail, difference) = _figure(9.0, 3, heights=(1.0, 1.2, 1.0))
+    figure, (whole, detail, difference) = panels(9.0, 3, heights=(1.0, 1.2, 1.0))
     shown = [comparison.reference, *pictured(comparison)]
     _lines(whole, comparison, shown, point, per_second=1.0)
     whole.set_xlim(0, comparison.bench.t_end)
@@ -83,7 +83,7 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
 
 def error_time_figure(comparison: Comparison) -> Figure:
     """Worst NRMSE of the judged points against online time, with the reference's own uncertainty."""
-    figure, (axes,) = _figure(4.6, 1)
+    figure, (axes,) = panels(4.6, 1)
     until = comparison.headline_window
     style = styles(comparison)
     nearby = comparison.cheapest[1:]
@@ -116,7 +116,7 @@ def mode_figure(levels: Sequence[LevelModes]) -> Figure:
 
 def energy_figure(comparison: Comparison) -> Figure:
     """Energy over time, and where it is at the end."""
-    figure, (curves, bars) = _figure(7.6, 2, heights=(1.0, 1.1))
+    figure, (curves, bars) = panels(7.6, 2, heights=(1.0, 1.1))
     style = styles(comparison)
     for run in [comparison.reference, *pictured(comparison)]:
         if len(run.energy):
@@ -135,7 +135,7 @@ def energy_figure(comparison: Comparison) -> Figure:
 def contact_figure(comparison: Comparison, contact: str) -> Figure:
     """Contact intervals of all models under each other, whole and in the first contact phase."""
     runs = [run for run in comparison.runs.values() if run.ok]
-    figure, both = _figure(1.6 + 0.46 * len(runs), 2, heights=(1, 1))
+    figure, both = panels(1.6 + 0.46 * len(runs), 2, heights=(1, 1))
     style = styles(comparison)
     for axes in both:
         for row, run in enumerate(runs):
@@ -188,7 +188,8 @@ def _canvas(height: float) -> Figure:
     return figure
 
 
-def _figure(height: float, rows: int, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
+def panels(height: float, rows: int, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
+    """Panels under each other in a figure of a given height [inches]; heights: their ratios."""
     figure = _canvas(height)
     axes = list(figure.subplots(rows, 1, squeeze=False, height_ratios=heights)[:, 0])
     for each in axes:

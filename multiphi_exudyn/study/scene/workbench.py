@@ -16,7 +16,7 @@ import numpy as np
 import scipy.optimize
 
 from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, beam_nodes, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
@@ -41,7 +41,7 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ROUND_OFF", "Workbench", "prepare", "start_configuration"]
+__all__ = ["ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration"]
 
 _Part = tuple[str, tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp]
 _Ties = tuple[tuple[tuple[str, float], ...], ...]
@@ -177,6 +177,12 @@ def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
             f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
         )
     return model.static_equilibrium({start.load_at: root.root * needed})
+
+
+def mesh_nodes(scene: Scene, mechanics: Mechanics) -> np.ndarray:
+    """Node positions (k,) [m] of the mesh that the structure of a scene's one beam is made from."""
+    assert mechanics.beam is not None, "checked by who asks"
+    return beam_nodes(mechanics.beam, _mesh(scene, mechanics)[-1])
 
 
 def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:

@@ -1,0 +1,46 @@
+"""``multiphi-exudyn animate``: a scene's reduced model and its reference beside each other, as a GIF in slow motion."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.study.comparison.animation import frame_count, frames, gif
+from multiphi_exudyn.study.comparison.film import film_of, run_stage, stage_of
+from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.scene.scenes import load_scene
+
+__all__ = ["run_animate"]
+
+BAR_DELAY = 2.0  # s before a progress bar appears
+
+
+def run_animate(
+    source: str, t_end: float | None, model: str | None, reference: str | None, slow: float | None, out: Path | None
+) -> bool:
+    """Run two models of a scene and write the GIF; True if both of them ran, False, and no file, if one failed."""
+    scene = load_scene(source, t_end=t_end)
+    stage = stage_of(scene, model, reference, slow)
+    file = _file(out or Path(f"multiphi-{scene.name}") / "animation.gif")
+    runs = run_stage(stage, progress=sys.stderr.isatty())
+    failed = {name: run.message for name, run in runs.items() if not run.ok}
+    for name, message in failed.items():
+        print(f"{name}: failed, {message}")
+    if failed:
+        return False
+    film = film_of(stage, runs)
+    count = frame_count(film)
+    with tqdm(frames(film), total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as images:
+        write_whole(file, gif(images, count))
+    print(f"{count} frames, {film.slow:g} times slower\n{file}")
+    return True
+
+
+def _file(path: Path) -> Path:
+    """The GIF to be written, in a folder there is."""
+    if path.suffix.lower() != ".gif" or path.is_dir():
+        raise MultiPhiValueError(f"--out: got {str(path)!r}, need the name of a .gif file")
+    return results_folder(path.parent) / path.name
