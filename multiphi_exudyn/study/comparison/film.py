@@ -165,7 +165,7 @@ def _slow_motion(bench: Workbench) -> float:
 def _checked(slow: float, t_end: float) -> float:
     least, most = 2 / (FRAME_RATE * t_end), MOST_FRAMES / (FRAME_RATE * t_end)
     if not least <= slow <= most:
-        raise MultiPhiValueError(f"--slow: got {slow:g}, need {least:.3g} to {most:.3g} for {t_end:g} s")
+        raise MultiPhiValueError(f"--slow: got {slow:g}, need {least:.4g} to {most:.4g} for {t_end:g} s")
     return slow
 
 
