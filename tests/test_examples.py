@@ -6,6 +6,7 @@ import math
 import sys
 from pathlib import Path
 
+import exudyn as exu
 import numpy as np
 import pytest
 
@@ -90,3 +91,15 @@ def test_meshed_cantilever(capsys, tmp_path):
     assert len(fine.trajectory.events) == len(beam.trajectory.events) == 12
     assert capsys.readouterr().out.count("12 events") == 2
     assert picture.stat().st_size > 10_000
+
+
+def test_draw_body(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(exu.config, "printToConsole", False)
+    example = load("draw_body")
+    start, later = np.vsplit(example.main().astype(int), 2)
+    assert start.shape == (example.WINDOW[1], example.WINDOW[0], 3)
+    red, green, blue = np.moveaxis(np.array([start, later]), -1, 0)
+    orange = np.sum((red > 150) & (green > 0.4 * red) & (green < 0.7 * red) & (blue < 0.4 * red), axis=(1, 2))
+    assert orange[0] == 0 < orange[1]
+    assert (tmp_path / "body_in_exudyn.png").stat().st_size > 10_000
