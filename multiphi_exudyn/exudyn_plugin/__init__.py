@@ -9,6 +9,7 @@ from multiphi_exudyn.exudyn_plugin.binding import bind
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
 from multiphi_exudyn.exudyn_plugin.drawing import Drawing
+from multiphi_exudyn.exudyn_plugin.fem_interface import linear_structure_from_fem
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.reduce import Item, Reduction, reduce
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
@@ -23,6 +24,7 @@ __all__ = [
     "Reduction",
     "body_histories",
     "linear_structure_from",
+    "linear_structure_from_fem",
     "reduce",
 ]
 
