@@ -54,11 +54,11 @@ def test_a_point_is_the_displacement_of_its_node_and_of_its_set_the_mean(fem, ba
     corner = int(np.argmax(np.sum(basis.mesh.p, axis=0)))
     places = {"corner": (corner, 2), "end": ("end", 2), "axial": ("end", 0)}
     structure = linear_structure_from_fem(fem, "clamp", places)
-    strain, turn = 1e-3, 2e-3  # u_x = strain x, u_z = turn y
-    field = np.column_stack([strain * basis.mesh.p[0], 0 * basis.mesh.p[0], turn * basis.mesh.p[1]])
+    strain, turn = 1e-3, 2.0  # u_x = strain x, u_z = turn y^2
+    field = np.column_stack([strain * basis.mesh.p[0], 0 * basis.mesh.p[0], turn * basis.mesh.p[1] ** 2])
     x = field[basis.mesh.p[0] > 0].ravel()
-    assert structure.row("corner") @ x == pytest.approx(turn * 0.02, rel=1e-13)
-    assert structure.row("end") @ x == pytest.approx(turn * 0.01, rel=1e-13)
+    assert structure.row("corner") @ x == pytest.approx(turn * 4e-4, rel=1e-13)
+    assert structure.row("end") @ x == pytest.approx(turn * 1.5e-4, rel=1e-13)
     assert structure.row("axial") @ x == pytest.approx(strain * LENGTH, rel=1e-13)
 
 

@@ -56,7 +56,7 @@ def _matrices(fem: Any) -> tuple[Any, Any]:
         raise MultiPhiValueError(f"fem: got nodes of the types {list(nodes)}, need ['Position']")
     size = COMPONENTS * len(nodes["Position"])
     for name in ("massMatrix", "stiffnessMatrix"):
-        matrix = getattr(fem, name, None)
+        matrix: Any = getattr(fem, name, None)
         if not scipy.sparse.issparse(matrix):
             raise MultiPhiTypeError(f"fem.{name}: got {type(matrix).__name__}, need a scipy.sparse matrix")
         if matrix.shape != (size, size):
