@@ -159,13 +159,13 @@ def _add_beam(mbs: Any, beam: Beam, settings: FullBeamSettings, ground: Any) -> 
 
 
 def _add_tie(mbs: Any, tie: Tie, ground: Any, places: Mapping[str, _Place]) -> None:
-    """Exudyn holds factorValue1 q(marker 1) - q(marker 0) at zero."""
+    """Exudyn holds factor1 q(marker 1) - q(marker 0) at zero."""
     (tied, coefficient), *rest = tie.items()
     markers = [_marker(mbs, places[point].node, DEFLECTION) for point, _ in rest] or [ground]
     factor = -rest[0][1] / coefficient if rest else 1.0
     mbs.AddObject(
         eii.ObjectConnectorCoordinate(
-            markerNumbers=[_marker(mbs, places[tied].node, DEFLECTION), *markers], factorValue1=factor
+            markerNumbers=[_marker(mbs, places[tied].node, DEFLECTION), *markers], factor1=factor
         )
     )
 

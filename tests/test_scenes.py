@@ -170,8 +170,8 @@ BROKEN = {
     "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: matrices: got"),
     "no matrix": (["structure"], {"matrices": FILES, "points": {"tip": 0}}, "structure: mass: got"),
     "no stiffness": (["structure"], {"matrices": {"mass": "m.mtx"}, "points": {"tip": 0}}, "structure.matrices"),
-    "unknown base": (["base"], "paper", "base: got 'paper', need one of: paper-rig"),
-    "base of the wrong kind": (["base"], [1], "base: got [1], need one of: paper-rig"),
+    "unknown base": (["base"], "paper", "base: got 'paper', need one of: beam-chain"),
+    "base of the wrong kind": (["base"], [1], "base: got [1], need one of: beam-chain"),
 }  # fmt: skip
 
 
@@ -262,7 +262,7 @@ def test_a_broken_matrix_file_is_one_line(tmp_path, content):
 
 @pytest.mark.parametrize("source", ["", "no-such-scene", "no/such.toml", "paper-rig.toml", "../paper-rig", "\0"])
 def test_an_unknown_scene_is_answered_with_the_known_ones(source):
-    with pytest.raises(MultiPhiValueError, match="need a TOML file or one of: paper-rig"):
+    with pytest.raises(MultiPhiValueError, match="need a TOML file or one of: beam-chain"):
         load_scene(source)
 
 
