@@ -103,3 +103,17 @@ def test_draw_body(monkeypatch, tmp_path):
     orange = np.sum((red > 150) & (green > 0.4 * red) & (green < 0.7 * red) & (blue < 0.4 * red), axis=(1, 2))
     assert orange[0] == 0 < orange[1]
     assert (tmp_path / "body_in_exudyn.png").stat().st_size > 10_000
+
+
+def test_coupled_body(capsys, monkeypatch, tmp_path):
+    example, picture = load("coupled_body"), tmp_path / "coupled.png"
+    monkeypatch.setattr(example, "T_END", 0.2)
+    monkeypatch.setattr(example, "FINE", 1e-5)
+    found = example.main([str(picture)])
+    for runs in found.values():
+        assert runs.errors[-1] < 3e-4
+        assert runs.order > 1.5
+        assert runs.small_error < 3e-3
+        assert runs.small.events >= 2
+    assert picture.stat().st_size > 10_000
+    assert capsys.readouterr().out.count("order") == 3

@@ -11,7 +11,10 @@ from exudyn.itemInterface import (
     MarkerNodeCoordinate,
     Mass1D,
     Node1D,
+    NodeGenericData,
     NodePointGround,
+    ObjectConnectorCoordinate,
+    ObjectContactCoordinate,
     SensorNode,
 )
 from scipy.integrate import solve_ivp
@@ -47,6 +50,7 @@ def settings(step):
     chosen.timeIntegration.verboseMode = 0
     chosen.timeIntegration.newton.relativeTolerance = 1e-12
     chosen.timeIntegration.generalizedAlpha.spectralRadius = 1.0
+    chosen.timeIntegration.discontinuous.useRecommendedStepSize = False  # of an ObjectContactCoordinate
     chosen.solution.file.write = False
     chosen.solution.sensors.writePeriod = step
     return chosen
@@ -156,6 +160,110 @@ def test_a_user_load_on_an_interface_coordinate_agrees_with_the_harmonic_load_to
     y, _, _ = run(model, step, push, matchedStepSize=step)
     expected = native.at("m2", np.minimum(np.arange(len(y)) * step, END))
     assert np.linalg.norm(y[:, 0] - expected) < 1e-5 * np.linalg.norm(expected)
+
+
+def order_and_error(shown, expected):
+    """Order between two halvings of the step, and the relative error at the last, of shown(step) (steps,)."""
+    errors = []
+    for step in (STEP, STEP / 2, STEP / 4):
+        y = shown(step)
+        exact = expected(np.minimum(np.arange(len(y)) * step, END))
+        errors.append(np.linalg.norm(y - exact) / np.linalg.norm(exact))
+    return math.log2(errors[0] / errors[2]) / 2, errors[2]
+
+
+def test_a_contact_on_an_interface_coordinate_converges_with_order_two_to_a_contact_of_the_model():
+    model, gap = chain(STIFFNESS), 3e-3
+
+    def stop(mbs, items):
+        ground = coordinate(mbs, mbs.AddNode(NodePointGround()))
+        data = mbs.AddNode(NodeGenericData(initialCoordinates=[gap], numberOfDataCoordinates=1))
+        ends = [ground, coordinate(mbs, items["nInterface"]["m2"])]
+        mbs.AddObject(
+            ObjectContactCoordinate(markerNumbers=ends, nodeNumber=data, contactStiffness=STIFFNESS, offset=-gap)
+        )
+
+    second = mp.UnilateralContact("second", "m2", gap, STIFFNESS)
+    both = mp.MultiPhiModel(model.structure, [*model.contacts, second], modes="all")
+    native = mp.simulate(both, END, displacement=START)
+    assert {event.contact for event in native.events} == {"stop", "second"}
+    order, error = order_and_error(
+        lambda step: run(model, step, stop, matchedStepSize=step)[0][:, 0], lambda t: native.at("m2", t)
+    )
+    assert order > 1.8
+    assert error < 3e-4
+
+
+def test_a_base_on_a_driven_slider_converges_with_order_two_to_the_structure_with_the_slider():
+    masses, held = np.eye(3), 1e4 * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    free, points = mp.RayleighDamping(0.0, 1e-5), {f"m{i}": i for i in range(3)}
+    contact = mp.UnilateralContact("stop", "m1", GAP, STIFFNESS)
+    body = mp.MultiPhiModel(mp.LinearStructure(masses, held, free, points), [contact], modes="all")
+    drawn = held + np.diag([4e3, 0.0, 0.0])
+    damping = 1e-5 * held + np.diag([5.0, 0.0, 0.0])
+    whole = mp.LinearStructure(masses + np.diag([2.0, 0.0, 0.0]), drawn, damping, points)
+    native = mp.simulate(
+        mp.MultiPhiModel(whole, [contact], modes="all"),
+        END,
+        displacement=START,
+        loads=[mp.HarmonicLoad("m0", 40.0, 7.0)],
+    )
+
+    def slider(mbs, items):
+        node = mbs.AddNode(Node1D(referenceCoordinates=[0.0]))
+        own, ground = coordinate(mbs, node), coordinate(mbs, mbs.AddNode(NodePointGround()))
+        mbs.AddObject(Mass1D(nodeNumber=node, mass=2.0))
+        mbs.AddObject(CoordinateSpringDamper(markerNumbers=[ground, own], stiffness=4e3, damping=5.0))
+        mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=[own, coordinate(mbs, items["nInterface"]["m0"])]))
+
+        def load(mbs, t, amplitude):
+            return amplitude * math.cos(2 * math.pi * 7.0 * t)
+
+        mbs.AddLoad(LoadCoordinate(markerNumber=own, load=40.0, loadUserFunction=load))
+
+    assert len(native.events) >= 4
+    order, error = order_and_error(
+        lambda step: run(body, step, slider, interface=("m0",), matchedStepSize=step)[0][:, 0],
+        lambda t: native.at("m0", t),
+    )
+    assert order > 1.8
+    assert error < 3e-4
+
+
+def test_two_bodies_coupled_by_a_spring_converge_with_order_two_to_one_structure():
+    model = chain(STIFFNESS)
+    matrix = np.kron(np.eye(2), model.structure.stiffness)
+    between = np.array([0, 0, 1, 0, 0, -1.0])
+    damping = 0.5 * np.eye(6) + 1e-5 * matrix
+    points = {"a": 2, "b": 5}
+    stops = [mp.UnilateralContact(f"stop{i}", np.eye(6)[i], GAP, STIFFNESS) for i in (1, 4)]
+    whole = mp.LinearStructure(np.eye(6), matrix + SPRING * np.outer(between, between), damping, points)
+    native = mp.simulate(
+        mp.MultiPhiModel(whole, stops, modes="all"), END, displacement=np.concatenate([START, -START / 2])
+    )
+    assert {event.contact for event in native.events} == {"stop1", "stop4"}
+
+    def shown(step):
+        container = exu.SystemContainer()
+        mbs = container.AddSystem()
+        bodies = [
+            CreateMultiPhiBody(mbs, model, name, displacement=start, interface=("m2",), matchedStepSize=step)
+            for name, start in (("a", START), ("b", -START / 2))
+        ]
+        nodes = [items["nInterface"]["m2"] for items in bodies]
+        mbs.AddObject(CoordinateSpringDamper(markerNumbers=[coordinate(mbs, node) for node in nodes], stiffness=SPRING))
+        sensors = [watch(mbs, node) for node in nodes]
+        mbs.Assemble()
+        mbs.SolveDynamic(settings(step), solverType=TRAPEZOIDAL)
+        return np.concatenate([mbs.GetSensorStoredData(sensor)[:, 1] for sensor in sensors])
+
+    def expected(t):
+        t = t[: len(t) // 2]
+        return np.concatenate([native.at("a", t), native.at("b", t)])
+
+    order, error = order_and_error(shown, expected)
+    assert order > 1.8
+    assert error < 3e-4
 
 
 def test_a_second_run_of_one_system_begins_in_the_level_of_its_start():

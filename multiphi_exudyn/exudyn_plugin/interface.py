@@ -9,11 +9,11 @@ ObjectConnectorCoordinateVector per point holds the equation. At a transition R 
 written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
 velocity (stepped_level.py).
 
-Within the step of an event the f of its mean acts before the event, that of its end after it: of second order for a
-force that varies (single halvings of the step gain between 1.5 and 2.4 powers: where in its step an event falls changes with
-the step), exact for one that does not. f comes from p, so the rows must be independent in every level; a point
-that rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not. A mass tied
-to y by a constraint is no part of an impact: it meets a rigid contact after a step with the velocity it had before.
+Within the step of an event the f of its mean acts before the event, that of its end after it: exact for a force that
+is constant, of second order for one that varies (a single halving of the step gains between 1.5 and 2.4 powers, as the
+place of an event in its step changes too). f comes from p, so the rows must be independent in every level; a point that
+rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not. A mass tied to y
+by a constraint is no part of an impact on a rigid contact: it takes the velocity that the body has after it.
 """
 
 from __future__ import annotations
