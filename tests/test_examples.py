@@ -117,3 +117,13 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
         assert runs.small.events >= 2
     assert picture.stat().st_size > 10_000
     assert capsys.readouterr().out.count("order") == 3
+
+
+def test_reduce_your_model(capsys, tmp_path):
+    picture = tmp_path / "reduced.png"
+    found = load("reduce_your_model").main([str(picture)])
+    errors = found.errors(0.25)
+    assert errors["on its own"] == pytest.approx(0.0021, abs=0.001)
+    assert errors["as a body in Exudyn"] == pytest.approx(errors["on its own"], rel=0.01)
+    assert "8 contacts" in capsys.readouterr().out
+    assert picture.stat().st_size > 10_000

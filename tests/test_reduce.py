@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import reduce
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, reduce
+from reference_models.published_systems import OwnRun, PublishedSystem
 
 STEP = 2e-5  # s, of Exudyn's own run
 
@@ -187,3 +188,120 @@ def test_a_contact_of_spheres_is_left_out_and_stays_active():
     assert (item.name, item.type) == ("balls", "ObjectContactSphereSphere")
     assert reason == "its gap is no linear function of coordinates"
     assert mbs.GetObjectParameter(balls, "activeConnector") is True
+
+
+def two_masses(first=0.0, second=0.0, held=False):
+    """Two masses on a line, each on a spring to ground, with a contact of 1e4 N/m between them, 10 mm apart.
+
+    first, second: displacements. held: a third coordinate is tied to the second mass by a constraint.
+    """
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    ground = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
+    markers = []
+    for name, start in (("a", first), ("b", second), *([("c", second)] if held else [])):
+        node = mbs.AddNode(eii.Node1D(referenceCoordinates=[0.0], initialCoordinates=[start]))
+        mbs.AddObject(eii.ObjectMass1D(mass=1.0, nodeNumber=node))
+        markers.append(mbs.AddMarker(eii.MarkerNodeCoordinate(name=name, nodeNumber=node, coordinate=0)))
+        spring = eii.ObjectConnectorCoordinateSpringDamper
+        mbs.AddObject(spring(markerNumbers=[ground, markers[-1]], stiffness=100.0, damping=0.1))
+    if held:
+        mbs.AddObject(eii.CoordinateConstraint(name="tie", markerNumbers=markers[1:]))
+    facing = [markers[0], markers[-1]]
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[second - first + 0.01], numberOfDataCoordinates=1))
+    mbs.AddObject(
+        eii.ObjectContactCoordinate(
+            name="facing", markerNumbers=facing, nodeNumber=data, contactStiffness=1e4, offset=-0.01
+        )
+    )
+    mbs.Assemble()
+    return PublishedSystem(container, mbs, "a", 0.5, 2e-5)
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize(("first", "closed"), [(-0.05, False), (0.03, True)])
+def test_two_bodies_in_contact_move_as_in_exudyn_also_from_closed_and_with_a_constraint(first, closed, held):
+    system = two_masses(first=first, held=held)
+    reduction = reduce(system.mbs)
+    (contact,) = reduction.model.contacts
+    assert contact.gap == pytest.approx(0.01 - first)
+    assert np.linalg.eigvalsh(reduction.structure.stiffness)[-1] < 101  # a closed contact is no part of it
+    assert reduction.structure.n == 2
+    assert ("constraint, its directions taken out" in reduction.report) == held
+    trajectory = run(reduction, system.end)
+    own = OwnRun.of(system)
+    intervals = trajectory.contact_intervals("facing")
+    assert (intervals[0][0] == 0.0) == closed
+    row = reduction.structure.coordinates @ reduction.structure.row("a")
+    np.testing.assert_allclose(trajectory.at("a", np.minimum(own.time, system.end)), own.of_row(row), atol=2e-6)
+
+
+def test_a_force_by_a_function_of_time_goes_on_from_the_current_time():
+    system = two_masses(first=-1.0)
+    force = eii.LoadCoordinate(name="push", markerNumber=2, load=2.0, loadUserFunction=pushed)
+    system.mbs.AddLoad(force)
+    system.mbs.Assemble()
+    assert reduce(system.mbs).left_out == ()
+    system.mbs.systemData.SetTime(0.3)
+    (load,) = [load for load in reduce(system.mbs).loads if isinstance(load, mp.FunctionLoad)]
+    assert load.function(0.1) == pytest.approx(2.0 * np.sin(40.0 * 0.4))
+
+
+def pushed(mbs, t, load):
+    return load * np.sin(40.0 * t)
+
+
+def test_a_force_by_a_function_of_time_moves_the_model_as_it_does_the_system():
+    system = two_masses(first=-0.05)
+    system.mbs.AddLoad(eii.LoadCoordinate(name="push", markerNumber=2, load=2.0, loadUserFunction=pushed))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    trajectory, own = run(reduction, system.end), OwnRun.of(system)
+    row = reduction.structure.coordinates @ reduction.structure.row("b")
+    assert "LoadCoordinate 'push': load by its function of time" in reduction.report
+    np.testing.assert_allclose(trajectory.at("b", np.minimum(own.time, system.end)), own.of_row(row), atol=2e-6)
+
+
+def test_gyroscopic_forces_are_refused():
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    zero = [0.0, 0.0]
+    node = mbs.AddNode(
+        eii.NodeGenericODE2(
+            referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero, numberOfODE2Coordinates=2
+        )
+    )
+    spin = np.array([[0.0, 3.0], [-3.0, 0.0]])
+    mbs.AddObject(
+        eii.ObjectGenericODE2(
+            nodeNumbers=[node], massMatrix=np.eye(2), stiffnessMatrix=100 * np.eye(2), dampingMatrix=spin
+        )
+    )
+    mbs.Assemble()
+    with pytest.raises(mp.MultiPhiValueError, match=r"damping matrix is not symmetric .*gyroscopic"):
+        reduce(mbs)
+
+
+def test_the_body_put_back_into_exudyn_moves_as_the_model_alone():
+    reduction = reduce(two_masses(first=-0.05).mbs)
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(
+        mbs, reduction.model, velocity=reduction.velocity, loads=reduction.loads, matchedStepSize=1e-3
+    )
+    mbs.Assemble()
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = 1e-3
+    settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.5, 500
+    assert mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    body = body_histories(mbs, items)
+    assert len(body.contact_intervals["facing"]) > 0
+    alone = run(reduction, 0.5).at("a", np.minimum(body.time, 0.5))
+    np.testing.assert_allclose(body.points["a"], alone, atol=1e-9)
+
+
+def test_a_system_not_assembled_is_refused():
+    container = exu.SystemContainer()
+    with pytest.raises(mp.MultiPhiValueError, match="not assembled"):
+        reduce(container.AddSystem())

@@ -100,6 +100,7 @@ def reduce(
     check_system(mbs)
     objects = [mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())]
     loads = [mbs.GetLoad(exu.LoadIndex(i)) for i in range(mbs.systemData.NumberOfLoads())]
+    now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
     with initial_is_current(mbs):
         gaps = {i: _distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
         with _smooth(mbs, objects, loads):
@@ -108,7 +109,7 @@ def reduce(
             static = basis.T @ forces(mbs) + dampers @ velocity
         rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = [c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i], basis)]
-        varying = {i: _varying(mbs, load, basis) for i, load in enumerate(loads) if user_function(load)}
+        varying = {i: _varying(mbs, load, now, basis) for i, load in enumerate(loads) if user_function(load)}
     own = dampers if np.any(dampers) else None
     given = own if damping is None else damping
     structure = LinearizedStructure(mass, stiffness, given, rows, coordinates=basis)
@@ -123,12 +124,12 @@ def reduce(
     )
 
 
-def _varying(mbs: Any, load: Mapping[str, Any], basis: np.ndarray) -> FunctionLoad | str:
+def _varying(mbs: Any, load: Mapping[str, Any], start: float, basis: np.ndarray) -> FunctionLoad | str:
     """A load by a user function as a function of time, or why it is none."""
     marker = exu.MarkerIndex(load["markerNumber"])
     if load["loadType"] != "Coordinate" or mbs.GetMarker(marker)["markerType"] != "NodeCoordinate":
         return "its user function gives no force on one coordinate"
-    start, value, held = mbs.systemData.GetTime(), load["load"], load[user_function(load)]
+    value, held = load["load"], load[user_function(load)]
     if held["type"] != "Python":
         return f"its user function is of type {held['type']}, need Python"
     function = held["function"]
