@@ -347,7 +347,7 @@ class DrivenMotion(Motion):
         self.work += _energy(after) - _energy(before) - float(self.rule.load @ moved)
         self.state = after
         functions = ((i, self.rule.function(level, i)) for i, p in enumerate(after.phases) if p is Phase.ARMED)
-        asking = {i for i, s in functions if s.sign(after.displacement, after.velocity) < 0}
+        asking = {i for i, s in functions if s.sign(after.displacement, after.velocity, after.reach) < 0}
         if asking:
             self._decide(asking)
 

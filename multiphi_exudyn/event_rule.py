@@ -13,9 +13,11 @@ bases of two levels need not agree, so the rule says what happens then:
 1. A contact is *armed* while s >= 0. When s falls through zero it asks to change state.
 2. A rigid contact that asks to close is decided together with all rigid contacts that touch, in the basis of the
    level in which they are open: Moreau's impact, then complementarity of acceleration and reaction. A contact closes
-   only if the level it enters gives it a reaction >= 0.
+   only if the level it enters gives it a reaction >= 0. At rest is also what would be back at its stop before its gap
+   is more than round-off: so ends a sequence of ever smaller bounces.
 3. A rigid contact that asks to open always opens: it never pulls.
-4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling.
+4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
+   several that ask together and may not, the first that may alone changes.
 5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
    armed when s reaches zero, and asks again if s turns down before.
 6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
@@ -42,6 +44,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.first_root import ZERO
 from multiphi_exudyn.level import cleared
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State, sign_of
@@ -251,10 +254,10 @@ class EventRule:
     def _standing(self, state: State, contact: int) -> Phase:
         """ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
         own = self.function(state.level, contact)
-        value = own.sign(state.displacement, state.velocity)
+        value = own.sign(state.displacement, state.velocity, state.reach)
         if value > 0:
             return Phase.ARMED
-        rate = own.rate_sign(state.velocity, state.acceleration, np.abs(state.level.level.omega * state.displacement))
+        rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
         if value == 0 or rate == 0:
             table = SignalTable(state.basis, state.shapes, [own, own], [False, True])
             value, rate = state.finder.signs(table.signals(state.coefficients()))
@@ -268,7 +271,7 @@ class EventRule:
         if contact not in self._viscous or contact in state.closed:
             return False
         force = self.entered_function(state.level, contact)
-        sign = force.sign(state.displacement, state.velocity)
+        sign = force.sign(state.displacement, state.velocity, state.reach)
         if sign == 0:
             table = SignalTable(state.basis, state.shapes, [force], [False])
             (sign,) = state.finder.signs(table.signals(state.coefficients()))
@@ -305,8 +308,13 @@ class EventRule:
         return self._with_phases(entered), loss, [Change(i, "close") for i in sorted(willing)]
 
     def _switch(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
-        """Compliant contacts change where the level they enter admits it, rigid ones open."""
-        while asking:
+        """Compliant contacts change where the level they enter admits it, rigid ones open.
+
+        Where it admits none of several together, the first that it admits alone.
+        """
+        heard, wishes = asking, [asking]
+        while wishes:
+            asking = wishes.pop(0)
             entered, loss = self._moved(state, self.level(asking.symmetric_difference(state.closed)))
             entered = self._with_phases(entered)
             denied = {
@@ -316,9 +324,12 @@ class EventRule:
             }
             if not denied:
                 break
-            asking = asking - denied
-        if not asking:
-            return self._with_phases(state, denied), Loss(), []
+            if denied < asking:
+                wishes = [asking - denied]
+            elif len(asking) > 1:
+                wishes = [{i} for i in sorted(asking)]
+        else:
+            return self._with_phases(state, heard), Loss(), []
         self.transitions += 1
         opened = sorted(i for i in asking if self._rigid[i])
         if opened:
@@ -423,13 +434,22 @@ class EventRule:
         """
         own = state.level.level
         rows = own.speed_rows[touching]
-        resting = np.abs(rows @ state.velocity) <= RESTING * self._sizes(rows, released, state)
+        speeds = rows @ state.velocity
+        resting = np.abs(speeds) <= np.maximum(
+            RESTING * self._sizes(rows, released, state), self._unseen(state, rows, touching)
+        )
         if not np.any(resting):
             return set()
         _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         return pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
+
+    def _unseen(self, state: State, rows: np.ndarray, touching: list[int]) -> np.ndarray:
+        """Gap velocities (k,) that the free motion turns back before the gap is more than round-off of its terms."""
+        level, place = state.level, np.abs(state.displacement)
+        gaps = np.abs(level.level.gap_rows[touching]) @ place + np.abs(level.gap_constants[touching])
+        return np.sqrt(2 * ZERO * gaps * np.maximum(-(rows @ state.acceleration), 0.0))
 
     def _sizes(self, rows: np.ndarray, *states: State) -> np.ndarray:
         """What gap velocities (k,) could be at the speeds of these states, whose directions an impact mixes."""

@@ -48,6 +48,17 @@ class State:
         return self.level.potential(self.displacement)
 
     @property
+    def reach(self) -> np.ndarray:
+        """How far (r,) the velocities carry the modes: |eta'| / omega, zero where nothing oscillates."""
+        omega = self.level.level.omega
+        return np.divide(np.abs(self.velocity), omega, out=np.zeros(len(omega)), where=omega > 0)
+
+    @property
+    def swing(self) -> np.ndarray:
+        """How fast (r,) the displacements make the modes: omega |eta|."""
+        return np.abs(self.level.level.omega * self.displacement)
+
+    @property
     def acceleration(self) -> np.ndarray:
         """eta'' (r,)."""
         return self.level.acceleration(self.displacement, self.velocity)
@@ -152,10 +163,13 @@ class Row:
     def __call__(self, displacement: np.ndarray, velocity: np.ndarray) -> float:
         return float(self.position @ displacement + self.rate @ velocity) + self.constant
 
-    def sign(self, displacement: np.ndarray, velocity: np.ndarray) -> int:
-        """Sign of the value, zero where it is round-off of its terms."""
-        terms = self.position * displacement
-        return sign_of(terms + self.rate * velocity if self._rated else terms, self.constant)
+    def sign(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> int:
+        """Sign of the value, zero where it is round-off of its terms; reach: displacements (r,) of the motion.
+
+        At the root of a signal all displacements may be round-off of what they were before.
+        """
+        terms, size = self.position * displacement, float(self._sizes.dot(reach))
+        return sign_of(terms + self.rate * velocity if self._rated else terms, self.constant, size)
 
     def rate_sign(self, velocity: np.ndarray, acceleration: np.ndarray, swing: np.ndarray) -> int:
         """Sign of the time derivative, zero where it is round-off of its terms; swing: speeds (r,) of the motion.

@@ -105,6 +105,14 @@ RESTS = {
         Recipe(15717, "free dense", 2, "modal", 4, "rigid", "mixed", "mixed", "half", "rest", "gravity"),
         8,
     ),
+    "rocking between two stops": (
+        Recipe(904, "unconnected", 3, "modal", 3, "mixed", "small", "between", "all", "moving", "none"),
+        20,
+    ),
+    "two springs that exchange one mode": (
+        Recipe(591, "chain", 3, "dashpot", 2, "compliant", "zero", "rows", "one", "static", "none"),
+        20,
+    ),
 }
 
 

@@ -29,14 +29,16 @@ def sign_of(value: float, size: float) -> int:
     return 1 if value > 0 else -1
 
 
-@jit
-def row_sign(row: np.ndarray, constant: float, x: np.ndarray, v: np.ndarray, r: int) -> int:
-    """Sign of row . (x, v) + constant, a mode's two terms taken for one."""
+@inlined
+def row_sign(k: Levels, a: int, row: np.ndarray, constant: float, x: np.ndarray, v: np.ndarray) -> int:
+    """Sign of row . (x, v) + constant, a mode's two terms taken for one; see Row.sign."""
     value, size = 0.0, abs(constant)
-    for i in range(r):
+    for i in range(k.sizes[a, 0]):
         term = row[0, i] * x[i] + row[1, i] * v[i]
         value += term
         size += abs(term)
+        if k.squared[a, i] != 0:
+            size += abs(row[0, i] * v[i]) / math.sqrt(abs(k.squared[a, i]))
     return sign_of(value + constant, size)
 
 
@@ -157,8 +159,8 @@ def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, skipped: int) -> 
 @inlined
 def standing(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, c: np.ndarray, work: np.ndarray) -> int:
     """The phase in which a contact stands; c: coefficients of the motion from here."""
-    r, row = k.sizes[a, 0], k.own[a, contact]
-    value = row_sign(row, k.own_constant[a, contact], x, v, r)
+    row = k.own[a, contact]
+    value = row_sign(k, a, row, k.own_constant[a, contact], x, v)
     if value > 0:
         return ARMED
     if k.rated[a]:
