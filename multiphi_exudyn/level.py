@@ -429,7 +429,7 @@ def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: i
     if complete:
         found = complete_modes(_dense(structure.mass), _dense(structure.stiffness))
     else:
-        points = np.array(list(structure.points.values())).reshape(-1, structure.n)
+        points = np.array([structure.row(name) for name in structure.points]).reshape(-1, structure.n)
         count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
         distinct = rows[sorted(set(rays_of(contacts)))]
         found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))

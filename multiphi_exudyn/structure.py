@@ -10,7 +10,7 @@ numbers: its value is p.x, and a force F at it acts as p F.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -83,7 +83,11 @@ class LinearStructure:
 
     mass, stiffness: (n, n), dense or scipy.sparse, symmetric; kept as given, never modified.
     damping: None | (n, n) | ModalDamping | RayleighDamping.
-    points: name -> DoF index or (n,) row.
+    points: name -> DoF index or (n,) row; afterwards name -> row, of which only what is not zero is kept.
+
+    Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
+    of its modes and static shapes, 4 r + 40 + contacts + points, a few times while it is computed, and once the factors
+    of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.4 GB for matrices and mesh, at most 1.1 GB in all.
 
     Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
     asymmetric matrix, a mass that is not positive definite, a negative diagonal of stiffness or damping.
@@ -202,24 +206,48 @@ def _check_positive_definite(mass: Matrix) -> None:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
 
 
-def _point_rows(given: Any, n: int) -> dict[str, np.ndarray]:
+class _PointRows(Mapping[str, np.ndarray]):
+    """Rows (n,) by name, made when asked for: kept are the entries that are not zero, (places, values) each."""
+
+    def __init__(self, n: int, entries: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
+        self.n = n
+        self._entries = entries
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        row = np.zeros(self.n)
+        places, values = self._entries[name]
+        row[places] = values
+        row.flags.writeable = False
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+
+def _point_rows(given: Any, n: int) -> _PointRows:
+    if isinstance(given, _PointRows) and given.n == n:
+        return given
     if not isinstance(given, Mapping):
         raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {{name: DoF index or ({n},) row}}")
-    return {name: _point_row(name, place, n) for name, place in given.items()}
+    return _PointRows(n, {name: _point_entries(name, place, n) for name, place in given.items()})
 
 
-def _point_row(name: str, given: int | np.ndarray, n: int) -> np.ndarray:
+def _point_entries(name: str, given: int | np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(name, str) or not name:
         raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
         if not 0 <= given < n:
             raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")
-        row = np.zeros(n)
-        row[given] = 1.0
-    else:
-        row = _vector(f"points[{name!r}]", given, n)
-    row.flags.writeable = False
-    return row
+        return np.array([given]), np.ones(1)
+    row = _vector(f"points[{name!r}]", given, n)
+    places = np.flatnonzero(row)
+    return places, row[places]
 
 
 def _vector(name: str, given: Any, n: int) -> np.ndarray:
