@@ -19,10 +19,10 @@ from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Event, Loss, Phase
 from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
 
-__all__ = ["CHATTER_WINDOW", "CompiledMotion", "Motion"]
+__all__ = ["CompiledMotion", "Motion"]
 
-EVENTS_PER_PERIOD = 20  # of the highest kept mode: more, over CHATTER_WINDOW events, is chatter
-CHATTER_WINDOW = 200
+EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
+CHATTER_WINDOW = 200  # events, for every contact
 ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
 
 
@@ -112,9 +112,9 @@ class Motion:
     def _count(self) -> int:
         return len(self.segments)
 
-    def _recent(self) -> list[tuple[float, float]]:
-        """Start [s] and highest frequency [Hz] of the segments that the chatter check is about."""
-        return [(segment.start, segment.level.level.highest_frequency) for segment in self.segments[-CHATTER_WINDOW:]]
+    def _recent(self, count: int) -> list[tuple[float, float]]:
+        """Start [s] and highest frequency [Hz] of the last ``count`` segments."""
+        return [(segment.start, segment.level.level.highest_frequency) for segment in self.segments[-count:]]
 
     def _one_segment(self, end: float) -> None:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
@@ -158,16 +158,34 @@ class Motion:
             self._keep_event(Event(self.time, name, change.kind, loss, change.impulse))
             loss = Loss()
 
+    @property
+    def window(self) -> int:
+        """How many of the last events the chatter check is about, so many for every contact.
+
+        Stops side by side are all struck in a small part of a period, once each.
+        """
+        return CHATTER_WINDOW * self._plain
+
+    @property
+    def _allowed(self) -> float:
+        """How many of them a period of the highest kept mode may hold; a swing passes every spring of a law twice."""
+        return EVENTS_PER_PERIOD * self._plain + 2 * sum(map(len, self.model.chains))
+
+    @property
+    def _plain(self) -> int:
+        """Number of contacts that are no springs of a law, at least 1."""
+        return max(1, len(self.model.contacts) - sum(map(len, self.model.chains)))
+
     def _check_chatter(self) -> None:
-        if self._count() <= CHATTER_WINDOW:
+        window, allowed = self.window, self._allowed
+        if self._count() <= window:
             return
-        starts, frequencies = zip(*self._recent(), strict=True)
+        starts, frequencies = zip(*self._recent(window), strict=True)
         elapsed, highest = self.time - starts[0], max(frequencies)
-        allowed = EVENTS_PER_PERIOD + 2 * sum(map(len, self.model.chains))  # a swing passes every spring of a law twice
-        if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < CHATTER_WINDOW / allowed:
+        if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < window / allowed:
             raise NumericalFailure(
-                f"chatter: {CHATTER_WINDOW} events in {elapsed:g} s, more than {allowed} "
-                f"in a period of the highest kept mode ({highest:g} Hz), or all within {ACCUMULATED:g} of the time"
+                f"chatter: {window} events in {elapsed:g} s, more than {allowed} in a period of the highest "
+                f"kept mode ({highest:g} Hz) or all within {ACCUMULATED:g} of the time so far"
             )
 
 
@@ -183,7 +201,7 @@ class CompiledMotion(Motion):
         super().__post_init__()
 
     def _continue(self, end: float) -> None:
-        given = self.state, self.time, end, self.record, CHATTER_WINDOW, EVENTS_PER_PERIOD, ACCUMULATED
+        given = self.state, self.time, end, self.record, self.window, self._allowed, ACCUMULATED
         self.state, self.time, chatter = self.loop.advance(*given)
         if chatter:
             self._check_chatter()
@@ -202,5 +220,5 @@ class CompiledMotion(Motion):
     def _count(self) -> int:
         return self.record.count
 
-    def _recent(self) -> list[tuple[float, float]]:
-        return self.record.recent(CHATTER_WINDOW)
+    def _recent(self, count: int) -> list[tuple[float, float]]:
+        return self.record.recent(count)

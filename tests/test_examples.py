@@ -126,4 +126,16 @@ def test_reduce_your_model(capsys, tmp_path):
     assert errors["on its own"] == pytest.approx(0.0021, abs=0.001)
     assert errors["as a body in Exudyn"] == pytest.approx(errors["on its own"], rel=0.01)
     assert "8 contacts" in capsys.readouterr().out
+
+
+def test_bed_of_stops(capsys, monkeypatch, tmp_path):
+    picture = tmp_path / "bed.png"
+    example = load("bed_of_stops")
+    monkeypatch.setattr(example, "ELEMENTS", (100, 400))
+    coarse, fine = example.main([str(picture)], 20, 0.16)
+    assert coarse.trajectory.status == fine.trajectory.status == "ok"
+    assert len(coarse.trajectory.events) > 15
+    first = [each.trajectory.events[0].time for each in (coarse, fine)]
+    assert first[0] == pytest.approx(first[1], rel=1e-4)
+    assert capsys.readouterr().out.count("1.05e+06") == 2
     assert picture.stat().st_size > 10_000

@@ -6,12 +6,15 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from run_checks import complaints
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn.beam import Beam, Section, planar_beam
 from multiphi_exudyn.level import build_level
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes
 SUBSPACES = 1e-9  # sine of the angle between them: what 1e-16 of the softest compliance is to the stiffest mode kept
+EVALUATIONS = 500  # samples of event signals that an event may take
 SYMMETRIC = 1e-12  # of the largest displacement
 
 
@@ -85,3 +88,30 @@ def test_forty_stops_build_the_levels_visited_only():
     assert len(run.events) > 10
     assert model.levels_possible == 2**40
     assert model.levels_built <= 2 * len(run.events) + 1
+
+
+def test_a_hundred_stops_run_to_the_end_with_certified_events():
+    """A beam over its bed: the work of an event does not grow with the contacts that rest."""
+    steel = Section.rectangle(0.0, 2.0, width=0.03, height=0.01, youngs_modulus=2.1e11, density=7850.0)
+    places = {f"p{i}": 0.02 * (i + 1) for i in range(100)}
+    structure = planar_beam(Beam([steel], places), 100)
+    stops = [UnilateralContact(f"c{i}", f"p{i}", 1e-3, 1e4) for i in range(100)]
+    model = MultiPhiModel(structure, stops, modes=24)
+    mode = model.level(()).shapes[:, 0]
+    run = simulate(model, 0.008, velocity=-mode / (structure.row("p99") @ mode), compiled=False)
+    assert complaints(run, samples=12.0, most=12) == []
+    assert len(run.events) > 15
+    assert run.stats.levels_built <= 2 * len(run.events) + 1
+    assert run.stats.function_evaluations < EVALUATIONS * len(run.events)
+
+
+def test_a_bed_struck_all_at_once_is_no_chatter(monkeypatch):
+    """One change of every stop within a small part of a period of the highest kept mode."""
+    monkeypatch.setattr("multiphi_exudyn.motion.CHATTER_WINDOW", 10)
+    model = bed(1e7, n=200, stops=60)
+    mode = model.level(()).shapes[:, 0]
+    fall = -3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2])
+    run = simulate(model, 4e-4, velocity=fall, compiled=False)
+    assert run.status == "ok", run.message
+    assert len(run.events) > 20
+    assert (run.events[-1].time - run.events[0].time) * model.level(()).highest_frequency < 10 / 20

@@ -30,7 +30,7 @@ from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
-from multiphi_exudyn.motion import CHATTER_WINDOW, Motion
+from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.state import Event, Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
@@ -239,7 +239,7 @@ class MultiPhiBody:
         if motion.message:
             raise NumericalFailure(f"body {self.name!r}: {motion.message}")
         motion.segments.pop()  # those that remain end with events: the chatter check counts them
-        del motion.segments[: -CHATTER_WINDOW - 1]
+        del motion.segments[: -motion.window - 1]
         end = self._plain(motion.state)
         centre = shift(end.level.level, force_in(end.closed))
         return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
