@@ -172,6 +172,23 @@ def order_and_error(shown, expected):
     return math.log2(errors[0] / errors[2]) / 2, errors[2]
 
 
+def test_a_damped_mass_beside_a_rigid_stop_converges_with_order_two_to_one_structure():
+    model, between = chain(math.inf), np.array([0, 0, 1, -1.0])
+    coupling = np.outer(between, between)
+    stiffness = np.pad(model.structure.stiffness, (0, 1))
+    damping = 0.5 * np.diag([1, 1, 1, 0.0]) + 1e-5 * stiffness + DAMPER * coupling
+    masses = np.diag([1, 1, 1, MASS])
+    whole = mp.LinearStructure(masses, stiffness + SPRING * coupling, damping, {"m1": 1, "m2": 2})
+    stops = [mp.UnilateralContact("stop", "m1", GAP)]
+    native = mp.simulate(mp.MultiPhiModel(whole, stops, modes="all"), END, displacement=np.append(START, 0.0))
+    assert len(native.events) >= 4
+    order, error = order_and_error(
+        lambda step: run(model, step, spring_and_mass, matchedStepSize=step)[0][:, 0], lambda t: native.at("m2", t)
+    )
+    assert order > 1.8
+    assert error < 1e-4
+
+
 def test_a_contact_on_an_interface_coordinate_converges_with_order_two_to_a_contact_of_the_model():
     model, gap = chain(STIFFNESS), 3e-3
 
