@@ -305,3 +305,38 @@ def test_a_system_not_assembled_is_refused():
     container = exu.SystemContainer()
     with pytest.raises(mp.MultiPhiValueError, match="not assembled"):
         reduce(container.AddSystem())
+
+
+def test_a_start_that_is_displaced_and_moving_against_a_damper_moves_as_in_exudyn():
+    system = Mass(displacement=0.3, velocity=10.0)
+    stops = {"limitStopsUpper": 0.95, "limitStopsLower": -0.95, "limitStopsStiffness": 1e4, "useLimitStops": True}
+    held = {"name": "slide", "markerNumbers": system.markers, "nodeNumber": system.data}
+    system.mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamperExt(**held, **stops, stiffness=50.0, damping=1.0))
+    system.mbs.Assemble()
+    trajectory = run(reduce(system.mbs), 0.15)
+    assert len(trajectory.contact_intervals("slide.upper")) == 1
+    assert 0.3 + trajectory.at("m1", 0.15) == pytest.approx(system.at(0.15), abs=2e-4)
+
+
+def test_a_hinged_bar_on_a_stop_moves_as_in_exudyn():
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    node = mbs.AddNode(eii.NodeRigidBody2D(referenceCoordinates=[0.5, 0.0, 0.0]))
+    bar = mbs.AddObject(eii.ObjectRigidBody2D(mass=2.0, inertia=2 / 12, nodeNumber=node))
+    ground = mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=mbs.AddObject(eii.ObjectGround())))
+    end = mbs.AddMarker(eii.MarkerBodyPosition(bodyNumber=bar, localPosition=[-0.5, 0.0, 0.0]))
+    mbs.AddObject(eii.ObjectJointRevolute2D(name="hinge", markerNumbers=[ground, end]))
+    fixed = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
+    markers = [fixed, mbs.AddMarker(eii.MarkerNodeCoordinate(name="centre", nodeNumber=node, coordinate=1))]
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1))
+    law = {"contactStiffness": 1e5, "offset": -1e-3}
+    mbs.AddObject(eii.ObjectContactCoordinate(name="stop", markerNumbers=markers, nodeNumber=data, **law))
+    body = mbs.AddMarker(eii.MarkerBodyMass(bodyNumber=bar))
+    mbs.AddLoad(eii.LoadMassProportional(markerNumber=body, loadVector=[0.0, -2.0, 0.0]))
+    mbs.Assemble()
+    reduction = reduce(mbs)
+    own, trajectory = OwnRun.of(PublishedSystem(container, mbs, "centre", 0.2, 2e-5)), run(reduction, 0.2)
+    row = reduction.structure.coordinates @ reduction.structure.row("centre")
+    assert "'hinge': constraint, its directions taken out" in reduction.report
+    assert len(trajectory.contact_intervals("stop")) == 2
+    np.testing.assert_allclose(trajectory.at("centre", np.minimum(own.time, 0.2)), own.of_row(row), atol=2e-6)
