@@ -28,6 +28,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.beam import Beam, Clamp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, LinearizedStructure, body_histories, linear_structure_from
 from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
+from reference_models.beams import as_beams
 from reference_models.exudyn_quiet import quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import point_contacts
@@ -115,13 +116,14 @@ CASES = (
 def full_system(case: Case, step: float, damping: np.ndarray | None = None) -> BeamSystem:
     """The full beam with its stop, without anything attached."""
     settings = FullBeamSettings(elements=ELEMENTS, step=step)
-    return build_beam_system(case.beam, settings, point_contacts(case.beam, [STOP]), damping)
+    beams = as_beams(case.beam)
+    return build_beam_system(beams, settings, point_contacts(beams, [STOP]), damping)
 
 
 def structure_of(case: Case) -> LinearizedStructure:
     """The full beam, linearised where it is straight, with proportional damping."""
-    system, beam = full_system(case, FINE), case.beam
-    points = {at: (system.nodes[system.node_at(beam.points[at])], DEFLECTION) for at in {"node2", TIP, case.point}}
+    system = full_system(case, FINE)
+    points = {at: (system.nodes[system.points[at]], DEFLECTION) for at in {"node2", TIP, case.point}}
     return linear_structure_from(system.mbs, points, DAMPING)[0]
 
 
@@ -140,7 +142,7 @@ def run_full(case: Case, structure: LinearizedStructure, step: float) -> Run:
     proportional = DAMPING.alpha * structure.mass + DAMPING.beta * structure.stiffness
     system = full_system(case, step, structure.coordinates @ proportional @ structure.coordinates.T)
     mbs = system.mbs
-    at, tip = (system.nodes[system.node_at(case.beam.points[point])] for point in (case.point, TIP))
+    at, tip = (system.nodes[system.points[point]] for point in (case.point, TIP))
     case.attach(mbs, coordinate(mbs, at, DEFLECTION))
     kind = exu.OutputVariableType.Coordinates
     sensor = mbs.AddSensor(

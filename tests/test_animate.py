@@ -160,6 +160,9 @@ def test_matrices_and_scenes_without_a_reduced_model_are_refused(tmp_path, capsy
     np.savez(tmp_path / "m.npz", mass=np.eye(2), stiffness=np.diag([1e4, 4e4]))
     data = changed(["structure"], {"matrices": "m.npz", "points": {"middle": 0, "tip": 1}})
     path = write(tmp_path / "matrices.toml", changed(["models"], [BEAM["models"][0]], data))
-    assert refused(capsys, path) == f"{path}: structure: got matrices, need a beam: they have no shape along x\n"
+    assert (
+        refused(capsys, path)
+        == f"{path}: structure: got matrices or several beams, need one beam, whose shape is drawn along x\n"
+    )
     alone = write(tmp_path / "full.toml", changed(["models"], [FULL], WITH_FULL))
     assert "models: got none that is reduced" in refused(capsys, alone)
