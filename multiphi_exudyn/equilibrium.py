@@ -85,9 +85,9 @@ def _path(base: Base, closed: set[int], loads: np.ndarray, lifts: np.ndarray) ->
         supports = base.supports(index, gaps[index])
         forces, configuration = rest(base, supports, load)
         states = base.directions.T @ configuration + gaps
-        for members, force in zip(supports.members, forces, strict=True):
-            for i in members:
-                states[i] = force if np.isinf(base.stiffnesses[i]) else -states[i]
+        pushed = base.contact_forces(supports, forces, states)
+        for i in index:
+            states[i] = pushed[i] if np.isinf(base.stiffnesses[i]) else -states[i]
         configurations.append(configuration)
         functions.append(states)
     return _Path(np.array(configurations), np.array(functions))

@@ -10,7 +10,7 @@ mass is the identity and the stiffness diag(Omega^2). A level is then a small de
     closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
 
 Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
-K q + G, q = p.y. The total stiffness of a law may be negative, and the level indefinite: then omega^2 < 0, the square
+K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force. The total stiffness of a law may be negative, and the level indefinite: then omega^2 < 0, the square
 of a rate of growth (eta ~ exp(+-|omega| t)).
 
 The omega of springs K > 0 are singular values of [diag(Omega) Z; sqrt(K) P^T Z], Z an orthonormal null space: as
@@ -141,9 +141,9 @@ class Base:
 
     @functools.cached_property
     def rays(self) -> list[int]:
-        """``rays_of`` the contacts, compliant contacts of one direction up to its sign taken together as well."""
+        """``rays_of`` the contacts, all others of one direction up to its sign taken together as well."""
         first = rays_of(self.contacts)
-        plain = [i for i, c in enumerate(self.contacts) if not c.rigid and not isinstance(c, LawSpring)]
+        plain = [i for i, c in enumerate(self.contacts) if not isinstance(c, LawSpring)]
         for k, i in enumerate(plain):
             first[i] = next((j for j in plain[:k] if first[j] == j and self._parallel(i, j)), i)
         return first
@@ -199,23 +199,47 @@ class Base:
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
 
     def supports(self, closed: Sequence[int], gaps: np.ndarray) -> Supports:
-        """Closed contacts with their gaps (k,), those of one direction taken together."""
+        """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""
         rays: dict[int, list[int]] = {}
         given = dict(zip(closed, gaps.tolist(), strict=True))
         for i in closed:
             rays.setdefault(self.rays[i], []).append(i)
-        stiffness, offsets = np.zeros((2, len(rays)))
-        for j, members in enumerate(rays.values()):
+        together = [part for members in rays.values() for part in self._held_once(members)]
+        stiffness, offsets = np.zeros((2, len(together)))
+        for j, members in enumerate(together):
             k, signed = self.stiffnesses[members], self.signs[members] * [given[i] for i in members]
             stiffness[j] = np.sum(k)
-            if len(members) == 1:
-                offsets[j] = signed[0]
+            rigid = np.isinf(k)
+            if len(members) == 1 or np.any(rigid):
+                offsets[j] = signed[np.argmax(rigid)]
                 continue
             if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
                 stiffness[j] = 0.0
             offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
-        together = tuple(tuple(members) for members in rays.values())
-        return Supports(together, self.directions[:, list(rays)], stiffness, offsets)
+        directions = self.directions[:, [self.rays[members[0]] for members in together]]
+        return Supports(tuple(map(tuple, together)), directions, stiffness, offsets)
+
+    def _held_once(self, members: list[int]) -> list[list[int]]:
+        """Contacts of one direction, every rigid one but the first on its own."""
+        further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
+        return [[i for i in members if i not in further], *([i] for i in further)]
+
+    def contact_forces(self, supports: Supports, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
+        """lambda (c,) [N] from the forces (d,) along supports and the gaps (c,) there; zero where open.
+
+        Springs of one direction have what their gaps say, and a rigid contact among them the rest.
+        """
+        forces = np.zeros(len(self.contacts))
+        for members, force in zip(supports.members, along.tolist(), strict=True):
+            index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
+            if len(index) > 1:
+                springs = [i for i in index if i not in held]
+                moved = self.signs[held[0]] * closing[held[0]] if held else 0.0  # round-off of zero
+                forces[springs] = -self.stiffnesses[springs] * (closing[springs] - self.signs[springs] * moved)
+                force -= self.signs[springs] @ forces[springs]
+                index = held
+            forces[index] = self.signs[index] * force
+        return forces
 
 
 @dataclass(frozen=True)
@@ -410,16 +434,10 @@ class Level:
         )
 
     def _forces(self, supports: Supports, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-        """lambda (k,) of the closed contacts from the forces along their directions; of a chain from its gaps."""
-        base, index = self.base, list(self.indices)
-        closing = base.directions[:, index].T @ configuration + gaps
-        forces = np.zeros(len(index))
-        for members, force in zip(supports.members, along, strict=True):
-            places = [self.indices.index(i) for i in members]
-            alone = len(members) == 1
-            springs = base.stiffnesses[list(members)]
-            forces[places] = base.signs[list(members)] * force if alone else -springs * closing[places]
-        return forces
+        """lambda (k,) of the closed contacts from the forces along their directions."""
+        index, closing = list(self.indices), np.zeros(len(self.base.contacts))
+        closing[index] = self.base.directions[:, index].T @ configuration + gaps
+        return self.base.contact_forces(supports, along, closing)[index]
 
 
 def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> Base:
@@ -467,7 +485,8 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     zero = squares == 0
     _check(base, squares, vectors, supports, accuracy)
     damping = base.resistance(closed)
-    forces, rates = _force_rows(base, closed, squares, vectors, damping)
+    gap_rows = cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
+    forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
         closed=tuple(base.contacts[i].name for i in closed),
         indices=indices,
@@ -475,7 +494,7 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
         squares=squares,
         vectors=vectors,
         damping=_projected_damping(damping, squares, vectors),
-        gap_rows=cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors)),
+        gap_rows=gap_rows,
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
@@ -551,15 +570,15 @@ def _divided(pull: np.ndarray, root: np.ndarray) -> np.ndarray:
 
 
 def _force_rows(
-    base: Base, closed: list[int], squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray
+    base: Base, closed: list[int], squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray, gap_rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Contact forces of the closed contacts from eta and eta', (k, r) each."""
+    """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
     rigid = np.isinf(base.stiffnesses[closed])
     forces = np.zeros((len(closed), len(squares)))
     rates = np.zeros_like(forces)
     pinned, sprung = base.directions[:, closed][:, rigid], base.directions[:, closed][:, ~rigid]
-    forces[~rigid] = -base.stiffnesses[closed][~rigid][:, None] * (sprung.T @ vectors)
-    rates[~rigid] = -base.dampings[closed][~rigid][:, None] * (sprung.T @ vectors)
+    forces[~rigid] = -base.stiffnesses[closed][~rigid][:, None] * gap_rows[~rigid]
+    rates[~rigid] = -base.dampings[closed][~rigid][:, None] * gap_rows[~rigid]
     if np.any(rigid):
         forces[rigid] = _reaction_rows(base, pinned, squares, vectors, sprung @ forces[~rigid])
         rates[rigid] = np.linalg.lstsq(pinned, damping @ vectors, rcond=None)[0]
@@ -663,12 +682,14 @@ def rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray, 
     none = np.zeros((carried.shape[1],) * 2)
     matrix = np.block([[flexibility, sprung[:, None] * coupling], [coupling.T, none]])
     pressed = -supports.offsets - sprung * (touching.T @ (compliance * load[elastic]))
-    given = np.concatenate([pressed, -carried.T @ load[free]])
-    solution = _solved(matrix, given)
-    forces, rigid = solution[: len(own)], solution[len(own) :]
+    solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]))
+    forces = solution[: len(own)]
     total = cleared(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
-    configuration = np.concatenate([carried @ rigid, compliance * total])
-    return forces, configuration
+    configuration = np.concatenate([carried @ solution[len(own) :], compliance * total])
+    left = supports.offsets + own * forces + sprung * (supports.directions.T @ configuration)
+    further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]))  # what soft modes magnified
+    added = np.concatenate([carried @ further[len(own) :], compliance * (touching @ further[: len(own)])])
+    return forces + further[: len(own)], configuration + added
 
 
 def _solved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:

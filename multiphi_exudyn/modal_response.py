@@ -25,6 +25,7 @@ DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-o
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
 SERIES_BELOW = 0.5  # |s T| - d under which t^d exp is integrated by its series: by parts d! / |s T|^d is lost
 SERIES_ROUND_OFF = 1e-18  # of 1: terms of that series below it are left out
+STEP = 1e-3  # of an eigenvector: a larger step of its refinement is none of round-off
 WORST_CONDITION = 1e7  # of the scaled eigenvectors; times round-off it is the motion's error (a double root has 1e8)
 
 
@@ -260,6 +261,7 @@ def _complex_modes(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
             "damping: the damped modes of a level are defective (coupled modes critically damped alike), "
             "so its motion is no sum of exponentials"
         )
+    rates, vectors = _refined(system, rates, vectors)
     kept = rates.imag >= 0
     maps = _real_part_inverse(vectors[:, kept], rates[kept].imag > 0)
     basis = Exponentials(rates[kept], np.zeros(int(np.sum(kept)), int))
@@ -267,6 +269,20 @@ def _complex_modes(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
     none = np.zeros_like(from_velocity)
     response = ModalResponse(basis, vectors[:r, kept] / scale[:, None], from_displacement, from_velocity, none, False)
     return _with_drift(response, squares, damping) if np.any(squares == 0) else response
+
+
+def _refined(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A step of Newton's method for all eigenpairs at once: V (I + F), F_ij = E_ij / (lambda_j - lambda_i).
+
+    E = V^-1 (S V - V Lambda). An eigenvalue solver leaves round-off of the largest rate in every pair; after the step
+    it is round-off of the pair's own rate. Pairs too near each other for a step stay as they are.
+    """
+    left = np.linalg.solve(vectors, system @ vectors - vectors * rates)
+    apart = rates - rates[:, None]
+    near = np.abs(left) >= STEP * np.abs(apart)
+    turned = vectors @ np.where(near, 0.0, left / np.where(near, 1.0, apart))
+    moved, real = np.diagonal(left), rates.imag == 0
+    return rates + np.where(real, moved.real, moved), vectors + np.where(real, turned.real, turned)
 
 
 def _real_part_inverse(vectors: np.ndarray, paired: np.ndarray) -> np.ndarray:
