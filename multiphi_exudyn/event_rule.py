@@ -14,7 +14,8 @@ bases of two levels need not agree, so the rule says what happens then:
 2. A rigid contact that asks to close is decided together with all rigid contacts that touch, in the basis of the
    level in which they are open: Moreau's impact, then complementarity of acceleration and reaction. A contact closes
    only if the level it enters gives it a reaction >= 0. At rest is also what would be back at its stop before its gap
-   is more than round-off: so ends a sequence of ever smaller bounces.
+   is more than round-off: so ends a sequence of ever smaller bounces. A contact whose gap the closed ones hold
+   already stays open at its stop, without a force: of redundant contacts a set that is independent carries all.
 3. A rigid contact that asks to open always opens: it never pulls.
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
@@ -45,7 +46,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.first_root import ZERO
-from multiphi_exudyn.level import cleared
+from multiphi_exudyn.level import cleared, independent
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
@@ -281,6 +282,17 @@ class EventRule:
         """Those of these contacts that are rigid and closed."""
         return {i for i in contacts if self._rigid[i] and i in state.closed}
 
+    def _joining(self, state: State, held: set[int], asking: set[int]) -> set[int]:
+        """Those of the rigid contacts ``asking`` that can close beside ``held`` and each other, penetrating ones first.
+
+        Between two stops without clearance the one on which nothing presses would keep the other out.
+        """
+        joined = set(held)
+        for i in sorted(asking, key=lambda i: (state.phases[i] is not Phase.REFUSED, i)):
+            if independent(self.model.base, sorted(joined | {i})):
+                joined.add(i)
+        return joined - held
+
     def _answer(
         self, state: State, asking: set[int], heard: set[int], freed: set[int]
     ) -> tuple[State, Loss, list[Change]]:
@@ -300,7 +312,8 @@ class EventRule:
     def _close_without_impact(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
         held = set(state.closed)
-        willing = {i for i in asking if self._reaction_sign(state, state, self.level(held | {i}), i) >= 0}
+        joining = self._joining(state, self._held(state, held), asking)
+        willing = {i for i in joining if self._reaction_sign(state, state, self.level(held | {i}), i) >= 0}
         if not willing:
             return self._with_phases(state, asking), Loss(), []
         self.transitions += 1
@@ -443,7 +456,9 @@ class EventRule:
         _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
-        return pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
+        return pressing or self._joining(
+            state, set(), {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
+        )
 
     def _unseen(self, state: State, rows: np.ndarray, touching: list[int]) -> np.ndarray:
         """Gap velocities (k,) that the free motion turns back before the gap is more than round-off of its terms."""

@@ -32,7 +32,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.force_law import LawSpring
 from multiphi_exudyn.history import History, differentiated, translated
-from multiphi_exudyn.level import Level
+from multiphi_exudyn.level import Level, cleared
 from multiphi_exudyn.loads import (
     BaseMotion,
     ConstantLoad,
@@ -265,8 +265,9 @@ class DrivenLevel(LoadedLevel):
         """``plain`` with the channels of an excitation."""
         own = plain.level
         parts = _prescribed(own, excitation)
-        gap_columns = own.base.directions.T @ parts.shapes - excitation.stops
-        speeds = own.base.directions.T @ parts.carried - excitation.stops
+        directions, sizes = own.base.directions.T, own.base.magnitudes[0].T
+        gap_columns = directions @ parts.shapes - excitation.stops
+        speeds = directions @ parts.carried - excitation.stops
         none = np.zeros(excitation.channels)
         level = ExtendedLevel(
             closed=own.closed,
@@ -275,11 +276,11 @@ class DrivenLevel(LoadedLevel):
             squares=np.concatenate([own.squares, none]),
             vectors=np.hstack([own.vectors, parts.shapes]),
             damping=np.pad(own.damping, (0, excitation.channels)),
-            gap_rows=np.hstack([own.gap_rows, gap_columns]),
+            gap_rows=np.hstack([own.gap_rows, cleared(gap_columns, sizes @ parts.terms + np.abs(excitation.stops))]),
             force_rows=np.hstack([own.force_rows, parts.contact_force]),
             force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
             neutral=own.neutral,
-            speeds=np.hstack([own.gap_rows, speeds]),
+            speeds=np.hstack([own.gap_rows, cleared(speeds, sizes @ np.abs(parts.carried) + np.abs(excitation.stops))]),
         )
         return cls(
             level=level,
@@ -371,9 +372,10 @@ class DrivenTransition(Transition):
 
 @dataclass(frozen=True)
 class _Prescribed:
-    """What a level makes of the channels: see DrivenLevel; shapes: R (m, q)."""
+    """What a level makes of the channels: see DrivenLevel; shapes: R (m, q), and of which terms they are the sum."""
 
     shapes: np.ndarray
+    terms: np.ndarray
     carried: np.ndarray
     force: np.ndarray
     force_rate: np.ndarray
@@ -406,7 +408,8 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
             contact_force[~rigid, derivative] += pressed[~rigid]
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
-    return _Prescribed(shapes, carried, force, rate, contact_force, contact_rate)
+    terms = np.abs(total) + np.abs(level.vectors) @ np.abs(centre)
+    return _Prescribed(shapes, terms, carried, force, rate, contact_force, contact_rate)
 
 
 def _columns(vectors: list[np.ndarray], length: int) -> np.ndarray:

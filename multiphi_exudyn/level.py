@@ -10,8 +10,9 @@ mass is the identity and the stiffness diag(Omega^2). A level is then a small de
     closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
 
 Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
-K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force. The total stiffness of a law may be negative, and the level indefinite: then omega^2 < 0, the square
-of a rate of growth (eta ~ exp(+-|omega| t)).
+K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force. The total stiffness of
+a law may be negative, and the level indefinite: then omega^2 < 0, the square of a rate of growth
+(eta ~ exp(+-|omega| t)).
 
 The omega of springs K > 0 are singular values of [diag(Omega) Z; sqrt(K) P^T Z], Z an orthonormal null space: as
 accurate as the base's own (see modes.py). Springs K < 0 follow on these modes, w = sqrt|K| Phi^T p, as
@@ -67,6 +68,7 @@ __all__ = [
     "build_base",
     "build_level",
     "cleared",
+    "independent",
     "rays_of",
     "rest",
 ]
@@ -472,7 +474,9 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     closed = list(indices)
     supports = base.supports(closed, base.gaps[closed])
     pinned = supports.directions[:, supports.rigid]
-    _independent(base, pinned, [base.contacts[i].name for i in closed if base.contacts[i].rigid])
+    if not independent(base, held := [i for i in closed if base.contacts[i].rigid]):
+        names = ", ".join(base.contacts[i].name for i in held)
+        raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     if not closed:
         squares, vectors, accuracy = base.modes.omega[:modes] ** 2, np.eye(base.modes.count, modes), 0.0
     elif modes is not None and _few(base, supports, modes):
@@ -611,13 +615,13 @@ def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.nda
     return projected
 
 
-def _independent(base: Base, pinned: np.ndarray, names: list[str]) -> None:
-    """Raises NumericalFailure for rigid contacts (m, k) of which one follows from the others."""
+def independent(base: Base, rigid: Sequence[int]) -> bool:
+    """Whether none of these rigid contacts follows from the others, so that they can be closed together."""
+    pinned = base.directions[:, list(rigid)]
     if pinned.shape[1] == 0:
-        return
+        return True
     diagonal = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
-    if pinned.shape[1] > base.modes.count or np.min(diagonal) <= INDEPENDENT * np.max(diagonal):
-        raise NumericalFailure(f"level: rigid contacts {', '.join(names)} are not independent of each other")
+    return pinned.shape[1] <= base.modes.count and bool(np.min(diagonal) > INDEPENDENT * np.max(diagonal))
 
 
 def _null_space(pinned: np.ndarray) -> np.ndarray:
