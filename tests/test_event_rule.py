@@ -211,3 +211,47 @@ def test_a_closed_rigid_contact_never_pulls_whatever_others_did_at_its_instant()
         case = built(recipe_of(number))
         given = case.displacement, case.velocity, case.loads
         assert not complaints(simulate(case.model, case.t_end, *given, compiled=False))
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        *(20525, 22275, 30128, 30213),  # a spring faces a rigid contact at its place
+        7307,  # coupled damping beside a spring of 1e9 N/m
+        *(19823, 26183),  # a soft mass under its weight on stops
+        *(25121, 25382, 23853, 23981),  # redundant rigid contacts
+        23776,  # two stops without clearance, one of them twice
+        25377,  # redundant under a load on damped rigid-body motion
+    ],
+)
+def test_what_random_cases_found(number):
+    """Seeds of a random campaign: energy out of round-off, or contacts that depend on each other."""
+    case = built(recipe_of(number))
+    run = simulate(case.model, case.t_end, case.displacement, case.velocity, case.loads, compiled=False)
+    assert run.status == "ok", run.message
+    assert not complaints(run)
+
+
+class TestRedundantContacts:
+    """Of contacts that follow from each other a set that is independent carries all: the motion knows no difference."""
+
+    def test_a_stop_twice_is_one_stop(self):
+        once = MultiPhiModel(chain(3), [stop(gap=0.1)], "all")
+        twice = MultiPhiModel(chain(3), [stop(gap=0.1), stop(gap=0.1, name="twin")], "all")
+        one, two = (simulate(m, 30.0, velocity=[-1.0, 0.3, 0.2]) for m in (once, twice))
+        t = np.linspace(0, 30, 200)
+        assert two.status == "ok"
+        assert len(one.events) == 8
+        assert_allclose(two.displacement(t), one.displacement(t), atol=1e-11)
+        assert np.min(two.gap("twin", t)) > -1e-12
+
+    def test_stops_on_both_sides_without_clearance_hold_like_a_clamp(self):
+        """One of them is closed at a time, the other without a force; the reaction changes sides."""
+        above = UnilateralContact("above", {"m0": -1.0}, 0.0)
+        m = MultiPhiModel(chain(2), [stop(gap=0.0, name="below"), above], "all")
+        run = simulate(m, 20.0, velocity=[0.0, 1.0])
+        t = np.linspace(0, 20, 101)
+        assert run.status == "ok"
+        assert_allclose(run.displacement(t)[0], 0, atol=1e-13)
+        assert_allclose(run.displacement(t)[1], np.sin(t), atol=1e-12)
+        assert {event.contact for event in run.events} == {"below", "above"}

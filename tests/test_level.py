@@ -134,6 +134,27 @@ class TestAsymptoticConfiguration:
             assert_allclose(rest.strain, 0.5 * x @ m.structure.stiffness @ x + sum(springs), rtol=1e-9)
             assert_allclose(rest.potential, rest.strain - load @ x, rtol=1e-8, atol=1e-10)
 
+    def test_of_a_soft_mode_keeps_to_its_stops_as_exactly_as_a_stiff_one(self):
+        """The load would carry the soft mass 300 m away; what is left of a gap is round-off of the 1e-6 m it moves."""
+        structure = LinearStructure(np.diag([76.0, 1.1, 1.0]), np.diag([2.0, 4e8, 3e9]), points={"m0": 0})
+        directions = [1.2, 1.3, 0.8], [-0.1, -0.7, 0.7]
+        m = MultiPhiModel(structure, [UnilateralContact(f"c{i}", d, 0.0) for i, d in enumerate(directions)], "all")
+        rest = m.level(["c0", "c1"]).asymptotic(m.base.modes.shapes.T @ [-746.0, -10.8, -10.2])
+        x = m.base.modes.shapes @ rest.configuration
+        assert np.all(np.abs(rows(m) @ x) <= 1e-15 * np.abs(rows(m)) @ np.abs(x))
+
+    def test_of_springs_beside_a_rigid_contact_of_their_direction_is_held_by_it_alone(self):
+        """Each spring pushes with what its gap there says, the rigid contact with the rest."""
+        above = UnilateralContact("above", {"m0": -1.0}, -0.3, 1e9)
+        m = MultiPhiModel(chain(3), [above, stop(gap=0.1), UnilateralContact("same", "m0", 0.04, 5e9)], "all")
+        level = m.level(["above", "stop", "same"])
+        rest = level.asymptotic(np.zeros(3))
+        assert_allclose(level.asymptotic_configuration, -0.1, rtol=1e-14)
+        assert_allclose(rest.forces, [2e8, 2e8 - 3e8 - 0.1, 3e8], rtol=1e-15, atol=1e-15 * 1e9)
+        assert_allclose(rest.strain, 0.5 * (0.1**2 + 1e9 * 0.2**2 + 5e9 * 0.06**2), rtol=1e-14)
+        assert_allclose(level.omega, m.level(["stop"]).omega, rtol=1e-14)
+        assert not np.any(level.force_rows[[0, 2]])
+
     def test_of_a_free_body_on_a_stop_carries_the_whole_weight(self):
         m = MultiPhiModel(chain(4, ends=0), [stop("m0", gap=0.3)], modes="all")
         weight = -9.81 * np.ones(4)

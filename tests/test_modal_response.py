@@ -123,6 +123,17 @@ class TestModalResponse:
         assert together.shape == (3, len(basis.rates))
         assert_allclose(together, [basis.at(float(t)) for t in times], rtol=1e-15)
 
+    @pytest.mark.parametrize("seed", range(6))
+    def test_a_slow_start_beside_a_fast_mode_is_met_to_its_own_round_off(self, seed):
+        """What an eigenvalue solver leaves, round-off of the fastest rate, would be 1e-10 of this velocity."""
+        random, omega = np.random.default_rng(seed), np.array([1.0, 1.5, 5.0, 14.0, 6e4])
+        root = random.normal(size=(5, 5))
+        response = modal_response(omega**2, 3 * root @ root.T)
+        displacement, velocity = 17 * random.normal(size=5) / omega, random.normal(size=5)
+        reached = response.state(response.coefficients(displacement, velocity), 0.0)
+        assert_allclose(reached[0], displacement, atol=2e-14)
+        assert_allclose(reached[1], velocity, atol=2e-14)
+
     def test_round_off_beside_the_diagonal_is_no_coupling(self):
         damping = np.diag([1.0, 2.0, 3.0])
         damping[0, 1] = damping[1, 0] = 1e-15
