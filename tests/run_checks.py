@@ -15,6 +15,7 @@ NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose be
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
 DIFFERENCE = 1e-3  # of a level's potential at rest: energies are differences of it, with 1e-3 of CLOSES for round-off
+PASSED = 1e-5  # the same of the open level, which a start passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
@@ -50,8 +51,9 @@ def largest_energy(run, segments):
     times = np.unique([time for segment in segments for time in (segment.start, segment.end)])
     stored = np.max(np.abs(run.energy(times)))
     work = np.max(np.abs(_work(run, times)))
-    rests = max(abs(segment.level.asymptotic.potential) for segment in segments)
-    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST, DIFFERENCE * rests)
+    rests = DIFFERENCE * max(abs(segment.level.asymptotic.potential) for segment in segments)
+    passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
+    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST, rests, passed)
 
 
 def ledger(run, scale):
