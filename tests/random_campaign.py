@@ -26,7 +26,7 @@ from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_withi
 CHUNK = 100  # cases written at a time
 NEAR = 1e-6  # of the largest displacement: the two loops' motions
 LONGEST = 900.0  # s: most cases take a tenth of a second, the first one compiles; a run may never end
-NUDGE = 1e-12  # of the start, more than is cleared on a stop: a run that it changes by over NEAR is sensitive, not wrong
+NUDGE = 1e-12  # of the start, more than is cleared on a stop: a run it changes by over NEAR is sensitive, not wrong
 INSTANTS = 40  # at which two runs are compared
 
 
