@@ -209,17 +209,17 @@ class DescentFinder:
         table = self._table(step)
         controls = _parts(local) @ table.controls
         self.evaluations += INTERVALS + 1
+        suspects = _doubtful(controls, constants, bounds, step)
         first: Descent | None = None
-        for s, constant in enumerate(constants):
-            limit = HERMITE * step**4 * bounds[s][4] - constant
-            doubtful = (controls[s] <= limit).nonzero()[0].tolist()
-            if doubtful and doubtful[0] < 3 and _lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
-                doubtful = [k for k in doubtful if k > 2]
-            if doubtful:
-                search = _Search(self, self._derivatives(local[s], SAMPLED), constant, bounds[s])
-                end = (horizon if first is None else first.time) - start
-                found = search.in_block(_intervals(doubtful), table, step, end)
-                first = first if found is None else Descent(start + found, s)
+        end = horizon - start
+        for k, s in sorted(suspects):  # the earliest doubt first: a descent found ends the search for others sooner
+            if max(0, (k - 1) // 3) * step >= end:
+                break
+            search = _Search(self, self._derivatives(local[s], SAMPLED), constants[s], bounds[s])
+            found = search.in_block(_intervals(suspects[k, s]), table, step, end)
+            if found is not None and (first is None or found < end or s > first.signal):
+                first = Descent(start + found, s)
+                end = first.time - start
         return first
 
 
@@ -245,6 +245,24 @@ class _Table:
         controls[:, 1::3] = samples[:, :-1] + slopes[:, :-1]
         controls[:, 2::3] = samples[:, 1:] - slopes[:, 1:]
         return cls(*(np.ascontiguousarray(np.ascontiguousarray(c.T).view(float).T) for c in (samples, controls)))
+
+
+def _doubtful(
+    controls: np.ndarray, constants: list[float], bounds: list[list[float]], step: float
+) -> dict[tuple[int, int], list[int]]:
+    """Control values (s, 3 INTERVALS + 1) that leave room for a root: by (the first of them, signal), ascending."""
+    limits = [HERMITE * step**4 * bound[4] - constant for constant, bound in zip(constants, bounds, strict=True)]
+    rows, places = (controls <= np.array(limits)[:, None]).nonzero()
+    found: dict[tuple[int, int], list[int]] = {}
+    firsts = np.searchsorted(rows, np.arange(len(constants) + 1)).tolist()
+    every: list[int] = places.tolist()
+    for s, constant in enumerate(constants):
+        doubtful = every[firsts[s] : firsts[s + 1]]
+        if doubtful and doubtful[0] < 3 and _lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
+            doubtful = [k for k in doubtful if k > 2]
+        if doubtful:
+            found[doubtful[0], s] = doubtful
+    return found
 
 
 def _intervals(controls: list[int]) -> Iterator[int]:
