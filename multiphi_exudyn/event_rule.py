@@ -48,7 +48,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.first_root import ZERO
 from multiphi_exudyn.level import cleared, independent
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.state import Change, Loss, Phase, Row, SignalTable, State, sign_of
+from multiphi_exudyn.state import Change, Loss, Phase, Row, Rows, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 
 __all__ = ["EventRule"]
@@ -72,6 +72,7 @@ class EventRule:
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
         self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
         self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
+        self._together: dict[tuple[int, ...], Rows] = {}
         self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[tuple[int, bool]], SignalTable]] = {}
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
@@ -108,6 +109,14 @@ class EventRule:
             return Row(-own.gap_rows[contact], np.zeros(own.modes), -float(level.gap_constants[contact]))
         k = own.indices.index(contact)
         return Row(own.force_rows[k], own.force_rate_rows[k], float(level.asymptotic.forces[k]))
+
+    def _rows(self, level: LoadedLevel) -> Rows:
+        """s of the ``ends`` in a level, together."""
+        closed = level.level.indices
+        if closed not in self._together:
+            rows = [self.function(level, contact) for contact in self.ends(closed)]
+            self._together[closed] = Rows.of(rows, level.level.modes)
+        return self._together[closed]
 
     def entered_function(self, level: LoadedLevel, contact: int) -> Row:
         """s that a contact would have after a change of its state, as a function of the present level's state."""
@@ -240,12 +249,13 @@ class EventRule:
     def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
         """The state with the phase in which every contact stands; ``refused``: those that asked in vain."""
         ends = self.ends(state.closed)
-        standing = [self._standing(state, contact) for contact in ends]
-        if all(phase is Phase.ARMED for phase in standing):
-            return replace(state, phases=self._armed)
+        clear = self._rows(state.level).clear(state.displacement, state.velocity, state.reach)
+        doubtful = [ends[k] for k in np.flatnonzero(~clear)]
         phases = list(self._armed)
-        for contact, phase in zip(ends, standing, strict=True):
-            phases[contact] = phase
+        for contact in doubtful:
+            phases[contact] = self._standing(state, contact)
+        if all(phases[contact] is Phase.ARMED for contact in doubtful):
+            return replace(state, phases=self._armed)
         for contact in set(self.candidates(state.closed, tuple(phases))) - set(ends):
             phases[contact] = self._standing(state, contact)
         for contact in refused:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -12,7 +13,9 @@ from multiphi_exudyn.first_root import ZERO, DescentFinder, Signals
 from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["Change", "Event", "Loss", "Phase", "Row", "SignalTable", "State", "sign_of"]
+__all__ = ["Change", "Event", "Loss", "Phase", "Row", "Rows", "SignalTable", "State", "sign_of"]
+
+CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
 
 
 class Phase(Enum):
@@ -47,18 +50,18 @@ class State:
         """Strain energy less the potential of static loads [J]; a transition can only lower it."""
         return self.level.potential(self.displacement)
 
-    @property
+    @functools.cached_property
     def reach(self) -> np.ndarray:
         """How far (r,) the velocities carry the modes: |eta'| / omega, zero where nothing oscillates."""
         omega = self.level.level.omega
         return np.divide(np.abs(self.velocity), omega, out=np.zeros(len(omega)), where=omega > 0)
 
-    @property
+    @functools.cached_property
     def swing(self) -> np.ndarray:
         """How fast (r,) the displacements make the modes: omega |eta|."""
         return np.abs(self.level.level.omega * self.displacement)
 
-    @property
+    @functools.cached_property
     def acceleration(self) -> np.ndarray:
         """eta'' (r,)."""
         return self.level.acceleration(self.displacement, self.velocity)
@@ -189,6 +192,33 @@ class Row:
         return np.abs(self.position)
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Linear functions of one level's modal state together: position (k, r), rate (k, r) or None for none, constant.
+
+    What most contacts need at most instants, whether a value is positive beyond doubt, is one product for all.
+    """
+
+    position: np.ndarray
+    rate: np.ndarray | None
+    constant: np.ndarray
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], modes: int) -> Rows:
+        """``rows`` of a level with so many modes."""
+        position = np.array([row.position for row in rows]).reshape(len(rows), modes)
+        rate = np.array([row.rate for row in rows]).reshape(len(rows), modes)
+        return cls(position, rate if np.any(rate) else None, np.array([row.constant for row in rows]))
+
+    def clear(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> np.ndarray:
+        """Which of them (k,) ``Row.sign`` calls positive, whatever the order in which their terms are added."""
+        value = self.position @ displacement + self.constant
+        size = np.abs(self.position) @ (np.abs(displacement) + reach) + np.abs(self.constant)
+        if self.rate is not None:
+            value, size = value + self.rate @ velocity, size + np.abs(self.rate) @ np.abs(velocity)
+        return np.asarray(value > CLEAR * size)
+
+
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
     """Sign of a sum, zero where it is round-off of its terms and of ``size``."""
     values = terms.tolist()
@@ -206,12 +236,10 @@ class SignalTable:
     """
 
     def __init__(self, basis: Exponentials, shapes: np.ndarray, rows: list[Row], rates: list[bool]) -> None:
-        r = len(shapes)
-        position = np.array([row.position for row in rows]).reshape(len(rows), r)
-        rate = np.array([row.rate for row in rows]).reshape(len(rows), r)
+        together = Rows.of(rows, len(shapes))
         self._basis = basis
-        self._position = position @ shapes
-        self._rate = rate @ shapes if np.any(rate) else None
+        self._position = together.position @ shapes
+        self._rate = None if together.rate is None else together.rate @ shapes
         self._rates = np.flatnonzero(rates)
         self._constants = np.array([0.0 if is_rate else row.constant for row, is_rate in zip(rows, rates, strict=True)])
 
