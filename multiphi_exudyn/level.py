@@ -147,14 +147,15 @@ class Base:
         first = rays_of(self.contacts)
         plain = [i for i, c in enumerate(self.contacts) if not isinstance(c, LawSpring)]
         for k, i in enumerate(plain):
-            first[i] = next((j for j in plain[:k] if first[j] == j and self._parallel(i, j)), i)
+            before = [j for j in plain[:k] if first[j] == j]
+            first[i] = next((before[same] for same in self._parallel(i, before)), i)
         return first
 
-    def _parallel(self, i: int, j: int) -> bool:
-        """Whether two contacts have one direction up to its sign, and the same measure of a gap along it."""
-        one, other = self.directions[:, i], self.directions[:, j]
-        apart = min(float(np.max(np.abs(one - other))), float(np.max(np.abs(one + other))))
-        return apart <= PARALLEL * float(np.max(np.abs(other)))
+    def _parallel(self, i: int, others: list[int]) -> np.ndarray:
+        """Which of these contacts have the direction of one up to its sign, and the same measure of a gap along it."""
+        one, other = self.directions[:, [i]], self.directions[:, others]
+        apart = np.minimum(np.max(np.abs(one - other), axis=0), np.max(np.abs(one + other), axis=0))
+        return np.flatnonzero(apart <= PARALLEL * np.max(np.abs(other), axis=0))
 
     @functools.cached_property
     def signs(self) -> np.ndarray:
@@ -528,7 +529,8 @@ def _modes(base: Base, supports: Supports, free: np.ndarray) -> tuple[np.ndarray
 def _few(base: Base, supports: Supports, modes: int) -> bool:
     """Whether the compliance gives that many modes cheaply."""
     left = base.modes.count - int(np.sum(supports.rigid))
-    return not base.modes.rigid and bool(np.all(supports.stiffness >= 0)) and FEW * modes <= left
+    few = modes <= left and FEW * modes <= base.modes.count
+    return few and not base.modes.rigid and bool(np.all(supports.stiffness >= 0))
 
 
 def _lowest(base: Base, supports: Supports, modes: int) -> tuple[np.ndarray, np.ndarray, float]:
@@ -610,6 +612,8 @@ def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.nda
     """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own."""
     projected: np.ndarray = vectors.T @ damping @ vectors
     free = squares == 0
+    if not np.any(free):
+        return projected
     negligible = np.abs(projected) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
     projected[negligible & (free[:, None] | free[None, :])] = 0.0
     return projected
@@ -652,7 +656,7 @@ def _reaction_rows(
     smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
     weights = 1 / np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
     residuals = (squared - squares) * vectors - spring_forces
-    grams = np.array([(pinned.T * weight) @ pinned for weight in weights.T]).reshape(-1, *2 * pinned.shape[1:])
+    grams = (pinned.T * weights.T[:, None, :]) @ pinned
     given = (pinned.T @ (weights * residuals)).T
     return np.asarray(np.linalg.solve(grams, given[:, :, None])[:, :, 0].T)
 
