@@ -32,6 +32,7 @@ from multiphi_exudyn.history import differentiated
 from multiphi_exudyn.loads import Load, Smooth, Sweep
 from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import Phase, SignalTable, State
 from multiphi_exudyn.trajectory import Segment, Trajectory
 from multiphi_exudyn.transition import LoadedLevel, Transition
@@ -101,7 +102,7 @@ class DrivenState(State):
     level: DrivenLevel
     drive: Drive
     until: float
-    finders: dict[tuple[tuple[int, ...], Basis], DescentFinder]
+    finders: Recent[tuple[tuple[int, ...], Basis], DescentFinder]
 
     @functools.cached_property
     def flow(self) -> Flow:
@@ -115,7 +116,7 @@ class DrivenState(State):
         eta, eta_t = self.level.split(self.displacement)[0], self.level.split(self.velocity)[0]
         return State(self.level.plain, eta, eta_t, self.phases)
 
-    @property
+    @functools.cached_property
     def acceleration(self) -> np.ndarray:
         """xi'' (r + q,)."""
         (eta, w), (eta_t, w_t) = self.level.split(self.displacement), self.level.split(self.velocity)
@@ -136,9 +137,7 @@ class DrivenState(State):
     def finder(self) -> DescentFinder:
         """Event location on these exponentials."""
         key = self.closed, self.flow.key
-        if key not in self.finders:
-            self.finders[key] = DescentFinder(self.flow.basis)
-        return self.finders[key]
+        return self.finders.find(key) or self.finders.keep(key, DescentFinder(self.flow.basis))
 
     def coefficients(self) -> np.ndarray:
         """Coefficients (p,) of the exponentials for the motion that starts here."""
@@ -160,8 +159,7 @@ class DrivenRule(EventRule):
         self.plain = plain
         self.excitation = excitation
         self.set_out(time, until)
-        self.finders: dict[tuple[tuple[int, ...], Basis], DescentFinder] = {}
-        self._driven: dict[tuple[int, ...], DrivenLevel] = {}
+        self.finders = Recent[tuple[tuple[int, ...], Basis], DescentFinder](plain.model.most_levels)
 
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""
@@ -169,19 +167,17 @@ class DrivenRule(EventRule):
 
     def level(self, closed: Iterable[int]) -> DrivenLevel:
         """The level with these contacts closed, under the static loads and the excitation."""
-        key = tuple(sorted(closed))
-        if key not in self._driven:
-            self._driven[key] = DrivenLevel.under(self.plain.level(key), self.excitation)
-        return self._driven[key]
+        level = super().level(closed)
+        assert isinstance(level, DrivenLevel)
+        return level
 
-    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        """The map between two levels, computed once."""
-        key = (source.level.indices, target.level.indices)
-        if key not in self._maps:
-            assert isinstance(source, DrivenLevel)
-            assert isinstance(target, DrivenLevel)
-            self._maps[key] = DrivenTransition(source, target)
-        return self._maps[key]
+    def _loaded(self, closed: tuple[int, ...]) -> DrivenLevel:
+        return DrivenLevel.under(self.plain.level(closed), self.excitation)
+
+    def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+        assert isinstance(source, DrivenLevel)
+        assert isinstance(target, DrivenLevel)
+        return DrivenTransition(source, target)
 
     def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
@@ -369,10 +365,6 @@ class DrivenMotion(Motion):
 
     def _work_since(self) -> float:
         return self.work
-
-    def _evaluations(self) -> int:
-        assert isinstance(self.rule, DrivenRule)
-        return self.model.evaluations + sum(finder.evaluations for finder in self.rule.finders.values())
 
 
 def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> Trajectory:

@@ -39,7 +39,7 @@ instant is a failure, with its cause.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,8 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.first_root import ZERO
 from multiphi_exudyn.level import cleared, independent
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.model import SIGNAL_TABLES, MultiPhiModel
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import Change, Loss, Phase, Row, Rows, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 
@@ -55,6 +56,22 @@ __all__ = ["EventRule"]
 
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
 RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
+
+
+@dataclass
+class _Known:
+    """What is kept of a level, beside itself: all of it is made when it is first asked for.
+
+    functions: s by contact. together: those of its ``ends``. tables: what is watched, by phases. ways: maps to other
+    levels, by their closed contacts.
+    """
+
+    level: LoadedLevel
+    functions: dict[int, Row] = field(default_factory=dict)
+    together: Rows | None = None
+    ends: tuple[int, ...] = ()
+    tables: dict[tuple[Phase, ...], tuple[list[tuple[int, bool]], SignalTable]] = field(default_factory=dict)
+    ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
 
 
 class EventRule:
@@ -68,38 +85,53 @@ class EventRule:
         self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
         self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
         self._armed = (Phase.ARMED,) * len(self._rigid)
-        self._ends: dict[tuple[int, ...], tuple[int, ...]] = {}
-        self._levels: dict[tuple[int, ...], LoadedLevel] = {}
-        self._maps: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
-        self._functions: dict[tuple[tuple[int, ...], int], Row] = {}
-        self._together: dict[tuple[int, ...], Rows] = {}
-        self._tables: dict[tuple[tuple[int, ...], tuple[Phase, ...]], tuple[list[tuple[int, bool]], SignalTable]] = {}
+        self._all = tuple(range(len(self._rigid)))
+        self.mapped = 0  # ways between levels that have been computed
+        self._known = Recent[tuple[int, ...], _Known](model.most_levels, self._close)
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed, under this load."""
         key = tuple(sorted(closed))
-        if key not in self._levels:
-            self._levels[key] = LoadedLevel.of(self.model.level_at(key), self.load)
-        return self._levels[key]
+        self.model.level_at(key)  # of the levels that the model keeps it is now the one used last
+        return self._of(key).level
+
+    def forget(self, closed: tuple[int, ...]) -> None:
+        """Let go of what is kept of a level."""
+        self._known.drop(closed)
+
+    def _of(self, closed: tuple[int, ...]) -> _Known:
+        return self._known.find(closed) or self._known.keep(closed, _Known(self._loaded(closed)))
+
+    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
+        return LoadedLevel.of(self.model.level_at(closed), self.load)
+
+    def _close(self, closed: tuple[int, ...], gone: _Known) -> None:
+        """The ways to a level that is not kept any more."""
+        for _, known in self._known.items():
+            known.ways.pop(closed, None)
 
     @property
     def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """From and to which closed contacts maps between levels have been asked for, in that order."""
-        return list(self._maps)
+        """From and to which closed contacts maps between levels are kept."""
+        return [(source, target) for source, known in self._known.items() for target in known.ways]
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        """The map between two levels, computed once."""
-        key = (source.level.indices, target.level.indices)
-        if key not in self._maps:
-            self._maps[key] = Transition(source, target)
-        return self._maps[key]
+        """The map between two levels, computed once as long as they are kept."""
+        ways = self._of(source.level.indices).ways
+        if target.level.indices not in ways:
+            ways[target.level.indices] = self._map(source, target)
+            self.mapped += 1
+        return ways[target.level.indices]
+
+    def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+        return Transition(source, target)
 
     def function(self, level: LoadedLevel, contact: int) -> Row:
         """s of a contact in a level."""
-        key = (level.level.indices, contact)
-        if key not in self._functions:
-            self._functions[key] = self._function(level, contact)
-        return self._functions[key]
+        functions = self._of(level.level.indices).functions
+        if contact not in functions:
+            functions[contact] = self._function(level, contact)
+        return functions[contact]
 
     def _function(self, level: LoadedLevel, contact: int) -> Row:
         own = level.level
@@ -112,11 +144,17 @@ class EventRule:
 
     def _rows(self, level: LoadedLevel) -> Rows:
         """s of the ``ends`` in a level, together."""
-        closed = level.level.indices
-        if closed not in self._together:
-            rows = [self.function(level, contact) for contact in self.ends(closed)]
-            self._together[closed] = Rows.of(rows, level.level.modes)
-        return self._together[closed]
+        known, own = self._of(level.level.indices), level.level
+        if known.together is None:
+            ends = self.ends(own.indices)
+            position, constant = own.gap_rows[list(ends)], level.gap_constants[list(ends)]
+            rate = np.zeros_like(position)
+            for k, contact in enumerate(ends):
+                if contact in own.indices:
+                    row = self.function(level, contact)
+                    position[k], rate[k], constant[k] = row.position, row.rate, row.constant
+            known.together = Rows(position, rate if np.any(rate) else None, constant)
+        return known.together
 
     def entered_function(self, level: LoadedLevel, contact: int) -> Row:
         """s that a contact would have after a change of its state, as a function of the present level's state."""
@@ -136,14 +174,17 @@ class EventRule:
 
     def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
         """Contacts that can ask first while all are armed: of a force law the ends of its chains."""
-        if closed not in self._ends:
+        if not self.model.chains:
+            return self._all
+        known = self._of(closed)
+        if not known.ends:
             chains, held = self.model.chains, set(closed)
             linked = {i for chain in chains for i in chain}
             found = {i for i in range(len(self._rigid)) if i not in linked}
             for chain in chains:
                 found.update(_ends(chain, held))
-            self._ends[closed] = tuple(sorted(found))
-        return self._ends[closed]
+            known.ends = tuple(sorted(found))
+        return known.ends
 
     def candidates(self, closed: tuple[int, ...], phases: tuple[Phase, ...]) -> tuple[int, ...]:
         """The ``ends``, and all of a chain that is not armed."""
@@ -154,22 +195,28 @@ class EventRule:
     def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
         settled = phases is self._armed  # the hash of many phases takes its time
-        key = (state.closed, () if settled else phases)
-        if key not in self._tables:
+        key = () if settled else phases
+        tables = self._of(state.closed).tables
+        found = tables.get(key)
+        if found is None:
             waiting, rows, rates = self.watched(state.level, phases)
-            self._tables[key] = waiting, SignalTable(state.basis, state.shapes, rows, rates)
-        return self._tables[key]
+            if len(tables) >= SIGNAL_TABLES:
+                tables.clear()
+            found = tables[key] = waiting, SignalTable(state.basis, state.shapes, rows, rates)
+        return found
 
-    def watched(
-        self, level: LoadedLevel, phases: tuple[Phase, ...]
-    ) -> tuple[list[tuple[int, bool]], list[Row], list[bool]]:
+    def watched(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], Rows, list[bool]]:
         """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
+        if phases is self._armed:
+            ends = self.ends(level.level.indices)
+            return [(contact, True) for contact in ends], self._rows(level), [False] * len(ends)
         found = [
             (contact, *wait)
             for contact in self.candidates(level.level.indices, phases)
             for wait in self._waiting_for(level, contact, phases[contact])
         ]
-        return [(item[0], item[1]) for item in found], [item[2] for item in found], [item[3] for item in found]
+        rows = Rows.of([item[2] for item in found], level.level.modes)
+        return [(item[0], item[1]) for item in found], rows, [item[3] for item in found]
 
     def _waiting_for(self, level: LoadedLevel, contact: int, phase: Phase) -> list[tuple[bool, Row, bool]]:
         """(asks, function, whether its rate is meant) of what ends a contact's phase by falling through zero."""
@@ -270,7 +317,7 @@ class EventRule:
             return Phase.ARMED
         rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
         if value == 0 or rate == 0:
-            table = SignalTable(state.basis, state.shapes, [own, own], [False, True])
+            table = SignalTable(state.basis, state.shapes, Rows.of([own, own], len(state.shapes)), [False, True])
             value, rate = state.finder.signs(table.signals(state.coefficients()))
         if value >= 0:
             return Phase.ARMED
@@ -284,7 +331,7 @@ class EventRule:
         force = self.entered_function(state.level, contact)
         sign = force.sign(state.displacement, state.velocity, state.reach)
         if sign == 0:
-            table = SignalTable(state.basis, state.shapes, [force], [False])
+            table = SignalTable(state.basis, state.shapes, Rows.of([force], len(state.shapes)), [False])
             (sign,) = state.finder.signs(table.signals(state.coefficients()))
         return sign <= 0
 
@@ -487,7 +534,7 @@ class EventRule:
 
     def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
         """The state in another level (eq. 38.6), and what truncation took."""
-        if level is state.level:
+        if level.level.indices == state.closed:
             return state, Loss()
         move = self.transition(state.level, level)
         displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)

@@ -27,13 +27,14 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.modal_response import Exponentials
 
-__all__ = ["ZERO", "Descent", "DescentFinder", "Signals"]
+__all__ = ["TABLES", "TABLE_NUMBERS", "ZERO", "Descent", "DescentFinder", "Signals"]
 
 ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
 SAMPLED = 5  # of them, known at every point
 INTERVALS = 64  # in a block
-TABLES = 64  # sample tables kept for a basis
+TABLES = 8  # sample tables kept for a basis: their steps are powers of two, most events need one of a few
+TABLE_NUMBERS = 2 * (4 * INTERVALS + 2)  # floats in a sample table for an exponential
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
 HERMITE = 1 / 384
@@ -190,7 +191,7 @@ class DescentFinder:
 
     def _table(self, step: float) -> _Table:
         if step not in self._tables:
-            if len(self._tables) > TABLES:
+            if len(self._tables) >= TABLES:
                 self._tables.clear()
             self._tables[step] = _Table.of(self.basis, step)
         return self._tables[step]

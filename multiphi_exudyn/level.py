@@ -367,6 +367,10 @@ class Level:
         """Certified event location on the level's exponentials."""
         return DescentFinder(self.response.basis)
 
+    def forget_samples(self) -> None:
+        """Let go of the samples for event location, most of what a level takes; they are made again when needed."""
+        vars(self).pop("finder", None)
+
     def truncated(self, modes: int) -> Level:
         """The same level with its lowest ``modes`` modes."""
         return replace(
@@ -542,9 +546,10 @@ def _lowest(base: Base, supports: Supports, modes: int) -> tuple[np.ndarray, np.
     bent = compliance[:, None] * directions / lengths
     flexibility = directions.T @ bent / lengths[:, None] + np.diag(1 / stiffness / lengths**2)
     taken = scipy.linalg.solve_triangular(np.linalg.cholesky(flexibility), bent.T, lower=True)
-    own = np.diag(compliance) - taken.T @ taken
-    count = base.modes.count
-    _, vectors = scipy.linalg.eigh(own, subset_by_index=[count - modes, count - 1], check_finite=False)
+    own, count = -(taken.T @ taken), base.modes.count
+    own.flat[:: count + 1] += compliance
+    wanted = [count - modes, count - 1]
+    _, vectors = scipy.linalg.eigh(own.T, subset_by_index=wanted, overwrite_a=True, check_finite=False)
     pinned = directions[:, np.isinf(stiffness)]
     if pinned.shape[1]:
         held = np.linalg.qr(pinned)[0]

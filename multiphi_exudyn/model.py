@@ -13,13 +13,19 @@ import numpy as np
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.equilibrium import equilibrium
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.first_root import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
 from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level, rays_of
 from multiphi_exudyn.nonnegative import nonnegative_least_squares
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import LinearStructure, is_real
 
 __all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
 
+CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
+FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
+RULES = 8  # static loads for which a model keeps what simulations have made of its levels
+SIGNAL_TABLES = 16  # kept of a level: sets of phases of its contacts; few come back
 INFEASIBLE = 1e-7  # residual of a least distance: below it the distance is some 1e7 of its nearest constraint
 
 
@@ -62,7 +68,10 @@ class MultiPhiModel:
     modes: r of every level, or "all"; or ``UpTo`` a frequency; or a ``Tolerance``, from which ``simulate`` finds that
     frequency. Levels are truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
-    rules: what simulations keep for later ones, by static load.
+    rules: what simulations keep for later ones, by static load, at most ``RULES``.
+
+    Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
+    asked for, to the bit.
     """
 
     structure: LinearStructure
@@ -70,8 +79,7 @@ class MultiPhiModel:
     modes: int | str | UpTo | Tolerance = 6
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-    rules: dict[bytes, Any] = field(init=False, default_factory=dict, repr=False, compare=False)
-    _levels: dict[tuple[int, ...], Level] = field(init=False, default_factory=dict, repr=False, compare=False)
+    rules: Recent[bytes, Any] = field(init=False, default_factory=lambda: Recent(RULES), repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
@@ -88,7 +96,7 @@ class MultiPhiModel:
         ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
         object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
         if not self._can_share():
-            object.__setattr__(self, "_shared", {"structure": self.structure, "contacts": self.contacts, "levels": {}})
+            object.__setattr__(self, "_shared", {"structure": self.structure, "contacts": self.contacts})
 
     @functools.cached_property
     def base(self) -> Base:
@@ -138,13 +146,26 @@ class MultiPhiModel:
 
     @property
     def levels_built(self) -> int:
-        """Number of levels built so far."""
-        return len(self._levels)
+        """Number of levels built so far, those built again included."""
+        return self._levels.kept
 
-    @property
-    def evaluations(self) -> int:
-        """Samples of event signals taken so far, in all levels."""
-        return sum(level.finder.evaluations for level in self._levels.values() if "finder" in vars(level))
+    @functools.cached_property
+    def most_levels(self) -> int:
+        """Number of levels that are kept: what ``CACHE_BYTES`` hold, with what is kept beside them."""
+        m, c = self.base.modes.count, len(self.contacts)
+        r = self.most_modes or m
+        of_a_mode = m + 20 * r + 2 * c + TABLES * TABLE_NUMBERS + 2 * SIGNAL_TABLES * c
+        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
+
+    @functools.cached_property
+    def _levels(self) -> Recent[tuple[int, ...], Level]:
+        return Recent(self.most_levels, self._forget)
+
+    def _forget(self, indices: tuple[int, ...], level: Level) -> None:
+        """What is made of a level goes with it; a trajectory may still hold the level itself."""
+        level.forget_samples()
+        for _, rule in self.rules.items():
+            rule.forget(indices)
 
     def index(self, name: str) -> int:
         """Position of a contact."""
@@ -162,15 +183,22 @@ class MultiPhiModel:
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
         """The level of closed contacts given by ascending positions."""
-        if indices not in self._levels:
-            base = self.base
-            full = self._shared["levels"].get(indices)
-            if full is None or full.modes < self._needed(indices):
-                full = self._shared["levels"][indices] = build_level(base, indices, self.most_modes)
-            level = full.truncated(self._modes_of(full))
-            override = self.overrides.get(level.closed)
-            self._levels[indices] = level if override is None else level.overridden(override)
-        return self._levels[indices]
+        found = self._levels.find(indices)
+        if found is not None:
+            return found
+        level = self._full(indices)
+        level = level.truncated(self._modes_of(level))
+        override = self.overrides.get(level.closed)
+        return self._levels.keep(indices, level if override is None else level.overridden(override))
+
+    def _full(self, indices: tuple[int, ...]) -> Level:
+        """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
+        base = self.base
+        shared: Recent[tuple[int, ...], Level] = self._shared.setdefault("levels", Recent(self.most_levels))
+        found = shared.find(indices)
+        if found is None or found.modes < self._needed(indices):
+            found = shared.keep(indices, build_level(base, indices, self.most_modes))
+        return found
 
     def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.

@@ -40,7 +40,7 @@ class Motion:
     start_loss: Loss = field(default_factory=Loss)
 
     def __post_init__(self) -> None:
-        self._evaluated, self._transitions = self._evaluations(), self.rule.transitions
+        self._evaluations, self._transitions = 0, self.rule.transitions
         try:
             self._begin()
         except NumericalFailure as failure:
@@ -84,17 +84,13 @@ class Motion:
                 transitions=self.rule.transitions - self._transitions,
                 events=len(events),
                 segments=len(segments),
-                function_evaluations=self._evaluations() - self._evaluated,
+                function_evaluations=self._evaluations,
             ),
         )
 
     def _work_since(self) -> float:
         """Work [J] of what varies in time since the last segment ended."""
         return 0.0
-
-    def _evaluations(self) -> int:
-        """Samples of event signals so far."""
-        return self.model.evaluations
 
     def _continue(self, end: float) -> None:
         """Some way towards ``end``."""
@@ -120,6 +116,7 @@ class Motion:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
         state, horizon = self.state, end - self.time
         finder, coefficients = state.finder, state.coefficients()
+        evaluated = finder.evaluations
         reached, asking, armed_at = 0.0, set[int](), 0.0
         phases = state.phases
         while not asking:
@@ -136,6 +133,7 @@ class Motion:
             if not asking:
                 armed, armed_at = waiting[found.signal][0], reached  # the next one at its own instant, maybe at once
                 phases = tuple(Phase.ARMED if i == armed else phase for i, phase in enumerate(phases))
+        self._evaluations += finder.evaluations - evaluated
         started, self.time = self.time, end if reached == horizon else self.time + reached
         self._keep(self._segment(started, coefficients, armed_at))
         self.state = replace(state.after(coefficients, reached), phases=phases)
@@ -202,7 +200,8 @@ class CompiledMotion(Motion):
 
     def _continue(self, end: float) -> None:
         given = self.state, self.time, end, self.record, self.window, self._allowed, ACCUMULATED
-        self.state, self.time, chatter = self.loop.advance(*given)
+        self.state, self.time, samples, chatter = self.loop.advance(*given)
+        self._evaluations += samples
         if chatter:
             self._check_chatter()
         if self.time < end:

@@ -120,9 +120,7 @@ def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
 def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
     """The model's event rule under this load, kept by the model: its maps between levels serve every run."""
     key = load.tobytes()
-    if key not in model.rules:
-        model.rules[key] = EventRule(model, load)
-    rule: EventRule = model.rules[key]
+    rule: EventRule = model.rules.find(key) or model.rules.keep(key, EventRule(model, load))
     return rule
 
 

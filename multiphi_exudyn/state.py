@@ -235,13 +235,12 @@ class SignalTable:
     rates: those whose time derivative is meant.
     """
 
-    def __init__(self, basis: Exponentials, shapes: np.ndarray, rows: list[Row], rates: list[bool]) -> None:
-        together = Rows.of(rows, len(shapes))
+    def __init__(self, basis: Exponentials, shapes: np.ndarray, rows: Rows, rates: list[bool]) -> None:
         self._basis = basis
-        self._position = together.position @ shapes
-        self._rate = None if together.rate is None else together.rate @ shapes
+        self._position = rows.position @ shapes
+        self._rate = None if rows.rate is None else rows.rate @ shapes
         self._rates = np.flatnonzero(rates)
-        self._constants = np.array([0.0 if is_rate else row.constant for row, is_rate in zip(rows, rates, strict=True)])
+        self._constants = np.where(rates, 0.0, rows.constant)
 
     def signals(self, coefficients: np.ndarray) -> Signals:
         """The signals of the motion with these coefficients (p,)."""

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
-    ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative"),
+    ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative", "recent"),
     ("structure", "assemble", "matrix_files", "beam", "contact", "force_law", "loads"),
     ("level", "equilibrium", "transition", "model", "excitation"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),

@@ -25,21 +25,21 @@ class CompiledLoop:
 
     def advance(
         self, state: State, time: float, end: float, record: Record, window: int, period: float, within: float
-    ) -> tuple[State, float, bool]:
-        """(state, time [s], whether it was chatter that stopped it) as far as the kernel comes from a state.
+    ) -> tuple[State, float, int, bool]:
+        """(state, time [s], samples, whether it was chatter that stopped it) as far as the kernel comes from a state.
 
         window, period, within: of the chatter check of motion.py.
         """
         position = self._pack.position(state.level)
         if position is None:
-            return state, time, False
+            return state, time, 0, False
         self._pack.connect()
         levels = self._pack.levels
         x, v = np.zeros((2, levels.squared.shape[1]))
         r = len(state.displacement)
         x[:r], v[:r] = state.displacement, state.velocity
         phases = np.array([NUMBERS[phase] for phase in state.phases], np.int8)
-        first, status = record.count, FULL
+        first, status, taken = record.count, FULL, 0
         while status == FULL:
             record.make_room()
             status, position, time, record.count, record.happened, samples, transitions = run(
@@ -62,11 +62,11 @@ class CompiledLoop:
                 period,
                 within,
             )
-            state.level.level.finder.evaluations += samples
+            taken += samples
             self._pack.rule.transitions += transitions
         if record.count == first:
-            return state, time, False
+            return state, time, taken, False
         level = self._pack.loaded[position]
         r = level.level.modes
         reached = State(level, x[:r], v[:r], tuple(PHASES[k] for k in phases.tolist()))
-        return reached, time, status == CHATTER
+        return reached, time, taken, status == CHATTER

@@ -2,6 +2,9 @@
 
 A level is packed when the NumPy loop has visited it, a way between two levels when that loop has computed it. Arrays
 are as wide as the largest level packed so far. Complex numbers are rows of real and imaginary parts.
+
+What is packed stays, for trajectories refer to it. Levels that ``PACK_BYTES`` have no room for are left to the NumPy
+loop.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Levels", "Pack"]
 
+PACK_BYTES = 2**29  # of all arrays of a pack: half of what a model may keep (model.py)
 LENGTHS = 56  # interval lengths, each twice the one before
 
 
@@ -101,22 +105,34 @@ class Pack:
         indices = level.level.indices
         if indices not in self._positions:
             basis = level.level.response.basis
-            runs = basis.pure and not level.driven and np.any(basis.rates)
+            runs = basis.pure and not level.driven and np.any(basis.rates) and self._has_room(level)
             self._positions[indices] = self._add(level) if runs else None
         return self._positions[indices]
 
     def connect(self) -> None:
         """Pack the ways between packed levels that the rule has computed since."""
-        ways = self.rule.ways
-        if (len(ways), len(self.loaded)) == self._seen:
+        if (self.rule.mapped, len(self.loaded)) == self._seen:
             return
-        self._seen = len(ways), len(self.loaded)
+        ways = self.rule.ways
+        self._seen = self.rule.mapped, len(self.loaded)
         for source, target in ways:
             changed, here, there = {*source} ^ {*target}, self._positions.get(source), self._positions.get(target)
             if len(changed) == 1 and here is not None and there is not None:
                 (contact,) = changed
                 if self.levels.target[here, contact] < 0:
                     self._connect(here, there, contact)
+
+    def _has_room(self, level: LoadedLevel) -> bool:
+        """Whether the arrays with one more level are no larger than ``PACK_BYTES``."""
+        held, r, p = self._sizes(len(self.loaded) + 1, level.level.modes, len(level.level.response.basis.rates))
+        one = Levels.empty(1, r, p, self._rigid)
+        return held * sum(array.nbytes for array in one) <= PACK_BYTES
+
+    def _sizes(self, count: int, r: int, p: int) -> tuple[int, int, int]:
+        """Levels, modes and exponentials that arrays with room for so many levels of these sizes have room for."""
+        held = len(self.levels.sizes)
+        wider = max(r, self.levels.squared.shape[1]), max(p, self.levels.rates.shape[2])
+        return (max(2 * held, 2) if count > held else held), *wider
 
     def _add(self, level: LoadedLevel) -> int:
         own, response = level.level, level.level.response
@@ -158,11 +174,10 @@ class Pack:
 
     def _reserve(self, count: int, r: int, p: int) -> None:
         """Room for so many levels of these sizes; what is packed moves to wider arrays where it is too small."""
-        held = len(self.levels.sizes)
-        r, p = max(r, self.levels.squared.shape[1]), max(p, self.levels.rates.shape[2])
-        if count <= held and self.levels.squared.shape[1:] == (r,) and self.levels.rates.shape[2:] == (p,):
+        n, r, p = self._sizes(count, r, p)
+        if (n, r, p) == (len(self.levels.sizes), self.levels.squared.shape[1], self.levels.rates.shape[2]):
             return
-        wider = Levels.empty(max(2 * held, 2) if count > held else held, r, p, self._rigid)
+        wider = Levels.empty(n, r, p, self._rigid)
         for name, old, new in zip(Levels._fields, self.levels, wider, strict=True):
             if name != "rigid":
                 new[tuple(slice(n) for n in old.shape)] = old

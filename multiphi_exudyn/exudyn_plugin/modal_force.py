@@ -10,7 +10,7 @@ Coordinates of such a level are eta - d. A force on coordinate k acts on mode k 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,14 +35,9 @@ class ForcedRule(EventRule):
         super().__init__(plain.model, plain.load)
         self._plain = plain
         self._force_in = force_in
-        self._forced: dict[tuple[int, ...], LoadedLevel] = {}
 
-    def level(self, closed: Iterable[int]) -> LoadedLevel:
-        """The level with these contacts closed, under the static load and its modal force."""
-        key = tuple(sorted(closed))
-        if key not in self._forced:
-            self._forced[key] = _forced(self._plain.level(key), self._force_in(key))
-        return self._forced[key]
+    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
+        return _forced(self._plain.level(closed), self._force_in(closed))
 
 
 @dataclass(frozen=True)
