@@ -111,6 +111,11 @@ class EventRule:
             known.ways.pop(closed, None)
 
     @property
+    def levels_kept(self) -> int:
+        """Number of levels of which something is kept."""
+        return len(self._known)
+
+    @property
     def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
         """From and to which closed contacts maps between levels are kept."""
         return [(source, target) for source, known in self._known.items() for target in known.ways]

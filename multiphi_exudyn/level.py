@@ -111,7 +111,7 @@ class Base:
     """The structure and its contacts in coordinates y of its own modes, x = Phi y.
 
     modes: of the open structure, (n, m). damping: (m, m), C in these coordinates. directions: H (m, c).
-    contacts: as given. complete: whether m = n. weights: Phi^T M (m, n), takes x to y.
+    contacts: as given. complete: whether m = n. mass: M (n, n), the structure's own.
     """
 
     modes: Modes
@@ -119,7 +119,11 @@ class Base:
     directions: np.ndarray
     contacts: tuple[Contact, ...]
     complete: bool
-    weights: np.ndarray
+    mass: Matrix
+
+    def coordinates(self, x: np.ndarray) -> np.ndarray:
+        """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k)."""
+        return np.asarray(self.modes.shapes.T @ (self.mass @ x))
 
     @functools.cached_property
     def gaps(self) -> np.ndarray:
@@ -464,7 +468,7 @@ def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: i
         directions=cleared(found.shapes.T @ rows.T, np.abs(found.shapes.T) @ np.abs(rows.T)),
         contacts=tuple(contacts),
         complete=complete,
-        weights=(structure.mass @ found.shapes).T,
+        mass=structure.mass,
     )
 
 

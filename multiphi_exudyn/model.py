@@ -149,6 +149,11 @@ class MultiPhiModel:
         """Number of levels built so far, those built again included."""
         return self._levels.kept
 
+    @property
+    def levels_kept(self) -> int:
+        """Number of levels that are kept."""
+        return len(self._levels)
+
     @functools.cached_property
     def most_levels(self) -> int:
         """Number of levels that are kept: what ``CACHE_BYTES`` hold, with what is kept beside them."""

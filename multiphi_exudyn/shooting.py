@@ -51,8 +51,8 @@ class PeriodMap:
 
     def states(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
         """q (2 m, k) of x, x' (n, k)."""
-        weights = self.model.base.weights
-        return np.vstack([self.scales * (weights @ x), weights @ v])
+        base = self.model.base
+        return np.vstack([self.scales * base.coordinates(x), base.coordinates(v)])
 
     def configuration(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x, x' (n,) of q (2 m,)."""

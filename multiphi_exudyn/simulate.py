@@ -160,7 +160,7 @@ def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> n
     """A given vector (n,) in base coordinates."""
     if given is None:
         return np.zeros(model.base.modes.count)
-    return model.base.weights @ model.structure.vector(name, given)
+    return model.base.coordinates(model.structure.vector(name, given))
 
 
 def _time(name: str, value: float) -> float:

@@ -138,6 +138,5 @@ def _state(segment: Segment, time: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _amplitude(trajectory: Trajectory, end: float) -> float:
     """Root of the mean square of y over [0, end]."""
-    weights = trajectory.model.base.weights
-    moved = weights @ trajectory.displacement(np.linspace(0.0, end, SAMPLES))
+    moved = trajectory.model.base.coordinates(trajectory.displacement(np.linspace(0.0, end, SAMPLES)))
     return float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))

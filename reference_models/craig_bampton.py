@@ -69,13 +69,14 @@ def craig_bampton(structure: LinearStructure, interface: Sequence[str], modes: i
     stiffness = np.diag(np.concatenate([np.zeros(len(held)), level.omega[:modes] ** 2]))
     stiffness[: len(held), : len(held)] = constraint.T @ (base.modes.omega[:, None] ** 2 * constraint)
     rows = base.directions.T
+    taken = np.vstack([rows, inside.T - (inside.T @ constraint) @ rows])
     return CraigBampton(
         interface=tuple(interface),
         mass=basis.T @ basis,
         damping=basis.T @ base.damping @ basis,
         stiffness=stiffness,
         shapes=base.modes.shapes @ basis,
-        weights=np.vstack([rows, inside.T - (inside.T @ constraint) @ rows]) @ base.weights,
+        weights=(structure.mass @ (base.modes.shapes @ taken.T)).T,
     )
 
 

@@ -118,7 +118,7 @@ def solve_stepwise(
         if contact.rigid:
             raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one")
     base = model.base
-    y = base.weights @ displacement
+    y = base.coordinates(displacement)
     rule = EventRule(model, np.zeros(base.modes.count))
     penetrating = np.flatnonzero(base.directions.T @ y + base.gaps < 0)
     state = rule.start(y, np.zeros_like(y), tuple(map(int, penetrating)), ())[0]
