@@ -207,6 +207,10 @@ class Base:
 
     def supports(self, closed: Sequence[int], gaps: np.ndarray) -> Supports:
         """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""
+        along = [self.rays[i] for i in closed]
+        if len(set(along)) == len(along):
+            index, alone = list(closed), tuple((i,) for i in closed)
+            return Supports(alone, self.directions[:, along], self.stiffnesses[index], self.signs[index] * gaps)
         rays: dict[int, list[int]] = {}
         given = dict(zip(closed, gaps.tolist(), strict=True))
         for i in closed:
