@@ -311,7 +311,7 @@ class TestMotion:
 
     def test_looks_at_the_ends_of_its_chains_only(self):
         run = mp.simulate(model(law(hardening, segments=200)), 5.0, displacement=START)
-        rule = next(iter(run.model.rules.values()))
+        ((_, rule),) = run.model.rules.items()
         for segment in run.segments:
             closed = segment.level.level.indices
             assert len(rule.ends(closed)) <= 3
