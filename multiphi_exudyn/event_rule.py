@@ -486,7 +486,10 @@ class EventRule:
     def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
         """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
         rows = state.level.level.speed_rows[touching]
-        velocity, impulses = nearest_admissible(rows, state.velocity, self._free(state.level))
+        free = self._free(state.level)
+        velocity, impulses = nearest_admissible(rows, state.velocity, free)
+        if np.linalg.norm(velocity[:free]) <= RESTING * np.linalg.norm(state.velocity[:free]):
+            velocity[:free] = 0.0  # round-off of rest, which would rock on redundant stops until it underflows
         after = replace(state, velocity=velocity)
         lost = state.kinetic - after.kinetic
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
