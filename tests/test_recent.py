@@ -1,6 +1,8 @@
 """What is kept of levels is bounded, and a bound changes no result."""
 
+import gc
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -62,3 +64,22 @@ def test_a_tiny_bound_gives_the_same_run_to_the_bit_and_is_kept(monkeypatch, mos
     assert tight.levels_kept == most
     assert tight.levels_built > plenty.levels_built
     assert all(rule.levels_kept <= most for _, rule in tight.rules.items())
+
+
+def test_what_is_kept_takes_no_more_bytes_than_the_bound(monkeypatch):
+    """Levels, their samples and tables, and the ways between them; a trajectory that is let go takes its own along."""
+    bound = 2_000_000
+    monkeypatch.setattr(model_module, "CACHE_BYTES", bound)
+    monkeypatch.setattr(model_module, "FEWEST_LEVELS", 1)
+    model = bed(1e7, n=100, stops=30, modes=8)
+    velocity = model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
+    gc.collect()
+    tracemalloc.start()
+    try:
+        built = simulate(model, 0.04, velocity=velocity, compiled=False).stats.levels_built
+        gc.collect()
+        taken = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert built > 2 * model.levels_kept == 2 * model.most_levels > 2
+    assert taken < bound
