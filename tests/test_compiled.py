@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from small_structures import chain, oscillator, random_model, stop
+from test_many_contacts import bed
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.errors import MultiPhiError
@@ -206,6 +207,35 @@ class TestFailures:
             runs.append(mp.simulate(model, 0.3, displacement=start, compiled=True))
         assert [e.time for e in runs[0].events] == pytest.approx([e.time for e in runs[1].events], abs=1e-11)
         assert runs[1].stats.function_evaluations > 1.5 * runs[0].stats.function_evaluations
+
+
+class TestBedOfStops:
+    @staticmethod
+    def struck(stiffness):
+        """A model and its start: many stops are struck one after the other."""
+        model = bed(stiffness, n=60, stops=12, modes=8)
+        return model, model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
+
+    @pytest.mark.parametrize("stiffness", [1e7, math.inf])
+    def test_agrees(self, stiffness):
+        model, velocity = self.struck(stiffness)
+        expected, found = both(model, 0.03, velocity=velocity)
+        assert_same(expected, found, 1e-8)
+        assert len(found.events) > 15
+        assert len({event.contact for event in found.events}) > 5
+        again = mp.simulate(model, 0.03, velocity=velocity, compiled=True)
+        assert by_numpy(again) < 0.5 * len(again.segments)
+
+    def test_levels_that_have_no_room_are_left_to_the_numpy_loop(self, monkeypatch):
+        model, velocity = self.struck(1e7)
+        mp.simulate(model, 0.03, velocity=velocity, compiled=True)
+        monkeypatch.setattr("multiphi_exudyn.compiled.pack.PACK_BYTES", 300_000)
+        tight, _ = self.struck(1e7)
+        runs = [mp.simulate(tight, 0.03, velocity=velocity, compiled=True) for _ in range(2)]
+        assert_same(mp.simulate(tight, 0.03, velocity=velocity, compiled=False), runs[1], 1e-8)
+        packed = [m.rules.find(np.zeros(m.base.modes.count).tobytes()).compiled.bytes_packed for m in (model, tight)]
+        assert 0 < packed[1] <= 300_000 < packed[0]
+        assert 0 < by_numpy(runs[1]) < len(runs[1].segments)
 
 
 @pytest.mark.parametrize(("value", "risen"), [(0.0, True), (1e-3, True), (-1e-3, False)])

@@ -19,6 +19,11 @@ class CompiledLoop:
     def __init__(self, rule: EventRule) -> None:
         self._pack = Pack(rule)
 
+    @property
+    def bytes_packed(self) -> int:
+        """Bytes of the arrays that the kernel works on."""
+        return sum(array.nbytes for array in self._pack.levels)
+
     def record(self) -> Record:
         """An empty record of a run."""
         return Record(self._pack)
