@@ -232,10 +232,10 @@ class TestBedOfStops:
         monkeypatch.setattr("multiphi_exudyn.compiled.pack.PACK_BYTES", 300_000)
         tight, _ = self.struck(1e7)
         runs = [mp.simulate(tight, 0.03, velocity=velocity, compiled=True) for _ in range(2)]
+        assert 0 < by_numpy(runs[1]) < len(runs[1].segments)
         assert_same(mp.simulate(tight, 0.03, velocity=velocity, compiled=False), runs[1], 1e-8)
         packed = [m.rules.find(np.zeros(m.base.modes.count).tobytes()).compiled.bytes_packed for m in (model, tight)]
         assert 0 < packed[1] <= 300_000 < packed[0]
-        assert 0 < by_numpy(runs[1]) < len(runs[1].segments)
 
 
 @pytest.mark.parametrize(("value", "risen"), [(0.0, True), (1e-3, True), (-1e-3, False)])
