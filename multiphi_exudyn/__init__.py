@@ -7,6 +7,7 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 from multiphi_exudyn.assemble import Assembly, assemble
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.courses import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.frequency_response import FrequencyResponse, frequency_response
@@ -16,13 +17,9 @@ from multiphi_exudyn.loads import (
     ConstantLoad,
     FunctionLoad,
     Gravity,
-    Harmonic,
     HarmonicLoad,
-    Sampled,
     SampledLoad,
-    Smooth,
     StopMotion,
-    Sweep,
     SweepLoad,
 )
 from multiphi_exudyn.matrix_files import read_structure

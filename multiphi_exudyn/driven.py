@@ -24,12 +24,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from multiphi_exudyn.courses import Smooth, Sweep
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.excitation import Drive, DrivenLevel, DrivenTransition, Excitation
 from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.forced_response import particular
 from multiphi_exudyn.history import differentiated
-from multiphi_exudyn.loads import Load, Smooth, Sweep
+from multiphi_exudyn.loads import Load
 from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.recent import Recent

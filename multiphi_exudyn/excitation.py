@@ -29,23 +29,12 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.courses import Course, Sampled
 from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.force_law import LawSpring
 from multiphi_exudyn.history import History, differentiated, translated
 from multiphi_exudyn.level import Level, cleared
-from multiphi_exudyn.loads import (
-    BaseMotion,
-    ConstantLoad,
-    Course,
-    FunctionLoad,
-    Gravity,
-    HarmonicLoad,
-    Load,
-    Sampled,
-    SampledLoad,
-    StopMotion,
-    SweepLoad,
-)
+from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.transition import LoadedLevel, Transition
 
@@ -147,7 +136,7 @@ class _Channels:
 
     def add(self, load: Load) -> None:
         """One load's channels; static loads have none."""
-        if isinstance(load, (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)):
+        if isinstance(load, VaryingLoad):
             self._append(self._row(load.at), self._no_stop(), self._history(load.course))
         elif isinstance(load, StopMotion):
             self._check_stop(load.contact)

@@ -20,8 +20,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from multiphi_exudyn.courses import Harmonic
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Harmonic, HarmonicLoad, StaticLoad
+from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
 from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real

@@ -18,17 +18,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.history import History
-from multiphi_exudyn.loads import (
-    BaseMotion,
-    ConstantLoad,
-    FunctionLoad,
-    Gravity,
-    HarmonicLoad,
-    Load,
-    SampledLoad,
-    StopMotion,
-    SweepLoad,
-)
+from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
 from multiphi_exudyn.structure import LinearStructure
 from reference_models.point_contact import PointContact
 
@@ -82,7 +72,7 @@ def actions_of(
         if isinstance(load, (ConstantLoad, Gravity)):
             rows.append(load.row(structure))
             courses.append(History.constant(1.0))
-        elif isinstance(load, (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)):
+        elif isinstance(load, VaryingLoad):
             rows.append(structure.row(load.at))
             courses.append(load.course.history(end))
         elif isinstance(load, StopMotion):

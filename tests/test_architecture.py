@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
     ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative", "recent"),
-    ("structure", "assemble", "matrix_files", "beam", "contact", "force_law", "loads"),
+    ("structure", "assemble", "matrix_files", "beam", "contact", "force_law", "courses", "loads"),
     ("level", "equilibrium", "transition", "model", "excitation"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("shooting", "steady_state", "frequency_response"),

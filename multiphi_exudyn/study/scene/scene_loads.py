@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from multiphi_exudyn.courses import Course, Harmonic, Sampled, Sweep
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.loads import (
     BaseMotion,
     ConstantLoad,
-    Course,
     Gravity,
-    Harmonic,
     HarmonicLoad,
     Load,
-    Sampled,
     SampledLoad,
     StopMotion,
-    Sweep,
     SweepLoad,
 )
 from multiphi_exudyn.structure import At
