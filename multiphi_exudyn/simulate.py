@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.driven import DrivenMotion, DrivenRule, to_tolerance
+from multiphi_exudyn.driven.excitation import Excitation
+from multiphi_exudyn.driven.motion import DrivenMotion
+from multiphi_exudyn.driven.refinement import to_tolerance
+from multiphi_exudyn.driven.rule import DrivenRule
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.excitation import Excitation
 from multiphi_exudyn.force_law import Contact
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance

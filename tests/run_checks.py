@@ -7,7 +7,7 @@ extended precision.
 
 import numpy as np
 
-from multiphi_exudyn.driven import DrivenSegment
+from multiphi_exudyn.driven.segment import DrivenSegment
 from multiphi_exudyn.state import Phase
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
@@ -209,7 +209,7 @@ def _complete(run):
 
 
 def _load(run, segment):
-    """Constant loads (m,); those that pull at damped rigid-body motion are a channel (excitation.py)."""
+    """Constant loads (m,); those that pull at damped rigid-body motion are a channel (driven/excitation.py)."""
     if not isinstance(segment, DrivenSegment):
         return run.load
     _, w = segment.level.split(segment.modal(np.array([segment.start])))

@@ -13,7 +13,7 @@ FLOORS = (
     ("errors",),
     ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative", "recent"),
     ("structure", "assemble", "matrix_files", "beam", "contact", "force_law", "courses", "loads"),
-    ("level", "equilibrium", "transition", "model", "excitation"),
+    ("level", "equilibrium", "transition", "model"),
     ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("shooting", "steady_state", "frequency_response"),
     ("exudyn_plugin",),

@@ -11,7 +11,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGenericODE2, VObjectGenericODE2
 
-from multiphi_exudyn.driven import DrivenMotion
+from multiphi_exudyn.driven.motion import DrivenMotion
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
 from multiphi_exudyn.exudyn_plugin.drawing import Drawing, check_drawing, graphics_of

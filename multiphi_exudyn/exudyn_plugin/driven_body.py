@@ -1,4 +1,4 @@
-"""Multi-Phi body under loads and stops that vary in time (excitation.py).
+"""Multi-Phi body under loads and stops that vary in time (driven/excitation.py).
 
     M q'' + D q' + K q = drive + P w(t) + Q w'(t) + (loads and connectors of the system)
 
@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.driven import DrivenMotion, DrivenRule, DrivenState
+from multiphi_exudyn.driven.excitation import Excitation
+from multiphi_exudyn.driven.motion import DrivenMotion
+from multiphi_exudyn.driven.rule import DrivenRule
+from multiphi_exudyn.driven.state import DrivenState
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.excitation import Excitation
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.driven_step_test import DrivenStepTest, jump_times
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel

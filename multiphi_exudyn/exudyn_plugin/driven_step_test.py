@@ -16,7 +16,8 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.excitation import DrivenLevel, Excitation
+from multiphi_exudyn.driven.excitation import Excitation
+from multiphi_exudyn.driven.level import DrivenLevel
 from multiphi_exudyn.exudyn_plugin.step_test import energy_norm, gains, swell
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.history import History

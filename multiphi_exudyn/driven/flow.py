@@ -1,0 +1,76 @@
+"""Flow: the motion of a driven level while one piece of every load lasts, in closed form.
+
+    xi(t) = Re V (c exp(lambda t)) + Re sum_j exp(mu_j t) sum_k x_jk t^k
+
+xi = (eta, w) as in driven/level.py; the free response and the closed-form response to the present piece of every load
+(forced_response.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.driven.excitation import Drive
+from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.forced_response import particular
+from multiphi_exudyn.history import differentiated
+from multiphi_exudyn.modal_response import Exponentials
+
+__all__ = ["Basis", "Flow"]
+
+Basis = tuple[tuple[complex, int], ...]  # carriers and numbers of powers
+
+
+@dataclass(frozen=True)
+class Flow:
+    """xi(t) = Re shapes (coefficients * basis) from a state on. key: what distinguishes its basis in its level."""
+
+    basis: Exponentials
+    shapes: np.ndarray
+    coefficients: np.ndarray
+    key: Basis
+
+    @classmethod
+    def of(cls, level: DrivenLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
+        """The motion from xi, xi' under a drive, good for [0, horizon]."""
+        own = level.plain.level
+        response, q = own.response, level.excitation.channels
+        blocks, key = list[np.ndarray](), list[tuple[complex, int]]()
+        for rate, given in drive.terms:
+            forces = given @ level.force.T
+            if np.any(level.force_rate):
+                forces = forces + differentiated(rate, given) @ level.force_rate.T
+            x = particular(own.squares, own.damping, response, rate, forces, horizon)
+            block = np.zeros((max(len(x), len(given)), own.modes + q), complex)
+            block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
+            blocks.append(block)
+            key.append((rate, len(block)))
+        at_once = sum(block[0] for block in blocks).real
+        rate_at_once = sum(differentiated(k[0], block)[0] for k, block in zip(key, blocks, strict=True)).real
+        (eta, _), (eta_t, _) = level.split(xi - at_once), level.split(xi_t - rate_at_once)
+        steady = level.plain.asymptotic.drive if level.plain.driven else None
+        free = response.coefficients(eta, eta_t, steady)
+        forced = np.concatenate(blocks).T
+        shapes = np.hstack([np.vstack([response.shapes, np.zeros((q, len(free)))]), forced])
+        coefficients = np.concatenate([free, np.ones(forced.shape[1])])
+        return cls(_basis(response.basis, tuple(key)), shapes, coefficients, tuple(key))
+
+    @property
+    def rows(self) -> np.ndarray:
+        """xi = Re rows phi(t), (r + q, p)."""
+        return self.shapes * self.coefficients
+
+    def at(self, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
+        """xi or a derivative, (r + q,) for a scalar, (r + q, k) for (k,) times from the state on."""
+        rows = self.rows
+        for _ in range(derivative):
+            rows = self.basis.derivative(rows)
+        return np.asarray((rows @ self.basis.at(t).T).real)
+
+
+def _basis(free: Exponentials, key: Basis) -> Exponentials:
+    """The exponentials of the free response and t^k exp(mu t) of every carrier."""
+    rates = np.concatenate([free.rates, *(np.full(count, rate) for rate, count in key)])
+    return Exponentials(rates, np.concatenate([free.powers, *(np.arange(count) for _, count in key)]))

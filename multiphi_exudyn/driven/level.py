@@ -1,0 +1,208 @@
+"""Levels under an excitation: what varies as prescribed coordinates, xi = (eta, w) (eqs. 38.4 to 38.6).
+
+    x = Psi eta + y_inf + R w,   R w = (K_l^-1 - Psi omega^-2 Psi^T) (b w + k h s w)  +  Y w
+
+w (q,) the channels, b and s their patterns and stops (driven/excitation.py). The first part is the quasi-static
+deflection of the modes left out (its inertia is neglected, its strain and the work of the load on it are not). Y holds
+the motion of rigid stops, the static shapes of eq. (38.5) with x_k(t); it has inertia:
+
+    eta'' + D eta' + omega^2 eta = P w + Q w',   P = Psi^T (b + k h s),   on w' as a channel of its own
+                                                 P = Psi^T (c h s - C Y),   Q = -Psi^T Y
+
+In xi every gap and contact force is again linear, so rows, maps between levels, events and energies are those of
+levels under static loads, with q more columns.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.driven.excitation import Excitation, columns
+from multiphi_exudyn.level import Level, cleared
+from multiphi_exudyn.transition import LoadedLevel, Transition
+
+__all__ = ["DrivenLevel", "DrivenTransition", "ExtendedLevel"]
+
+
+@dataclass(frozen=True)
+class ExtendedLevel(Level):
+    """A level in the coordinates xi = (eta, w) (r + q): its rows and vectors have q more columns.
+
+    speeds: gap velocities (c, r + q) without the quasi-static part. squares and damping are zero on w.
+    """
+
+    speeds: np.ndarray
+
+    @property
+    def speed_rows(self) -> np.ndarray:
+        """Gap velocities (c, r + q) as impacts see them."""
+        return self.speeds
+
+
+@dataclass(frozen=True)
+class DrivenLevel(LoadedLevel):
+    """A level under static and varying loads, in the coordinates xi = (eta, w).
+
+    plain: the level under the static loads alone. force, force_rate: P, Q (r, q). carried: Y (m, q).
+    excitation: of the run.
+    """
+
+    plain: LoadedLevel
+    force: np.ndarray
+    force_rate: np.ndarray
+    carried: np.ndarray
+    excitation: Excitation
+
+    @classmethod
+    def under(cls, plain: LoadedLevel, excitation: Excitation) -> DrivenLevel:
+        """``plain`` with the channels of an excitation."""
+        own = plain.level
+        parts = _prescribed(own, excitation)
+        directions, sizes = own.base.directions.T, own.base.magnitudes[0].T
+        gap_columns = directions @ parts.shapes - excitation.stops
+        speeds = directions @ parts.carried - excitation.stops
+        none = np.zeros(excitation.channels)
+        level = ExtendedLevel(
+            closed=own.closed,
+            indices=own.indices,
+            base=own.base,
+            squares=np.concatenate([own.squares, none]),
+            vectors=np.hstack([own.vectors, parts.shapes]),
+            damping=np.pad(own.damping, (0, excitation.channels)),
+            gap_rows=np.hstack([own.gap_rows, cleared(gap_columns, sizes @ parts.terms + np.abs(excitation.stops))]),
+            force_rows=np.hstack([own.force_rows, parts.contact_force]),
+            force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
+            neutral=own.neutral,
+            speeds=np.hstack([own.gap_rows, cleared(speeds, sizes @ np.abs(parts.carried) + np.abs(excitation.stops))]),
+        )
+        return cls(
+            level=level,
+            asymptotic=plain.asymptotic,
+            gap_constants=plain.gap_constants,
+            plain=plain,
+            force=parts.force,
+            force_rate=parts.force_rate,
+            carried=parts.carried,
+            excitation=excitation,
+        )
+
+    def split(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """eta (r, ...) and w (q, ...) of xi."""
+        r = self.plain.level.modes
+        return xi[:r], xi[r:]
+
+    def motion(self, velocity: np.ndarray) -> np.ndarray:
+        """y' (m, ...) of xi', without the quasi-static part: Psi eta' + Y w'."""
+        eta_t, w_t = self.split(velocity)
+        return np.asarray(self.plain.level.vectors @ eta_t + self.carried @ w_t)
+
+    def kinetic(self, velocity: np.ndarray) -> np.ndarray:
+        """Kinetic energy [J] of (r + q,) or of every column."""
+        if not np.any(self.carried):
+            return self.plain.kinetic(self.split(velocity)[0])
+        return np.asarray(0.5 * np.sum(self.motion(velocity) ** 2, axis=0))
+
+    def strain(self, displacement: np.ndarray) -> np.ndarray:
+        """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column."""
+        base, index = self.level.base, list(self.level.indices)
+        y = self.configuration(displacement)
+        springs = base.stiffnesses[index]
+        springs = np.where(np.isinf(springs), 0.0, springs)
+        gaps = (self.level.gap_rows[index] @ displacement).T + self.gap_constants[index]
+        bent = 0.5 * (np.sum((base.modes.omega * y.T) ** 2, axis=-1) + gaps**2 @ springs)
+        return np.asarray(bent - y.T @ base.preload + base.datum)
+
+    def potential(self, displacement: np.ndarray) -> float:
+        """Strain energy less the potential f.x of the loads [J] at their present values."""
+        load = self.excitation.load(self.split(displacement)[1])
+        return float(self.strain(displacement) - load @ self.configuration(displacement))
+
+    def configuration(self, displacement: np.ndarray) -> np.ndarray:
+        """y (m, ...) in base coordinates."""
+        moved = self.level.vectors @ displacement
+        return np.asarray((moved.T + self.asymptotic.configuration).T)
+
+
+@dataclass(frozen=True)
+class DrivenTransition(Transition):
+    """The map of eq. (38.6) between levels in the coordinates xi; w stays what it is."""
+
+    source: DrivenLevel
+    target: DrivenLevel
+
+    @functools.cached_property
+    def matrix(self) -> np.ndarray:
+        """[[Psi_m^T Psi_l, Psi_m^T (R_l - R_m)], [0, 1]]."""
+        return self._map(
+            self.source.level.vectors[:, self._modes :], self.target.level.vectors[:, self._target_modes :]
+        )
+
+    @functools.cached_property
+    def velocity_matrix(self) -> np.ndarray:
+        """[[Psi_m^T Psi_l, Psi_m^T (Y_l - Y_m)], [0, 1]]."""
+        return self._map(self.source.carried, self.target.carried)
+
+    @functools.cached_property
+    def offset(self) -> np.ndarray:
+        """c (r_m + q,)."""
+        jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
+        return np.concatenate([self.target.plain.level.vectors.T @ jump, np.zeros(self.source.excitation.channels)])
+
+    @property
+    def _modes(self) -> int:
+        return self.source.plain.level.modes
+
+    @property
+    def _target_modes(self) -> int:
+        return self.target.plain.level.modes
+
+    def _map(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+        project = self.target.plain.level.vectors.T
+        modal, prescribed = project @ self.source.plain.level.vectors, project @ (source - target)
+        q = self.source.excitation.channels
+        return np.block([[modal, prescribed], [np.zeros((q, self._modes)), np.eye(q)]])
+
+
+@dataclass(frozen=True)
+class _Prescribed:
+    """What a level makes of the channels: see DrivenLevel; shapes: R (m, q), and of which terms they are the sum."""
+
+    shapes: np.ndarray
+    terms: np.ndarray
+    carried: np.ndarray
+    force: np.ndarray
+    force_rate: np.ndarray
+    contact_force: np.ndarray
+    contact_force_rate: np.ndarray
+
+
+def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
+    base, index = level.base, list(level.indices)
+    rigid = np.isinf(base.stiffnesses[index])
+    stops, directions = excitation.stops[index], base.directions[:, index]
+    springs = np.where(rigid, 0.0, base.stiffnesses[index])
+    force = level.vectors.T @ excitation.patterns + level.vectors.T @ (directions @ (springs[:, None] * stops))
+    squares = level.squares[:, None]
+    centre = np.divide(force, squares, out=np.zeros_like(force), where=squares != 0)
+    at_rest = [level.rest(excitation.patterns[:, k], -stops[:, k]) for k in range(excitation.channels)]
+    held = [level.rest(np.zeros(base.modes.count), np.where(rigid, -stops[:, k], 0.0)) for k in range(len(at_rest))]
+    carried = columns([y for _, y in held], base.modes.count)
+    total = columns([y for _, y in at_rest], base.modes.count)
+    contact_force = columns([forces for forces, _ in at_rest], len(index)) - level.force_rows @ centre
+    shapes = total - level.vectors @ centre
+    rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
+    pinned = directions[:, rigid]
+    for k, derivative in enumerate(excitation.rate_of):
+        if derivative >= 0:
+            pressed = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # of dampers, at w' = 1
+            damped = base.damping @ carried[:, k] - directions @ pressed
+            force[:, derivative] -= level.vectors.T @ damped
+            rate[:, derivative] -= level.vectors.T @ carried[:, k]
+            contact_force[~rigid, derivative] += pressed[~rigid]
+            contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
+            contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
+    terms = np.abs(total) + np.abs(level.vectors) @ np.abs(centre)
+    return _Prescribed(shapes, terms, carried, force, rate, contact_force, contact_rate)

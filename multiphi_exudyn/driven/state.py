@@ -1,0 +1,77 @@
+"""State under an excitation: xi = (eta, w), xi' and the drive that takes them on."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multiphi_exudyn.driven.excitation import Drive
+from multiphi_exudyn.driven.flow import Basis, Flow
+from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.first_root import DescentFinder
+from multiphi_exudyn.modal_response import Exponentials
+from multiphi_exudyn.recent import Recent
+from multiphi_exudyn.state import State
+
+__all__ = ["DrivenState"]
+
+
+@dataclass(frozen=True)
+class DrivenState(State):
+    """A state xi, xi' of a driven level, with the drive from its instant on, that is looked at up to ``until`` [s]."""
+
+    level: DrivenLevel
+    drive: Drive
+    until: float
+    finders: Recent[tuple[tuple[int, ...], Basis], DescentFinder]
+
+    @functools.cached_property
+    def flow(self) -> Flow:
+        """The motion that starts here."""
+        horizon = _bucket(min(self.drive.until, self.until) - self.drive.time)
+        return Flow.of(self.level, self.displacement, self.velocity, self.drive, horizon)
+
+    @property
+    def plain(self) -> State:
+        """eta, eta' alone, in the level under static loads."""
+        eta, eta_t = self.level.split(self.displacement)[0], self.level.split(self.velocity)[0]
+        return State(self.level.plain, eta, eta_t, self.phases)
+
+    @functools.cached_property
+    def acceleration(self) -> np.ndarray:
+        """xi'' (r + q,)."""
+        (eta, w), (eta_t, w_t) = self.level.split(self.displacement), self.level.split(self.velocity)
+        forced = self.level.force @ w + self.level.force_rate @ w_t
+        return np.concatenate([self.level.plain.acceleration(eta, eta_t) + forced, self.drive.values[2]])
+
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials of the motion that starts here."""
+        return self.flow.basis
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """xi is the real part of these times coefficients times exponentials."""
+        return self.flow.shapes
+
+    @property
+    def finder(self) -> DescentFinder:
+        """Event location on these exponentials."""
+        key = self.closed, self.flow.key
+        return self.finders.find(key) or self.finders.keep(key, DescentFinder(self.flow.basis))
+
+    def coefficients(self) -> np.ndarray:
+        """Coefficients (p,) of the exponentials for the motion that starts here."""
+        return self.flow.coefficients
+
+    def after(self, coefficients: np.ndarray, t: float) -> DrivenState:
+        """The state a time t [s] later."""
+        return replace(self, displacement=self.flow.at(t), velocity=self.flow.at(t, 1), drive=self.drive.after(t))
+
+
+def _bucket(duration: float) -> float:
+    """The power of two above a duration: bases are shared among pieces of about the same length."""
+    return math.ldexp(1.0, math.frexp(duration)[1])
