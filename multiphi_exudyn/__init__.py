@@ -5,7 +5,7 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 """
 
 from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.courses import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
@@ -24,6 +24,7 @@ from multiphi_exudyn.loads import (
 )
 from multiphi_exudyn.matrix_files import read_structure
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
+from multiphi_exudyn.section import Section
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event
 from multiphi_exudyn.steady_state import SteadyState, steady_state

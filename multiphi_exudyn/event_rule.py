@@ -45,10 +45,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.first_root import ZERO
 from multiphi_exudyn.level import cleared, independent
 from multiphi_exudyn.model import SIGNAL_TABLES, MultiPhiModel
 from multiphi_exudyn.recent import Recent
+from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.state import Change, Loss, Phase, Row, Rows, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 

@@ -19,28 +19,23 @@ for CAGD, ch. 5.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.modal_response import Exponentials
+from multiphi_exudyn.exponentials import Exponentials
+from multiphi_exudyn.root_search import HERMITE, SAMPLED, ZERO, RootSearch, lifts_off, real_parts
 
-__all__ = ["TABLES", "TABLE_NUMBERS", "ZERO", "Descent", "DescentFinder", "Signals"]
+__all__ = ["TABLES", "TABLE_NUMBERS", "Descent", "DescentFinder", "Signals"]
 
-ZERO = 1e-13  # of sum |a_j^(k)|: a k-th derivative below it is round-off
 DERIVATIVES = 7  # g and its derivatives up to the sixth
-SAMPLED = 5  # of them, known at every point
 INTERVALS = 64  # in a block
 TABLES = 8  # sample tables kept for a basis: their steps are powers of two, most events need one of a few
 TABLE_NUMBERS = 2 * (4 * INTERVALS + 2)  # floats in a sample table for an exponential
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
-NARROWEST = 1e-13  # of the horizon or block: an interval in doubt is not divided below this
-HERMITE = 1 / 384
-LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
 WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold no longer than twice this
-TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal this near to zero at another's root has its root there too
 
 
@@ -172,8 +167,10 @@ class DescentFinder:
                 o == s or values[o] + constants[o] > bounds[o][1] * latest or slopes[o] > bounds[o][2] * latest
                 for o in range(len(constants))
             ):
-                search = _Search(self, self._derivatives(coefficients[s], SAMPLED), constant, bound)
-                return Descent(search.root(latest), s)
+                search = RootSearch(self.basis, self._derivatives(coefficients[s], SAMPLED), constant, bound)
+                found = search.root(latest)
+                self.evaluations += search.evaluations
+                return Descent(found, s)
         return None
 
     def _step(self, constants: list[float], bounds: list[list[float]], remaining: float) -> float:
@@ -208,7 +205,7 @@ class DescentFinder:
         """First descent in a block of intervals; all signals are sampled in one product."""
         local = coefficients if start == 0 else self.basis.shifted(coefficients, start)
         table = self._table(step)
-        controls = _parts(local) @ table.controls
+        controls = real_parts(local) @ table.controls
         self.evaluations += INTERVALS + 1
         suspects = _doubtful(controls, constants, bounds, step)
         first: Descent | None = None
@@ -216,8 +213,9 @@ class DescentFinder:
         for k, s in sorted(suspects):  # the earliest doubt first: a descent found ends the search for others sooner
             if max(0, (k - 1) // 3) * step >= end:
                 break
-            search = _Search(self, self._derivatives(local[s], SAMPLED), constants[s], bounds[s])
-            found = search.in_block(_intervals(suspects[k, s]), table, step, end)
+            search = RootSearch(self.basis, self._derivatives(local[s], SAMPLED), constants[s], bounds[s])
+            found = search.in_block(_intervals(suspects[k, s]), table.values, step, end)
+            self.evaluations += search.evaluations
             if found is not None and (first is None or found < end or s > first.signal):
                 first = Descent(start + found, s)
                 end = first.time - start
@@ -226,7 +224,7 @@ class DescentFinder:
 
 @dataclass(frozen=True)
 class _Table:
-    """Samples of a basis at 0, h, ..., as real rows for the products with ``_parts``.
+    """Samples of a basis at 0, h, ..., as real rows for the products with ``real_parts``.
 
     values: (2p, INTERVALS + 1), phi. controls: (2p, 3 INTERVALS + 1), the Bernstein control values of every interval
     in their order, a sample shared by the two intervals that it bounds.
@@ -259,7 +257,7 @@ def _doubtful(
     every: list[int] = places.tolist()
     for s, constant in enumerate(constants):
         doubtful = every[firsts[s] : firsts[s + 1]]
-        if doubtful and doubtful[0] < 3 and _lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
+        if doubtful and doubtful[0] < 3 and lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
             doubtful = [k for k in doubtful if k > 2]
         if doubtful:
             found[doubtful[0], s] = doubtful
@@ -275,173 +273,6 @@ def _intervals(controls: list[int]) -> Iterator[int]:
             if last < candidate < INTERVALS:
                 last = candidate
                 yield candidate
-
-
-class _Search:
-    """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about.
-
-    derivatives: coefficients (5, p) of g and its first four derivatives.
-    """
-
-    def __init__(self, finder: DescentFinder, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
-        self._finder = finder
-        self._basis = finder.basis
-        self._rates = finder.basis.rates if finder.basis.pure else None
-        self._rows = _parts(derivatives)
-        self._constant = constant
-        self._bounds = bounds
-        self._noise = ZERO * (bounds[0] + abs(constant)), ZERO * bounds[1], ZERO * bounds[2]
-
-    def in_block(self, intervals: Iterable[int], table: _Table, step: float, end: float) -> float | None:
-        """First descent in these intervals of a block, up to ``end``, from the block's start."""
-        for interval in intervals:
-            left = interval * step
-            if left >= end:
-                return None
-            ends = (self._rows @ table.values[:, interval : interval + 2]).T.tolist()
-            for values in ends:
-                values[0] += self._constant
-            found = self._descent(left, left + step, *ends)
-            if found is not None:
-                return found if found <= end else None
-        return None
-
-    def root(self, latest: float) -> float:
-        """The one root in (0, latest] of a signal that falls all the way."""
-        return self._root(0, 0.0, latest, self._point(0.0), self._point(latest))
-
-    def _descent(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
-        """First descent in [left, right], by division until every interval is decided.
-
-        at_left, at_right: g and its first four derivatives at the ends.
-        """
-        narrowest = NARROWEST * right
-        intervals = [(left, right, at_left, at_right)]
-        while intervals:
-            left, right, at_left, at_right = intervals.pop()
-            decided, root = self._decide(left, right, at_left, at_right, narrowest)
-            if root is not None:
-                return root
-            if not decided:
-                middle = (left + right) / 2
-                at_middle = self._point(middle)
-                intervals.append((middle, right, at_middle, at_right))
-                intervals.append((left, middle, at_left, at_middle))
-        return None
-
-    def _point(self, t: float) -> list[float]:
-        """g and its first four derivatives at t."""
-        self._finder.evaluations += 1
-        samples = self._basis.at(t) if self._rates is None else np.exp(self._rates * t)
-        values: list[float] = self._rows.dot(samples.view(float)).tolist()
-        values[0] += self._constant
-        return values
-
-    def _decide(
-        self, left: float, right: float, at_left: list[float], at_right: list[float], narrowest: float
-    ) -> tuple[bool, float | None]:
-        """(decided, root): what certified bounds of g, g', g'' say about a descent in [left, right]."""
-        width = right - left
-        low, high = self._range(0, at_left, at_right, width)
-        if low > 0 or max(-low, high) <= self._noise[0] or self._rises(at_left, at_right, width):
-            return True, None
-        slope_low, slope_high = self._range(1, at_left, at_right, width)
-        if at_left[0] < -self._noise[0]:
-            return True, left
-        if slope_low > 0:
-            return True, None
-        crosses = at_right[0] < -self._noise[0]
-        if slope_high < 0 or width < narrowest:
-            return True, self._root(0, left, right, at_left, at_right) if crosses else None
-        curvature_low, curvature_high = self._range(2, at_left, at_right, width)
-        if curvature_high < 0:
-            return True, self._root(0, left, right, at_left, at_right) if crosses else None
-        if curvature_low > 0:
-            return True, self._convex(left, right, at_left, at_right)
-        return False, None
-
-    def _range(self, order: int, at_left: list[float], at_right: list[float], width: float) -> tuple[float, float]:
-        """Certified range of the derivative of this order on an interval: Bernstein coefficients and remainder."""
-        remainder = HERMITE * width**4 * self._bounds[order + 4]
-        left, right = at_left[order], at_right[order]
-        inner_left, inner_right = left + width * at_left[order + 1] / 3, right - width * at_right[order + 1] / 3
-        low = min(left, right, inner_left, inner_right) - remainder
-        return low, max(left, right, inner_left, inner_right) + remainder
-
-    def _rises(self, at_left: list[float], at_right: list[float], width: float) -> bool:
-        """True where g starts at zero or above and stays above it.
-
-        By g/t: the Bernstein coefficients of (g - g0 (1 - u)^3) / u, u = t / h, exceed the remainder, at most
-        h^4/162 max|g^(4)| u; or by the first derivative that counts, with Taylor's remainder.
-        """
-        if at_left[0] < -self._noise[0]:
-            return False
-        inner_left, inner_right = at_left[0] + width * at_left[1] / 3, at_right[0] - width * at_right[1] / 3
-        if min(3 * inner_left, 1.5 * inner_right, at_right[0]) > LIFTED * width**4 * self._bounds[4]:
-            return True
-        for order in range(1, 4):
-            if at_left[order] > self._bounds[order + 1] * width:
-                return True
-            if order < 3 and at_left[order] < -self._noise[order]:
-                return False
-        return False
-
-    def _convex(self, left: float, right: float, at_left: list[float], at_right: list[float]) -> float | None:
-        """First descent of a convex piece: it lies before the minimum, if the minimum lies below zero."""
-        if at_left[1] >= -self._noise[1]:
-            return None
-        if at_right[1] > 0:
-            right = self._root(1, left, right, at_left, at_right)
-            at_right = self._point(right)
-        return self._root(0, left, right, at_left, at_right) if at_right[0] < -self._noise[0] else None
-
-    def _root(self, order: int, left: float, right: float, at_left: list[float], at_right: list[float]) -> float:
-        """Root in [left, right] of g (order 0, falling) or g' (order 1, rising).
-
-        Inverse Taylor series to third order, kept inside the bracket, from inverse Hermite interpolation.
-        """
-        sign = 1.0 if order == 0 else -1.0
-        t = left + (right - left) * _guess(right - left, at_left[order : order + 2], at_right[order : order + 2])
-        tolerance = TIME_ROUND_OFF * right
-        for _ in range(100):
-            value, slope, curvature, third = self._point(t)[order : order + 4]
-            if sign * value >= 0:
-                left = t
-            else:
-                right = t
-            if slope:
-                newton, c2, c3 = value / slope, curvature / (2 * slope), third / (6 * slope)
-                following = t - newton - c2 * newton**2 - (2 * c2**2 - c3) * newton**3
-                left_out = 5 * abs(c2) * (c2**2 + abs(c3)) + self._bounds[order + 4] / (24 * abs(slope))
-                if left_out * newton**4 <= tolerance or abs(newton) <= tolerance:
-                    return min(max(following, left), right)
-            t = following if slope and left < following < right else (left + right) / 2
-        return t
-
-
-def _lifts_off(controls: list[float], constant: float, width: float, bounds: list[float]) -> bool:
-    """``_Search._rises`` by the Bernstein coefficients of an interval, without their constant."""
-    left, inner_left, inner_right, right = controls
-    if left + constant < -ZERO * (bounds[0] + abs(constant)):
-        return False
-    lifted = min(3 * (inner_left + constant), 1.5 * (inner_right + constant), right + constant)
-    return lifted > LIFTED * width**4 * bounds[4]
-
-
-def _parts(coefficients: np.ndarray) -> np.ndarray:
-    """Real rows (..., 2p) whose product with the interleaved parts of phi is Re(coefficients phi)."""
-    return coefficients.conj().view(float)
-
-
-def _guess(width: float, at_left: list[float], at_right: list[float]) -> float:
-    """Where in its interval, as a fraction, a monotone function is zero: inverse cubic Hermite interpolation."""
-    (left, slope_left), (right, slope_right) = at_left, at_right
-    rise = right - left
-    s = -left / rise if rise else 0.5
-    if slope_left * rise > 0 and slope_right * rise > 0:
-        toward_left, toward_right = rise / (slope_left * width), rise / (slope_right * width)
-        s = s * s * (3 - 2 * s) + s * (1 - s) * ((1 - s) * toward_left - s * toward_right)
-    return min(max(s, 0.01), 0.99)
 
 
 def _power_of_two_above(value: float) -> float:

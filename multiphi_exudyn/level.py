@@ -52,10 +52,11 @@ import scipy.linalg
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.first_root import ZERO, DescentFinder
+from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.force_law import Contact, ForceLaw, LawSpring
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import Modes, complete_modes, lowest_modes, right_singular_vectors
+from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping, real_array
 
 __all__ = [

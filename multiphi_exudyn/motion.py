@@ -16,8 +16,9 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.state import Change, Event, Loss, Phase
-from multiphi_exudyn.trajectory import Segment, Start, Statistics, Trajectory
+from multiphi_exudyn.trajectory import Start, Statistics, Trajectory
 
 __all__ = ["CompiledMotion", "Motion"]
 

@@ -9,8 +9,9 @@ from enum import Enum
 
 import numpy as np
 
-from multiphi_exudyn.first_root import ZERO, DescentFinder, Signals
-from multiphi_exudyn.modal_response import Exponentials
+from multiphi_exudyn.exponentials import Exponentials
+from multiphi_exudyn.first_root import DescentFinder, Signals
+from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Change", "Event", "Loss", "Phase", "Row", "Rows", "SignalTable", "State", "sign_of"]

@@ -9,22 +9,18 @@ a closed-form integral of eta'^T D eta') and what loads did; its residual is the
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.state import Event, Loss, Phase, State
 from multiphi_exudyn.structure import At
-from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["Ledger", "Segment", "Start", "Statistics", "Trajectory"]
-
-MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
+__all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
 
 
 @dataclass(frozen=True)
@@ -35,76 +31,6 @@ class Start:
     velocity: np.ndarray
     penetrating: tuple[int, ...]
     touching: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Motion in one level from ``start`` to ``end`` [s]: coefficients c (p,) of the level's exponentials.
-
-    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed.
-    """
-
-    start: float
-    end: float
-    level: LoadedLevel
-    coefficients: np.ndarray
-    phases: tuple[Phase, ...]
-    armed_at: float
-
-    def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """eta or its first or second derivative, (r, k) at times (k,)."""
-        rows = self.rows
-        for _ in range(derivative):
-            rows = self.basis.derivative(rows)
-        return np.asarray((rows @ self.basis.at(t - self.start).T).real)
-
-    @property
-    def basis(self) -> Exponentials:
-        """The exponentials phi (p,) of the motion."""
-        return self.level.level.response.basis
-
-    @property
-    def rows(self) -> np.ndarray:
-        """eta = Re rows phi(t - start), (r, p)."""
-        return self.level.level.response.shapes * self.coefficients
-
-    def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
-        """Gap (k,) [m] of a contact at times (k,)."""
-        return np.asarray(self.level.level.gap_rows[contact] @ self.modal(t) + self.level.gap_constants[contact])
-
-    def force(self, contact: int, t: np.ndarray) -> np.ndarray:
-        """Contact force (k,) [N] at times (k,), zero where the contact is open."""
-        own = self.level.level
-        if contact not in own.indices:
-            return np.zeros(len(t))
-        k = own.indices.index(contact)
-        moving = own.force_rows[k] @ self.modal(t) + own.force_rate_rows[k] @ self.modal(t, 1)
-        return np.asarray(moving + self.level.asymptotic.forces[k])
-
-    def force_integral(self, contact: int, start: float, end: float) -> float:
-        """Integral of the force of a closed contact [N s], exact: a sum of exponentials plus a constant."""
-        own = self.level.level
-        k, response = own.indices.index(contact), own.response
-        c = response.basis.shifted(self.coefficients, start - self.start)
-        terms = (own.force_rows[k] @ response.shapes) * c
-        terms = terms + (own.force_rate_rows[k] @ response.shapes) * response.basis.derivative(c)
-        integral = float((terms @ response.basis.integrals(end - start)).real)
-        return integral + float(self.level.asymptotic.forces[k]) * (end - start)
-
-    def energy(self, t: np.ndarray) -> np.ndarray:
-        """Kinetic + strain energy (k,) [J] at times (k,)."""
-        return np.asarray(self.level.kinetic(self.modal(t, 1)) + self.level.strain(self.modal(t)))
-
-    def damping_work(self) -> float:
-        """Integral of eta'^T D eta' [J], in closed form pair by pair of exponentials."""
-        own = self.level.level
-        if not np.any(own.damping):
-            return 0.0
-        return own.response.dissipated(self.coefficients, own.damping, self.end - self.start)
-
-    def varying_work(self) -> float:
-        """Work [J] of loads and stops that vary in time."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -254,7 +180,7 @@ class Trajectory:
         depth = 0.0
         for segment in self.segments:
             if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
-                depth = min(depth, float(np.min(segment.gaps(i, _unarmed_times(segment, samples)))))
+                depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))
         return depth
 
     # ------------------------------------------------------------------ evaluation
@@ -314,11 +240,3 @@ class Trajectory:
             raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
         found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
         return np.maximum(found, 0)
-
-
-def _unarmed_times(segment: Segment, samples: int) -> np.ndarray:
-    """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several."""
-    waiting = sum(phase is not Phase.ARMED for phase in segment.phases)
-    end = segment.start + segment.armed_at if waiting == 1 and segment.armed_at > 0 else segment.end
-    periods = segment.level.level.highest_frequency * (end - segment.start)
-    return np.linspace(segment.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))

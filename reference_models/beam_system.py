@@ -22,7 +22,8 @@ import exudyn.itemInterface as eii
 import numpy as np
 
 from multiphi_exudyn.assemble import Tie
-from multiphi_exudyn.beam import Beam, Section, beam_nodes
+from multiphi_exudyn.beam import Beam, beam_nodes
+from multiphi_exudyn.section import Section
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact

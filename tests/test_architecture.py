@@ -11,10 +11,20 @@ import pytest
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors",),
-    ("modes", "modal_response", "first_root", "history", "forced_response", "nonnegative", "recent"),
-    ("structure", "assemble", "matrix_files", "beam", "contact", "force_law", "courses", "loads"),
+    (
+        "modes",
+        "exponentials",
+        "modal_response",
+        "root_search",
+        "first_root",
+        "history",
+        "forced_response",
+        "nonnegative",
+        "recent",
+    ),
+    ("structure", "assemble", "matrix_files", "section", "beam", "contact", "force_law", "courses", "loads"),
     ("level", "equilibrium", "transition", "model"),
-    ("state", "event_rule", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
+    ("state", "event_rule", "segment", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("shooting", "steady_state", "frequency_response"),
     ("exudyn_plugin",),
     ("study.scene",),

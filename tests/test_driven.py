@@ -226,7 +226,7 @@ class TestSmoothLoadsHoldTheirToleranceInTheResponse:
         assert run.status == "failed"
         assert run.message.startswith("at t = 0 s: damping: the damped modes of a level are defective")
         assert (run.t_end, len(run.segments), run.final) == (0.0, 0, None)
-        with pytest.raises(mp.NumericalFailure, match="ledger: got a run without motion .*defective"):
+        with pytest.raises(mp.NumericalFailure, match=r"ledger: got a run without motion .*defective"):
             _ = run.ledger
 
 

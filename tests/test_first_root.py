@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from multiphi_exudyn.exponentials import Exponentials
 from multiphi_exudyn.first_root import Descent, DescentFinder, Signals
-from multiphi_exudyn.modal_response import Exponentials
 
 
 def signals(*rows, constants=None):

@@ -9,10 +9,11 @@ import pytest
 import scipy.linalg
 from scipy.signal import cont2discrete
 
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, planar_beam
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin import linear_structure_from
+from multiphi_exudyn.section import Section
 from reference_models.beam_system import build_beam_system
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_run import EnergyBalance, closed_intervals

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from run_checks import complaints
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
-from multiphi_exudyn.beam import Beam, Section, planar_beam
+from multiphi_exudyn.beam import Beam, planar_beam
 from multiphi_exudyn.level import build_level
+from multiphi_exudyn.section import Section
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes
 SUBSPACES = 1e-9  # sine of the angle between them: what 1e-16 of the softest compliance is to the stiffest mode kept

@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad_vec
 
 from multiphi_exudyn import NumericalFailure
-from multiphi_exudyn.modal_response import exponential_integrals, modal_response
+from multiphi_exudyn.exponentials import exponential_integrals
+from multiphi_exudyn.modal_response import modal_response
 
 
 def by_matrix_exponential(omega, damping, displacement, velocity, force, t):

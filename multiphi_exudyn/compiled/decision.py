@@ -13,7 +13,8 @@ import numpy as np
 from multiphi_exudyn.compiled.pack import Levels
 from multiphi_exudyn.compiled.waves import copy, inlined, jit
 from multiphi_exudyn.event_rule import RESTING
-from multiphi_exudyn.first_root import DERIVATIVES, ZERO
+from multiphi_exudyn.first_root import DERIVATIVES
+from multiphi_exudyn.root_search import ZERO
 
 __all__ = ["ARMED", "DENIED", "LIFTED", "NOT_PLAIN", "PULLED", "RECOVERING", "REFUSED", "collapse", "decide", "expand"]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from multiphi_exudyn.compiled.kernel import CLOSE
 from multiphi_exudyn.compiled.pack import Pack
+from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.state import Event, Loss, Phase
-from multiphi_exudyn.trajectory import Segment
 
 __all__ = ["NUMBERS", "PHASES", "Record"]
 

@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from multiphi_exudyn.compiled.waves import copy, derivatives, jit, multiply, prepare, sample, shift
-from multiphi_exudyn.first_root import HERMITE, LIFTED, RESOLUTION, SIMULTANEOUS, TIME_ROUND_OFF, ZERO
+from multiphi_exudyn.first_root import RESOLUTION, SIMULTANEOUS
+from multiphi_exudyn.root_search import HERMITE, LIFTED, TIME_ROUND_OFF, ZERO
 
 __all__ = ["FOUND", "NONE", "UNDECIDED", "first_descent", "meets_another"]
 
@@ -48,7 +49,7 @@ def rises(
     phi: np.ndarray,
     p: int,
 ) -> bool:
-    """Whether g starts at zero or above and stays above it; see first_root.py."""
+    """Whether g starts at zero or above and stays above it; see root_search.py."""
     noise = ZERO * (bounds[0] + abs(constant))
     if left[0] < -noise:
         return False
@@ -104,7 +105,7 @@ def root(
     given: np.ndarray,
     phi: np.ndarray,
 ) -> tuple[float, int]:
-    """The root of g in [start, start + h], in which g falls, and the samples it took, by the method of first_root.py.
+    """The root of g in [start, start + h], in which g falls, and the samples it took, by the method of root_search.py.
 
     given: the exponentials at the start; phi: those at the root.
     """

@@ -14,9 +14,9 @@ import numpy as np
 
 from multiphi_exudyn.driven.excitation import Drive
 from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.exponentials import Exponentials
 from multiphi_exudyn.forced_response import particular
 from multiphi_exudyn.history import differentiated
-from multiphi_exudyn.modal_response import Exponentials
 
 __all__ = ["Basis", "Flow"]
 

@@ -15,8 +15,8 @@ from multiphi_exudyn.driven.rule import DrivenRule
 from multiphi_exudyn.driven.segment import DrivenSegment
 from multiphi_exudyn.driven.state import DrivenState
 from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.state import Phase
-from multiphi_exudyn.trajectory import Segment
 
 __all__ = ["DrivenMotion"]
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from multiphi_exudyn.driven.flow import Flow
 from multiphi_exudyn.driven.level import DrivenLevel
-from multiphi_exudyn.modal_response import Exponentials
-from multiphi_exudyn.trajectory import Segment
+from multiphi_exudyn.exponentials import Exponentials
+from multiphi_exudyn.segment import Segment
 
 __all__ = ["DrivenSegment"]
 

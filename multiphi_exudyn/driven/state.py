@@ -11,8 +11,8 @@ import numpy as np
 from multiphi_exudyn.driven.excitation import Drive
 from multiphi_exudyn.driven.flow import Basis, Flow
 from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.exponentials import Exponentials
 from multiphi_exudyn.first_root import DescentFinder
-from multiphi_exudyn.modal_response import Exponentials
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import State
 

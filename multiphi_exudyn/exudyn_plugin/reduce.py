@@ -36,13 +36,11 @@ from multiphi_exudyn.exudyn_plugin.items import (
 from multiphi_exudyn.exudyn_plugin.linearize import (
     LinearizedStructure,
     check_system,
-    coordinate_row,
-    default_points,
     forces,
-    given_points,
     initial_is_current,
     projected_matrices,
 )
+from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
 from multiphi_exudyn.loads import ConstantLoad, FunctionLoad, Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
 from multiphi_exudyn.structure import Matrix, ModalDamping, RayleighDamping

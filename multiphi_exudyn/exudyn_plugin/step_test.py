@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
-from multiphi_exudyn.first_root import HERMITE
+from multiphi_exudyn.root_search import HERMITE
 from multiphi_exudyn.state import Row
 
 __all__ = ["Lookahead", "StepTest", "energy_norm", "gains", "swell"]

@@ -15,12 +15,13 @@ from typing import TypeVar
 import numpy as np
 import scipy.sparse
 
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section
+from multiphi_exudyn.beam import Beam, Clamp, PointMass
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
 from multiphi_exudyn.matrix_files import read_array, read_arrays, read_structure
+from multiphi_exudyn.section import Section
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 from multiphi_exudyn.study.scene.fields import numbered
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec

@@ -16,13 +16,14 @@ import numpy as np
 import scipy.optimize
 
 from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, Section, beam_nodes, planar_beam
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, beam_nodes, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
+from multiphi_exudyn.section import Section
 from multiphi_exudyn.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics

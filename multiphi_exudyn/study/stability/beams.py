@@ -10,7 +10,8 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.beam import Beam, PointMass, Section, planar_beam
+from multiphi_exudyn.beam import Beam, PointMass, planar_beam
+from multiphi_exudyn.section import Section
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem

@@ -1,0 +1,120 @@
+"""Points of an Exudyn system as rows: by which its markers and nodes follow its coordinates.
+
+    displacement of a point = row . (q - q_0) = row S . z
+
+q (n_full,) the ODE2 coordinates, S (n_full, n) the basis of linearize.py, z (n,) those of the linear structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn.advancedUtilities import NumericalJacobian
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+
+__all__ = ["coordinate_row", "default_points", "given_points"]
+
+HELD = 1e-9  # of a row's largest entry before projection: a point that moves less is held by constraints
+
+_AXES = ("x", "y", "z")
+_VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # what only a node with ODE2 coordinates has
+
+
+def coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
+    """Row (n_full,) of a marker of one coordinate."""
+    return next(iter(_marker_rows(mbs, "marker", marker).values()))
+
+
+def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
+    """Rows (n,) of all markers and node coordinates that can move, by their own names."""
+    rows: dict[str, np.ndarray] = {}
+    for i in range(mbs.systemData.NumberOfMarkers()):
+        marker = exu.MarkerIndex(i)
+        try:
+            found = _marker_rows(mbs, mbs.GetMarker(marker)["name"], marker)
+        except MultiPhiError:  # a marker without position or coordinates names no point
+            continue
+        _add(rows, found)
+    for i in range(mbs.systemData.NumberOfNodes()):
+        _add(rows, _node_rows(mbs, exu.NodeIndex(i)))
+    return {name: row @ basis for name, row in rows.items() if _moves(row, basis)}
+
+
+def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
+    for name, row in found.items():
+        if name in rows:
+            raise MultiPhiValueError(f"points: got the name {name!r} twice, need the argument points")
+        rows[name] = row
+
+
+def given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
+    """Rows (n,) of the points asked for; raises MultiPhiValueError or MultiPhiTypeError for one that there is not."""
+    rows: dict[str, np.ndarray] = {}
+    for name, given in points.items():
+        _add(rows, _given_rows(mbs, name, given))
+    return {name: row @ basis for name, row in rows.items()}
+
+
+def _given_rows(mbs: Any, name: str, given: Any) -> dict[str, np.ndarray]:
+    if isinstance(given, tuple):
+        return {name: _node_coordinate_row(mbs, name, *given)}
+    if not isinstance(given, (int, np.integer, exu.MarkerIndex)):
+        raise MultiPhiTypeError(
+            f"points[{name!r}]: got {given!r}, need a marker index or (node index, coordinate number)"
+        )
+    if not 0 <= int(given) < mbs.systemData.NumberOfMarkers():
+        raise MultiPhiValueError(f"points[{name!r}]: got marker {int(given)}, need one that exists")
+    return _marker_rows(mbs, name, exu.MarkerIndex(int(given)))
+
+
+def _node_coordinate_row(mbs: Any, name: str, node: Any, coordinate: int) -> np.ndarray:
+    rows = list(_node_rows(mbs, exu.NodeIndex(int(node))).values())
+    if not 0 <= coordinate < len(rows):
+        raise MultiPhiValueError(f"points[{name!r}]: got coordinate {coordinate}, need 0 <= coordinate < {len(rows)}")
+    return rows[coordinate]
+
+
+def _node_rows(mbs: Any, node: Any) -> dict[str, np.ndarray]:
+    """Row of every coordinate of a node, (n_full,) each; none for ground and data nodes."""
+    item, coordinates = mbs.GetNode(node), np.eye(len(mbs.systemData.GetODE2Coordinates()))
+    if not _VELOCITIES & item.keys():
+        return {}
+    first, count = mbs.GetNodeODE2Index(node), len(item["initialCoordinates"])
+    return {f"{item['name']}.{c}": coordinates[first + c] for c in range(count)}
+
+
+def _marker_rows(mbs: Any, name: str, marker: Any) -> dict[str, np.ndarray]:
+    """Rows by which a marker's coordinates, or else its position, follow the coordinates, (n_full,) each."""
+    if mbs.GetMarker(marker)["markerType"] == "NodeCoordinate":
+        return {name: _node_coordinate_marker_row(mbs, marker)}
+    outputs = exu.OutputVariableType
+    for variable, labels in ((outputs.Coordinates, None), (outputs.Position, _AXES)):
+        try:
+            values = np.atleast_1d(mbs.GetMarkerOutput(marker, variable))
+        except (exu.ExudynError, ValueError):  # not an output of this type of marker
+            continue
+        rows = _derivative(mbs, marker, variable)
+        if len(values) == 1:
+            return {name: rows[0]}
+        return {f"{name}.{label}": row for label, row in zip(labels or range(len(values)), rows, strict=True)}
+    raise MultiPhiValueError(f"points[{name!r}]: got a marker without coordinates or position, need one")
+
+
+def _node_coordinate_marker_row(mbs: Any, marker: Any) -> np.ndarray:
+    item = mbs.GetMarker(marker)
+    rows = list(_node_rows(mbs, exu.NodeIndex(item["nodeNumber"])).values())
+    return rows[item["coordinate"]] if rows else np.zeros(len(mbs.systemData.GetODE2Coordinates()))
+
+
+def _derivative(mbs: Any, marker: Any, variable: Any) -> np.ndarray:
+    """Central differences of a marker's output by the ODE2 coordinates, (values, n_full)."""
+    every = range(len(mbs.systemData.GetODE2Coordinates()))
+    return NumericalJacobian(mbs, lambda: mbs.GetMarkerOutput(marker, variable), every)
+
+
+def _moves(row: np.ndarray, basis: np.ndarray) -> bool:
+    return bool(np.max(np.abs(row @ basis)) > HELD * np.max(np.abs(row), initial=1.0))
