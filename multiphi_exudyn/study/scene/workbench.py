@@ -8,23 +8,21 @@ from __future__ import annotations
 
 import functools
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
 
-from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, beam_nodes, planar_beam
+from multiphi_exudyn.beam import beam_nodes
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel, Tolerance
-from multiphi_exudyn.section import Section
 from multiphi_exudyn.structure import At, LinearStructure
+from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics
 from multiphi_exudyn.study.scene.scene_file import (
@@ -37,22 +35,16 @@ from multiphi_exudyn.study.scene.scene_file import (
 )
 from multiphi_exudyn.study.scene.scene_loads import loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
-from reference_models.beams import Beams
 from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
 __all__ = ["ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration"]
 
-_Part = tuple[str, tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp]
-_Ties = tuple[tuple[tuple[str, float], ...], ...]
-_Mesh = tuple[tuple[_Part, ...], _Ties, str | None, int]  # what discretised beams are kept by
-
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
 REPEATS = 7
 ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
-KEPT_STRUCTURES = 32  # linearised beams kept for later scenes; each is two matrices of some 100 DoFs
 ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
 
 
@@ -126,7 +118,7 @@ class Workbench:
         along = any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.scene.file.loads)
         if self.mechanics.beams is None or not along:
             return None
-        return _transverse(*_mesh(self.scene, self.mechanics))
+        return discretised(_mesh(self.scene, self.mechanics))[0].transverse
 
     def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
         """The scene's loads on a full beam's own mesh."""
@@ -183,74 +175,24 @@ def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
 def mesh_nodes(scene: Scene, mechanics: Mechanics) -> np.ndarray:
     """Node positions (k,) [m] of the mesh that the structure of a scene's one beam is made from."""
     assert mechanics.beam is not None, "checked by who asks"
-    return beam_nodes(mechanics.beam, _mesh(scene, mechanics)[-1])
+    return beam_nodes(mechanics.beam, _mesh(scene, mechanics).elements)
 
 
 def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:
     """M, K and points, and what it took to get them [s]; the same beam is linearised once for all scenes."""
     if mechanics.matrices is not None:
         return mechanics.matrices, 0.0
-    return _discretised(*_mesh(scene, mechanics))
+    beams, seconds = discretised(_mesh(scene, mechanics))
+    return beams.structure, seconds
 
 
-def _mesh(scene: Scene, mechanics: Mechanics) -> _Mesh:
+def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
     """The beams, and what discretises them: kind and elements of the reference, or of another full model."""
     full = [model for model in scene.models.values() if isinstance(model, FullModel)]
     named = [model for model in full if model.name == scene.file.comparison.reference]
     kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
-    beams = mechanics.beams
-    assert beams is not None, "a structure is beams or matrices"
-    parts = tuple(
-        (name, tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp)
-        for name, beam in beams.parts.items()
-    )
-    return parts, tuple(tuple(tie.items()) for tie in beams.ties), kind, elements
-
-
-def _beams(parts: tuple[_Part, ...], ties: _Ties) -> Beams:
-    named = {name: Beam(sections, dict(points), masses, clamp) for name, sections, points, masses, clamp in parts}
-    return Beams(named, tuple(dict(tie) for tie in ties))
-
-
-@functools.lru_cache(maxsize=KEPT_STRUCTURES)
-def _discretised(
-    parts: tuple[_Part, ...], ties: _Ties, kind: str | None, elements: int
-) -> tuple[LinearStructure, float]:
-    """Beams as the linearised full beams of a kind, or without one as linear elements; seconds of the first time."""
-    started = time.perf_counter()
-    beams = _beams(parts, ties)
-    if kind is None:
-        structure = _linear(beams, elements)
-    else:
-        structure = FullBeam(beams, (), FullBeamSettings(kind=kind, elements=elements)).structure
-    return structure, time.perf_counter() - started
-
-
-def _linear(beams: Beams, elements: int) -> LinearStructure:
-    if beams.only is not None:
-        return planar_beam(beams.only, elements)
-    return assemble({name: planar_beam(beam, elements) for name, beam in beams.parts.items()}, beams.ties)
-
-
-@functools.lru_cache(maxsize=KEPT_STRUCTURES)
-def _transverse(parts: tuple[_Part, ...], ties: _Ties, kind: str | None, elements: int) -> np.ndarray:
-    """e (n,) of discretised beams; M e is the inertia of the whole beams, see FullBeam.transverse."""
-    beams = _beams(parts, ties)
-    if kind is not None:
-        return FullBeam(beams, (), FullBeamSettings(kind=kind, elements=elements)).transverse
-    inertia = np.concatenate([_inertia(beam, elements) for beam in beams.parts.values()])
-    structure = _linear(beams, elements)
-    if isinstance(structure, Assembly):
-        inertia = structure.transformation.T @ inertia
-    return np.asarray(np.linalg.solve(structure.mass, inertia))
-
-
-def _inertia(beam: Beam, elements: int) -> np.ndarray:
-    """Of the free coordinates of a beam as linear elements, moved by 1 as a whole."""
-    free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
-    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations take turns
-    springs = (beam.clamp.translation, beam.clamp.rotation)
-    return np.delete(inertia, [dof for dof, spring in enumerate(springs) if math.isinf(spring)])
+    assert mechanics.beams is not None, "a structure is beams or matrices"
+    return Mesh.of(mechanics.beams, kind, elements)
 
 
 def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:

@@ -1,0 +1,94 @@
+"""Discretised beams: M, K, points and rigid-body motion of a scene's beams, made once for all scenes that share them.
+
+They are the linearised full beams of a kind, or, where no full model of the scene discretises them, linear elements.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multiphi_exudyn.assemble import Assembly, assemble
+from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
+from multiphi_exudyn.section import Section
+from multiphi_exudyn.structure import LinearStructure
+from reference_models.beams import Beams
+from reference_models.full_beam import FullBeam, FullBeamSettings
+
+__all__ = ["LinearBeams", "Mesh", "discretised"]
+
+KEPT = 32  # discretised beams kept for later scenes; each is a few matrices of some 100 DoFs
+_Part = tuple[str, tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """What discretised beams are kept by: the beams as tuples, the kind of full beam (None: linear ones), elements."""
+
+    parts: tuple[_Part, ...]
+    ties: tuple[tuple[tuple[str, float], ...], ...]
+    kind: str | None
+    elements: int
+
+    @classmethod
+    def of(cls, beams: Beams, kind: str | None, elements: int) -> Mesh:
+        """Beams in elements of a kind."""
+        parts = tuple(
+            (name, tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp)
+            for name, beam in beams.parts.items()
+        )
+        return cls(parts, tuple(tuple(tie.items()) for tie in beams.ties), kind, elements)
+
+    @property
+    def beams(self) -> Beams:
+        """The beams again."""
+        named = {
+            name: Beam(sections, dict(points), masses, clamp) for name, sections, points, masses, clamp in self.parts
+        }
+        return Beams(named, tuple(dict(tie) for tie in self.ties))
+
+
+class LinearBeams:
+    """Beams of linear elements. structure: M, K and points."""
+
+    def __init__(self, beams: Beams, elements: int) -> None:
+        self.beams = beams
+        self.elements = elements
+        self.structure = self._structure()
+
+    def _structure(self) -> LinearStructure:
+        if self.beams.only is not None:
+            return planar_beam(self.beams.only, self.elements)
+        parts = {name: planar_beam(beam, self.elements) for name, beam in self.beams.parts.items()}
+        return assemble(parts, self.beams.ties)
+
+    @functools.cached_property
+    def transverse(self) -> np.ndarray:
+        """e (n,), unit rigid-body motion along +z: M e is the inertia of the whole beams, see FullBeam.transverse."""
+        inertia = np.concatenate([_inertia(beam, self.elements) for beam in self.beams.parts.values()])
+        if isinstance(self.structure, Assembly):
+            inertia = self.structure.transformation.T @ inertia
+        return np.asarray(np.linalg.solve(self.structure.mass, inertia))
+
+
+@functools.lru_cache(maxsize=KEPT)
+def discretised(mesh: Mesh) -> tuple[FullBeam | LinearBeams, float]:
+    """The beams without contacts, and what it took to make them the first time [s]."""
+    started = time.perf_counter()
+    if mesh.kind is None:
+        made: FullBeam | LinearBeams = LinearBeams(mesh.beams, mesh.elements)
+    else:
+        made = FullBeam(mesh.beams, (), FullBeamSettings(kind=mesh.kind, elements=mesh.elements))
+    return made, time.perf_counter() - started
+
+
+def _inertia(beam: Beam, elements: int) -> np.ndarray:
+    """Of the free coordinates of a beam as linear elements, moved by 1 as a whole."""
+    free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
+    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations take turns
+    springs = (beam.clamp.translation, beam.clamp.rotation)
+    return np.delete(inertia, [dof for dof, spring in enumerate(springs) if math.isinf(spring)])
