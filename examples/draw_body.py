@@ -14,20 +14,11 @@ from matplotlib.image import imsave
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, Drawing
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+from reference_models.solver_settings import fixed_steps
 
 STEP, END = 5e-4, 0.088  # s; at the end the contact is closed
 SCALE, RADIUS = 4.0, 3e-3  # deflections are shown four times as large; m
 WINDOW = [1000, 300]  # pixels of one picture
-
-
-def settings() -> exu.SimulationSettings:
-    """A fixed step, nothing printed, nothing written."""
-    chosen = exu.SimulationSettings()
-    chosen.timeIntegration.numberOfSteps = round(END / STEP)
-    chosen.timeIntegration.endTime = END
-    chosen.timeIntegration.verboseMode = 0
-    chosen.solution.file.write = False
-    return chosen
 
 
 def redrawn(system: exu.SystemContainer) -> np.ndarray:
@@ -50,7 +41,7 @@ def main() -> np.ndarray:
     system.visualizationSettings.view0.window.renderWindowSize = WINDOW
     system.renderer.ZoomAll()
     start = redrawn(system)
-    mbs.SolveDynamic(settings(), solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    mbs.SolveDynamic(fixed_steps(END, round(END / STEP)), solverType=exu.DynamicSolverType.TrapezoidalIndex2)
     mbs.systemData.SetSystemState(
         mbs.systemData.GetSystemState(exu.ConfigurationType.Current), exu.ConfigurationType.Visualization
     )

@@ -16,6 +16,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.force_law import Function
 from reference_models.rig import rig_beam
+from reference_models.solver_settings import fixed_steps
 
 MODES, TIP, SPAN = 4, 0.020, (-0.025, 0.025)  # modes of the beam, start [m], where the laws are followed [m]
 T_END, STEP = 0.2, 1e-4  # s, of the run and of Exudyn's solver
@@ -60,12 +61,7 @@ def inside_exudyn(model: mp.MultiPhiModel, start: np.ndarray) -> tuple[np.ndarra
     mbs = container.AddSystem()
     items = CreateMultiPhiBody(mbs, model, name="beam", displacement=start, matchedStepSize=STEP)
     mbs.Assemble()
-    settings = exu.SimulationSettings()
-    settings.timeIntegration.numberOfSteps = round(T_END / STEP)
-    settings.timeIntegration.endTime = T_END
-    settings.timeIntegration.verboseMode = 0
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = 1e-3
+    settings = fixed_steps(T_END, round(T_END / STEP), write_period=1e-3)
     mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
     histories = body_histories(mbs, items)
     return histories.time, histories.points["tip"]

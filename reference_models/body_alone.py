@@ -14,6 +14,7 @@ from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, bod
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
 from reference_models.exudyn_quiet import cpu_limit, quiet
+from reference_models.solver_settings import fixed_steps
 
 __all__ = ["solve_body_alone"]
 
@@ -51,12 +52,7 @@ def solve_body_alone(
 
 
 def _simulation_settings(t_end: float, steps: int) -> Any:
-    settings = exu.SimulationSettings()
-    settings.timeIntegration.numberOfSteps = steps
-    settings.timeIntegration.endTime = t_end
-    settings.timeIntegration.verboseMode = 0
+    settings = fixed_steps(t_end, steps, write_period=t_end / steps)
     settings.timeIntegration.newton.useModifiedNewton = True
     settings.timeIntegration.reuseConstantMassMatrix = True
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = t_end / steps
     return settings

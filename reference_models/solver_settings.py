@@ -1,8 +1,8 @@
-"""Exudyn's solver settings that run a stiff beam against stiff contacts, and run it fast.
+"""Exudyn's solver settings: of a silent run in equal steps, and those that run a stiff beam against stiff contacts.
 
-Chosen by measurement: modified Newton unless asked otherwise (a full one costs four times as much), contacts
-switched in up to five iterations inside a step, none of them asking for another step size, a sparse
-factorisation whose pattern is reused. Nothing is written to a file.
+The latter run it fast, and are chosen by measurement: modified Newton unless asked otherwise (a full one costs four
+times as much), contacts switched in up to five iterations inside a step, none of them asking for another step size, a
+sparse factorisation whose pattern is reused. Nothing is written to a file.
 """
 
 from __future__ import annotations
@@ -14,13 +14,28 @@ import exudyn as exu
 
 from reference_models.full_beam_settings import FullBeamSettings
 
-__all__ = ["simulation_settings"]
+__all__ = ["fixed_steps", "simulation_settings"]
 
 SMALLEST_STEP = 1 / 256  # of the step: an iteration that still fails there will not converge at all
 STATIC_RELATIVE = 1e-8  # Newton tolerances of the static start; the absolute one, in N, lies above the
 STATIC_ABSOLUTE = 1e-6  # round-off of an axial stiffness of 1e9 N/m
 SWITCHES = 5  # contact iterations in a time step; one is not enough from 1e7 N/m on
 STATIC_SWITCHES = 20  # in a static solution, where they are to end in the right state
+
+
+def fixed_steps(t_end: float, steps: int, write_period: float | None = None) -> Any:
+    """Settings of a run in equal steps from 0 to t_end [s] that prints nothing and writes no file.
+
+    write_period: of sensors [s], None for Exudyn's own.
+    """
+    found = exu.SimulationSettings()
+    found.timeIntegration.numberOfSteps = steps
+    found.timeIntegration.endTime = t_end
+    found.timeIntegration.verboseMode = 0
+    found.solution.file.write = False
+    if write_period is not None:
+        found.solution.sensors.writePeriod = write_period
+    return found
 
 
 def simulation_settings(settings: FullBeamSettings, t_end: float) -> Any:

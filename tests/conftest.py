@@ -1,7 +1,7 @@
 """What the whole suite shares: reproducible property tests, and how a bad input has to be refused."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: on a busy machine threads make small matrices slow
@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
+from reference_models.exudyn_quiet import quiet
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
@@ -32,3 +33,10 @@ def refused() -> Callable[..., None]:
         assert "\n" not in message
 
     return check
+
+
+@pytest.fixture
+def quiet_exudyn() -> Iterator[None]:
+    """Exudyn prints nothing in the test; what was set is restored."""
+    with quiet():
+        yield

@@ -23,18 +23,14 @@ from multiphi_exudyn.exudyn_plugin.step_test import Lookahead
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.transition import LoadedLevel
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+from reference_models.solver_settings import fixed_steps
+
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 RADIUS_ONE = exu.DynamicSolverType.GeneralizedAlpha
 TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
 POINTS = ("node2", "node3")
 COMPLIANT = 1e6  # N/m
-
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    printed, exu.config.printToConsole = exu.config.printToConsole, False
-    yield
-    exu.config.printToConsole = printed
 
 
 @functools.cache
@@ -56,13 +52,8 @@ def chain(contacts, masses=3, modes="all", grounded=True, damping=None):
 
 
 def settings(step, end, radius=1.0):
-    chosen = exu.SimulationSettings()
-    chosen.timeIntegration.numberOfSteps = round(end / step)
-    chosen.timeIntegration.endTime = end
-    chosen.timeIntegration.verboseMode = 0
+    chosen = fixed_steps(end, round(end / step), write_period=max(step, 1e-3))
     chosen.timeIntegration.generalizedAlpha.spectralRadius = radius
-    chosen.solution.file.write = False
-    chosen.solution.sensors.writePeriod = max(step, 1e-3)
     return chosen
 
 

@@ -10,17 +10,13 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, Drawing
 from multiphi_exudyn.exudyn_plugin.drawing import BLOCK, graphics_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+from reference_models.solver_settings import fixed_steps
+
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 STEP, SHORT, LONG = 5e-4, 0.02, 0.088  # s; open at the first end, closed at the second
 SHOWN, CURRENT = exu.ConfigurationType.Visualization, exu.ConfigurationType.Current
 SAME = 1e-7  # m: the matched step is exact to round-off of 20 mm and 200 steps
-
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    printed, exu.config.printToConsole = exu.config.printToConsole, False
-    yield
-    exu.config.printToConsole = printed
 
 
 class Recorded(Drawing):
@@ -54,12 +50,7 @@ def system(drawing, matched=STEP):
 
 
 def run(mbs, end):
-    chosen = exu.SimulationSettings()
-    chosen.timeIntegration.numberOfSteps = round(end / STEP)
-    chosen.timeIntegration.endTime = end
-    chosen.timeIntegration.verboseMode = 0
-    chosen.solution.file.write = False
-    mbs.SolveDynamic(chosen, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    mbs.SolveDynamic(fixed_steps(end, round(end / STEP)), solverType=exu.DynamicSolverType.TrapezoidalIndex2)
     mbs.systemData.SetSystemState(mbs.systemData.GetSystemState(CURRENT), SHOWN)
 
 

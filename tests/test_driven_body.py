@@ -11,6 +11,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.driven_step_test import jump_times
 from reference_models.exudyn_quiet import quiet
+from reference_models.solver_settings import fixed_steps
 
 T_END = 5.0
 SOFT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
@@ -44,12 +45,7 @@ def solved(model, loads, steps, *, matched=False, prepare=None):
         mbs.Assemble()
         if prepare:
             prepare(mbs)
-        settings = exu.SimulationSettings()
-        settings.timeIntegration.numberOfSteps = steps
-        settings.timeIntegration.endTime = T_END
-        settings.timeIntegration.verboseMode = 0
-        settings.solution.file.write = False
-        settings.solution.sensors.writePeriod = T_END / steps
+        settings = fixed_steps(T_END, steps, write_period=T_END / steps)
         mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
     return body_histories(mbs, items)
 

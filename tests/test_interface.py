@@ -21,19 +21,15 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
+from reference_models.solver_settings import fixed_steps
+
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
 STEP, END = 1e-3, 0.25  # s
 SPRING, DAMPER, MASS = 800.0, 2.0, 0.4  # N/m, N s/m, kg
 GAP, STIFFNESS = 1e-3, 3e4  # m, N/m
 START = np.array([0.0, 0.0, 0.01])  # m
-
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    printed, exu.config.printToConsole = exu.config.printToConsole, False
-    yield
-    exu.config.printToConsole = printed
 
 
 def chain(stiffness):
@@ -44,15 +40,10 @@ def chain(stiffness):
 
 
 def settings(step):
-    chosen = exu.SimulationSettings()
-    chosen.timeIntegration.numberOfSteps = round(END / step)
-    chosen.timeIntegration.endTime = END
-    chosen.timeIntegration.verboseMode = 0
+    chosen = fixed_steps(END, round(END / step), write_period=step)
     chosen.timeIntegration.newton.relativeTolerance = 1e-12
     chosen.timeIntegration.generalizedAlpha.spectralRadius = 1.0
     chosen.timeIntegration.discontinuous.useRecommendedStepSize = False  # of an ObjectContactCoordinate
-    chosen.solution.file.write = False
-    chosen.solution.sensors.writePeriod = step
     return chosen
 
 

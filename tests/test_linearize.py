@@ -8,6 +8,8 @@ import pytest
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
 
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
+
 MASSES = (2.0, 3.0, 5.0)
 STIFFNESS = (700.0, 1100.0)  # ground - first, first - second
 DAMPING = (3.0, 7.0)
@@ -57,13 +59,6 @@ class Chain:
     @property
     def active(self):
         return self.mbs.GetObjectParameter(self.contact, "activeConnector")
-
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    exu.config.printToConsole = False
-    yield
-    exu.config.printToConsole = True
 
 
 def in_two_coordinates(matrix):

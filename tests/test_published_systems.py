@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import exudyn as exu
 import numpy as np
 import pytest
 
@@ -11,12 +10,7 @@ from multiphi_exudyn.exudyn_plugin import reduce
 from reference_models import published_systems as published
 from reference_models.published_systems import OwnRun
 
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    exu.config.printToConsole = False
-    yield
-    exu.config.printToConsole = True
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 
 @dataclass

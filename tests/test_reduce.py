@@ -9,14 +9,9 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, reduce
 from reference_models.published_systems import OwnRun, PublishedSystem
 
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
+
 STEP = 2e-5  # s, of Exudyn's own run
-
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    exu.config.printToConsole = False
-    yield
-    exu.config.printToConsole = True
 
 
 class Mass:
