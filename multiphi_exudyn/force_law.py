@@ -11,9 +11,7 @@ dk_j [N/m] is the change of slope at a knot, negative where the law softens. Kno
 left out. F(q_m) is a constant force of every level. q_m is the zero of F nearest to q = 0, without any the place
 nearest to q = 0. Strain energy is the integral of the segmented law from q_m. Beyond the span its last segments go on.
 
-Knots are placed so that all segments have the same error: from one end to the next knot as far as that error allows,
-with the smallest error that so many segments can have. The error falls with the square of their number.
-Source: H. G. Burchard, Splines (with optimal knots) are better, Applicable Analysis 3 (1974) 309.
+Where the knots stand is in chords.py.
 """
 
 from __future__ import annotations
@@ -26,6 +24,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from multiphi_exudyn.chords import MOST_SEGMENTS, spread, with_segments
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.structure import At, is_real
@@ -35,8 +34,6 @@ __all__ = ["Contact", "ForceLaw", "Given", "LawSpring", "expanded"]
 Function = Callable[[Any], Any]
 
 SAMPLES = 2**14  # of a law on either side of its central knot; knots stand on samples
-MOST_SEGMENTS = 2**10  # a law that needs more is not followed by straight segments
-BALANCED = 1e-3  # of the smallest error that so many segments can have: nearer to it is not sought
 STRAIGHT = 1e-12  # of the largest slope: a smaller change of slope is round-off
 ZERO_FORCE = 1e-14  # of the largest force: the law vanishes there
 
@@ -153,7 +150,7 @@ class ForceLaw:
         values = [self._sampled(side) for side in sides]
         largest = max(float(np.max(np.abs(value))) for value in values)
         if isinstance(wanted, int):
-            chosen = _with_segments(sides, values, max(wanted, len(sides)), 2 * largest)
+            chosen = with_segments(sides, values, max(wanted, len(sides)), 2 * largest)
         else:
             chosen = self._within(sides, values, wanted * largest)
         knots = np.concatenate([side[index[first:]] for first, (side, index) in _numbered(sides, chosen)])
@@ -163,13 +160,13 @@ class ForceLaw:
         return knots, forces, centre, float(off / largest) if largest else 0.0
 
     def _within(self, sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
-        count = sum(len(index) - 1 for index in _spread(sides, values, error))
+        count = sum(len(index) - 1 for index in spread(sides, values, error))
         if count > MOST_SEGMENTS:
             raise MultiPhiValueError(
                 f"{self._called} tolerance: got {self.tolerance!r}, which needs more than {MOST_SEGMENTS} segments, "
                 "need a larger one"
             )
-        return _with_segments(sides, values, count, error)
+        return with_segments(sides, values, count, error)
 
     def _checked_span(self) -> tuple[float, float]:
         span = self.span
@@ -269,49 +266,6 @@ def _centre(q: np.ndarray, forces: np.ndarray) -> float:
     rise = forces[crossing + 1] - forces[crossing]
     zeros = np.concatenate([q[small], q[crossing] - forces[crossing] * (q[crossing + 1] - q[crossing]) / rise])
     return float(zeros[np.argmin(np.abs(zeros))]) if len(zeros) else nearest
-
-
-def _spread(sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
-    """Of every side the samples that are knots, each segment as long as this error [N] allows."""
-    return [_knots(q, value, error) for q, value in zip(sides, values, strict=True)]
-
-
-def _knots(q: np.ndarray, values: np.ndarray, error: float) -> np.ndarray:
-    chosen, last = [0], len(q) - 1
-    while chosen[-1] < last and len(chosen) <= MOST_SEGMENTS + 1:
-        start, reach = chosen[-1], 1
-        while start + reach < last and _chord_error(q, values, start, min(start + 2 * reach, last)) <= error:
-            reach *= 2
-        low, high = min(start + reach, last), min(start + 2 * reach, last)
-        while high - low > 1:
-            middle = (low + high) // 2
-            if _chord_error(q, values, start, middle) <= error:
-                low = middle
-            else:
-                high = middle
-        chosen.append(high if _chord_error(q, values, start, high) <= error else low)
-    return np.array(chosen)
-
-
-def _chord_error(q: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
-    """Largest error [N] of the straight line between samples a and b."""
-    line = values[a] + (values[b] - values[a]) / (q[b] - q[a]) * (q[a : b + 1] - q[a])
-    return float(np.max(np.abs(values[a : b + 1] - line)))
-
-
-def _with_segments(sides: list[np.ndarray], values: list[np.ndarray], count: int, error: float) -> list[np.ndarray]:
-    """The knots of at most so many segments with the smallest error [N]; ``error`` is one that they can have."""
-    high, low, best = error, 0.0, _spread(sides, values, error)
-    while high - low > BALANCED * high:
-        middle = (low + high) / 2 if low else high / 4  # segments grow with error^-1/2
-        found = _spread(sides, values, middle)
-        if sum(len(index) - 1 for index in found) <= count:
-            high, best = middle, found
-        else:
-            low = middle
-        if high <= ZERO_FORCE * error:
-            break
-    return best
 
 
 def _numbered(columns: list[np.ndarray], chosen: list[np.ndarray]) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:

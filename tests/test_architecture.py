@@ -21,6 +21,7 @@ FLOORS = (
         "forced_response",
         "nonnegative",
         "recent",
+        "chords",
     ),
     ("structure", "assemble", "matrix_files", "section", "beam", "contact", "force_law", "courses", "loads"),
     ("level", "equilibrium", "transition", "model"),
