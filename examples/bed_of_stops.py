@@ -97,8 +97,11 @@ def _plot_contacts(axes: plt.Axes, run: mp.Trajectory) -> None:
     for i, stop in enumerate(run.model.contacts):
         intervals = run.contact_intervals(stop.name)
         axes.broken_barh([(1e3 * a, 1e3 * (b - a)) for a, b in intervals], (i + 0.55, 0.9), color="tab:red")
-    axes.set(xlabel="time [ms]", ylabel="stop, from the root", title="Closed contacts")
-    axes.set(xlim=(0, 1e3 * run.t_end), ylim=(0.5, len(run.model.contacts) + 0.5))
+    touched = 1e3 * np.array([interval for stop in run.model.contacts for interval in run.contact_intervals(stop.name)])
+    first, last = np.min(touched), np.max(touched)
+    title = f"Closed contacts, {first:.0f} to {last:.0f} ms of {1e3 * run.t_end:.0f} ms"
+    axes.set(xlabel="time [ms]", ylabel="stop, from the root", title=title)
+    axes.set(xlim=(first - 1, last + 1), ylim=(0.5, len(run.model.contacts) + 0.5))
 
 
 def _plot_cost(axes: plt.Axes, costs: list[Cost]) -> None:
@@ -107,6 +110,8 @@ def _plot_cost(axes: plt.Axes, costs: list[Cost]) -> None:
     axes.loglog(n, [1e3 * each.again / each.events for each in costs], "s-", label="an event, levels known")
     axes.loglog(n, [1e3 * each.offline for each in costs], "k:", label="base, once (not per event)")
     axes.set(xlabel="degrees of freedom", ylabel="CPU time [ms]", title="Cost")
+    axes.set_xticks(n, [str(each) for each in n])
+    axes.minorticks_off()
     axes.legend()
 
 

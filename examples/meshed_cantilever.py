@@ -185,8 +185,9 @@ def _mesh(axis: matplotlib.axes.Axes, drawn: Run) -> None:
     left, top = 1e3 * (STOP_AT - STOP_HALF), 1e3 * (-HEIGHT / 2 - EXAGGERATED * GAP)
     axis.add_patch(Rectangle((left, top - 12), 2e3 * STOP_HALF, 12, color="0.35"))
     yielded = 1e3 * np.max(drawn.force) / STIFFNESS
-    axis.annotate(f"stop, yields by {yielded:.2f} mm", (left - 4, top - 9), ha="right", color="0.35")
-    axis.set(aspect="equal", xlim=(-5, 1e3 * LENGTH + 5), ylim=(top - 18, 80), xlabel="mm", ylabel="mm")
+    told = f"stop, {1e3 * GAP:g} mm below the beam at rest, yields by {yielded:.2f} mm"
+    axis.text(left - 6, top - 26, told, ha="right", va="center", color="0.35")
+    axis.set(aspect="equal", xlim=(-5, 1e3 * LENGTH + 5), ylim=(top - 34, 80), xlabel="x [mm]", ylabel="z [mm]")
     axis.set_title(f"{_label(drawn)}, displacements {EXAGGERATED} times as large", fontsize=10)
     axis.legend(frameon=False, loc="upper left")
 

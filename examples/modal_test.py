@@ -97,13 +97,14 @@ def _functions(axis: matplotlib.axes.Axes, record: Record, found: ResponseModes)
     band = (f >= BAND[0]) & (f <= BAND[1])
     fitted = synthesised(f[band], functions[:, band], found)
     for k, (point, colour) in enumerate(zip(POINTS, ("#009E73", "#0072B2", "#D55E00"), strict=True)):
-        axis.loglog(f[band], np.abs(functions[k, band]), color=colour, lw=2.5, alpha=0.35, label=point)
+        axis.loglog(f[band], np.abs(functions[k, band]), color=colour, lw=2.5, alpha=0.35, label=f"{point}, from the samples")
         axis.loglog(f[band], np.abs(fitted[k]), color=colour, lw=0.9)
     axis.plot([], [], color="0.3", lw=0.9, label="made of the identified modes")
     axis.set_ylim(top=axis.get_ylim()[1] * 60)
     values = zip(record.own.frequencies, found.frequencies, record.own.ratios, found.ratios, strict=True)
     for k, (true, hz, own, ratio) in enumerate(values):
-        told = f"{hz:.2f} Hz ({100 * (hz / true - 1):+.3f} %)\nζ {100 * ratio:.3g} % ({100 * (ratio / own - 1):+.1f} %)"
+        off, ratio_off = round(100 * (hz / true - 1), 3) + 0.0, round(100 * (ratio / own - 1), 1) + 0.0  # no -0
+        told = f"{hz:.2f} Hz ({off:+.3f} %)\nζ {100 * ratio:.3g} % ({ratio_off:+.1f} %)"
         axis.text(
             hz, 0.995 - 0.09 * (k % 2), told, transform=axis.get_xaxis_transform(), ha="center", va="top", fontsize=8
         )

@@ -104,6 +104,7 @@ def _draw_intervals(axis: matplotlib.axes.Axes, found: Runs) -> None:
             bars = [(1e3 * a, 1e3 * (b - a)) for a, b in intervals]
             axis.broken_barh(bars, (level + shift, 0.25), color=colour)
     axis.set_yticks(range(len(contacts)), [contact.name for contact in contacts], fontsize=8)
+    axis.set(ylim=(-0.6, len(contacts) - 0.4), title="closed stops")
 
 
 def main(arguments: list[str]) -> Runs:
