@@ -97,7 +97,8 @@ def _functions(axis: matplotlib.axes.Axes, record: Record, found: ResponseModes)
     band = (f >= BAND[0]) & (f <= BAND[1])
     fitted = synthesised(f[band], functions[:, band], found)
     for k, (point, colour) in enumerate(zip(POINTS, ("#009E73", "#0072B2", "#D55E00"), strict=True)):
-        axis.loglog(f[band], np.abs(functions[k, band]), color=colour, lw=2.5, alpha=0.35, label=f"{point}, from the samples")
+        label = f"{point}, from the samples"
+        axis.loglog(f[band], np.abs(functions[k, band]), color=colour, lw=2.5, alpha=0.35, label=label)
         axis.loglog(f[band], np.abs(fitted[k]), color=colour, lw=0.9)
     axis.plot([], [], color="0.3", lw=0.9, label="made of the identified modes")
     axis.set_ylim(top=axis.get_ylim()[1] * 60)
