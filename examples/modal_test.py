@@ -112,7 +112,7 @@ def _functions(axis: matplotlib.axes.Axes, record: Record, found: ResponseModes)
         axis.axvline(hz, ymax=0.82, color="0.8", lw=0.8, zorder=0)
     axis.set(xlabel="frequency [Hz]", ylabel="acceleration / force [1/kg]", xlim=(BAND[0], 330))
     axis.set_xticks([2, 5, 10, 20, 50, 100, 200], ["2", "5", "10", "20", "50", "100", "200"])
-    axis.legend(frameon=False, fontsize=9, loc=(0.46, 0.03))
+    axis.legend(frameon=False, fontsize=9, loc=(0.2, 0.55))
 
 
 def synthesised(f: np.ndarray, functions: np.ndarray, found: ResponseModes) -> np.ndarray:
