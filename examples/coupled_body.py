@@ -232,8 +232,7 @@ def draw(found: dict[str, Comparison], path: str) -> None:
         left.set(title=name, ylabel="tip [\N{MICRO SIGN}m]", xlim=(0, T_END))
         right.loglog(STEPS, runs.full_errors, "s-", color="0.5", label="full beam")
         right.loglog(STEPS, runs.errors, "o-", color="#D55E00", label=f"all modes, order {runs.order:.2f}")
-        label = f"{MODES} modes, matched to the step"
-        right.loglog(SMALL_STEP, runs.small_error, "*", color="#0072B2", markersize=12, label=label)
+        right.loglog(SMALL_STEP, runs.small_error, "*", color="#0072B2", markersize=12, label=f"{MODES} modes, matched")
         right.set_xticks([*STEPS, SMALL_STEP], [f"{1e3 * step:g}" for step in (*STEPS, SMALL_STEP)])
         right.minorticks_off()
         right.set(title="relative error of the tip", xlabel="step [ms]", xlim=(4e-5, 3.2e-4), ylim=(5e-6, 5e-2))
