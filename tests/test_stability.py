@@ -20,7 +20,7 @@ from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.native_run import run_native
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.stability_report import render_stability
-from multiphi_exudyn.study.stability.summary import contents
+from multiphi_exudyn.study.stability.summary import contents, failures, summaries
 from multiphi_exudyn.study.stability.text_table import text_table
 from reference_models.full_matrices import run_matrices
 
@@ -328,6 +328,18 @@ class TestTables:
             ("NumPy loop", 2, 0, 1),
             ("user object", 0, 1, 0),
         ]
+
+    def test_the_worst_figures_and_the_failed_runs_lead_to_their_cases(self):
+        far = CaseResult("far", "Far.", (Outcome("NumPy loop", energy=1e-3), Outcome("user object", difference=0.5)))
+        near = CaseResult("near", "Near.", (Outcome("NumPy loop", energy=1e-9), Outcome("user object", difference=0.1)))
+        loop, body = summaries([near, far])
+        assert (loop.energy_case, loop.difference_case) == ("far", "")
+        assert (body.energy_case, body.difference_case) == ("", "far")
+        assert [(case, o.model, o.message) for case, o in failures(RESULTS)] == [("sound", "user object", "a cause")]
+        page = render_stability([near, far, *RESULTS], {}, quick=True)
+        for name in ("far", "sound"):
+            assert f'<a href="#{name}">{name}</a>' in page
+            assert f'id="{name}"' in page
 
 
 class TestCommand:

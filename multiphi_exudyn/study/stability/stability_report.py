@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from multiphi_exudyn.study.comparison.findings import percent, seconds
 from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
 from multiphi_exudyn.study.stability.outcome import CaseResult
-from multiphi_exudyn.study.stability.summary import headline, summaries
+from multiphi_exudyn.study.stability.summary import failures, headline, summaries
 from multiphi_exudyn.study.stability.text_table import figure
 
 __all__ = ["render_stability"]
@@ -28,6 +28,7 @@ def render_stability(results: Sequence[CaseResult], environment: dict[str, Any],
         results=results,
         headline=headline(results),
         summaries=summaries(results),
+        failures=failures(results),
         quick=quick,
         environment=environment,
         limits=judgement,

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from multiphi_exudyn.study.stability.judgement import BEYOND, RESIDUAL
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
 
-__all__ = ["ModelSummary", "contents", "headline", "summaries"]
+__all__ = ["ModelSummary", "contents", "failures", "headline", "summaries"]
 
 
 @dataclass(frozen=True)
 class ModelSummary:
-    """Of one model in all cases: how many ended how, its worst figures, and the time of all its runs [s]."""
+    """Of one model in all cases: how many ended how, its worst figures, and the time of all its runs [s].
+
+    energy_case, difference_case: the case that is the worst one, "" without any.
+    """
 
     model: str
     ok: int
@@ -27,20 +30,35 @@ class ModelSummary:
     missed: int | None
     difference: float | None
     time_s: float
+    energy_case: str
+    difference_case: str
 
 
 def summaries(results: Sequence[CaseResult]) -> list[ModelSummary]:
     """One of every model, in the order of the table."""
-    by_model: dict[str, list[Outcome]] = {}
+    by_model: dict[str, dict[str, Outcome]] = {}
     for result in results:
         for outcome in result.outcomes:
-            by_model.setdefault(outcome.model, []).append(outcome)
-    return [_summary(name, outcomes) for name, outcomes in by_model.items()]
+            by_model.setdefault(outcome.model, {})[result.name] = outcome
+    return [_summary(name, cases) for name, cases in by_model.items()]
 
 
-def _summary(name: str, outcomes: Sequence[Outcome]) -> ModelSummary:
+def failures(results: Sequence[CaseResult]) -> list[tuple[str, Outcome]]:
+    """The runs that failed, each with the name of its case, model by model."""
+    models = list(dict.fromkeys(outcome.model for result in results for outcome in result.outcomes))
+    failed = [(result.name, o) for result in results for o in result.outcomes if o.status == FAILED]
+    return sorted(failed, key=lambda found: models.index(found[1].model))
+
+
+def _summary(name: str, cases: Mapping[str, Outcome]) -> ModelSummary:
+    outcomes = list(cases.values())
+
     def worst(value: Callable[[Outcome], float | None]) -> float | None:
         return max((found for o in outcomes if o.status == OK and (found := value(o)) is not None), default=None)
+
+    def where(value: Callable[[Outcome], float | None]) -> str:
+        found = worst(value)
+        return "" if found is None else next(case for case, o in cases.items() if o.status == OK and value(o) == found)
 
     missed = [o.missed for o in outcomes if o.missed is not None]
     return ModelSummary(
@@ -55,6 +73,8 @@ def _summary(name: str, outcomes: Sequence[Outcome]) -> ModelSummary:
         missed=sum(missed) if missed else None,
         difference=worst(lambda o: o.difference),
         time_s=sum(o.time_s or 0.0 for o in outcomes),
+        energy_case=where(lambda o: o.energy),
+        difference_case=where(lambda o: o.difference),
     )
 
 
