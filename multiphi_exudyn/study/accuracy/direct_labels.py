@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 __all__ = ["Label", "place_labels"]
 
@@ -22,6 +23,7 @@ DISTANCE = 9.0  # points, from anchor to label
 SIDES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 1), (0, -1))
 ON_LABEL, OUTSIDE, ON_POINT = 100.0, 40.0, 1.0  # cost of covering a label, of leaving the axes, of covering a point
 LATER = 0.05  # cost of each anchor passed over
+HALO = 3.0  # points, white around a label: what it has to cover does not run into its letters
 ALIGNED = {-1: "right", 0: "center", 1: "left"}
 RAISED = {-1: "top", 0: "center", 1: "bottom"}
 
@@ -64,6 +66,7 @@ def _write(axes: Axes, label: Label, anchor: tuple[float, float], side: tuple[in
         fontsize=FONT_SIZE,
         fontweight="bold",
         zorder=10,
+        path_effects=[withStroke(linewidth=HALO, foreground="white")],
     )
     text.set_in_layout(False)
 
@@ -71,7 +74,8 @@ def _write(axes: Axes, label: Label, anchor: tuple[float, float], side: tuple[in
 def _box(text: str, pixel: np.ndarray, side: tuple[int, int], dpi: float) -> Box:
     """Where the text would stand."""
     unit = dpi / 72
-    width, height = CHARACTER * FONT_SIZE * unit * len(text), LINE * FONT_SIZE * unit
+    lines = text.split("\n")
+    width, height = CHARACTER * FONT_SIZE * unit * max(map(len, lines)), LINE * FONT_SIZE * unit * len(lines)
     x, y = pixel[0] + DISTANCE * unit * side[0], pixel[1] + DISTANCE * unit * side[1]
     left, bottom = x - width * (1 - side[0]) / 2, y - height * (1 - side[1]) / 2
     return left, bottom, left + width, bottom + height

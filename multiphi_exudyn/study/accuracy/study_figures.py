@@ -50,6 +50,7 @@ __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_fig
 
 MOST_ORDERS = 5  # written one by one
 LABEL_LENGTH = 42  # characters of a legend's line
+NAME_LENGTH = 24  # characters of a line of a label beside its curve
 BETWEEN = 30  # points of a front's line that labels keep clear of, per segment
 
 
@@ -63,8 +64,10 @@ def pareto_figure(result: StudyResult, at: Mapping[str, Any]) -> Figure:
         if own:
             fronts[name] = _method(axes, own, style)
     _time_error_frame(axes, result, at, [100 * s.error for s in drawn if s.error and s.online_s])
-    labels = [Label(name, styles(result)[name].colour, _anchors(line)) for name, line in fronts.items() if len(line)]
-    place_labels(figure, axes, labels, [point for line in fronts.values() for point in _along(line)])
+    written = {name: textwrap.fill(name, NAME_LENGTH) for name in fronts}
+    labels = [Label(written[n], styles(result)[n].colour, _anchors(line)) for n, line in fronts.items() if len(line)]
+    faint = [(s.online_s, 100 * s.error) for s in drawn if s.error is not None and s.online_s is not None]
+    place_labels(figure, axes, labels, [*(point for line in fronts.values() for point in _along(line)), *faint])
     return figure
 
 
@@ -170,7 +173,7 @@ def _time_error_frame(axes: Axes, result: StudyResult, at: Mapping[str, Any], er
     for time in [s.online_s for s in references(result) if s.method == REFERENCE and s.at == at and s.online_s]:
         axes.axvline(time, color="#000000", ls="--", lw=1, zorder=1)
         beside = {"rotation": 90, "ha": "right", "va": "top"}
-        note(axes, "the reference itself", (time, 0.97), axes.get_xaxis_transform(), (0, 0), **beside)
+        note(axes, "the reference itself", (time, 0.97), axes.get_xaxis_transform(), (-4, 0), **beside)
     axes.margins(x=0.08)
     axes.grid(color=GRID)
     axes.set_axisbelow(True)
