@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.base import Base
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.level import Base, rest
+from multiphi_exudyn.rest import rest
 
 __all__ = ["equilibrium"]
 

@@ -44,8 +44,9 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.base import cleared
+from multiphi_exudyn.build_level import independent
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.level import cleared, independent
 from multiphi_exudyn.model import SIGNAL_TABLES, MultiPhiModel
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.root_search import ZERO

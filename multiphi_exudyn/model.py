@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.base import BASE_MARGIN, Base, build_base, rays_of
+from multiphi_exudyn.build_level import build_level
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.equilibrium import equilibrium
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.first_root import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
-from multiphi_exudyn.level import BASE_MARGIN, Base, Level, LevelOverride, build_base, build_level, rays_of
+from multiphi_exudyn.level import Level, LevelOverride
 from multiphi_exudyn.nonnegative import nonnegative_least_squares
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import LinearStructure, is_real

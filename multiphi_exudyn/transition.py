@@ -23,7 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.level import Asymptotic, Level, cleared
+from multiphi_exudyn.base import cleared
+from multiphi_exudyn.level import Asymptotic, Level
 from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
 __all__ = ["LoadedLevel", "Transition", "nearest_admissible"]

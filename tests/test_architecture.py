@@ -24,7 +24,7 @@ FLOORS = (
         "chords",
     ),
     ("structure", "assemble", "matrix_files", "section", "beam", "contact", "force_law", "courses", "loads"),
-    ("level", "equilibrium", "transition", "model"),
+    ("supports", "base", "rest", "level_modes", "level", "build_level", "equilibrium", "transition", "model"),
     ("state", "event_rule", "segment", "trajectory", "truncation", "motion", "driven", "simulate", "compiled"),
     ("shooting", "steady_state", "frequency_response"),
     ("exudyn_plugin",),

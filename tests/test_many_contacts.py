@@ -10,7 +10,7 @@ from run_checks import complaints
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.beam import Beam, planar_beam
-from multiphi_exudyn.level import build_level
+from multiphi_exudyn.build_level import build_level
 from multiphi_exudyn.section import Section
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes

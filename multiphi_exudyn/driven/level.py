@@ -20,8 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.base import cleared
 from multiphi_exudyn.driven.excitation import Excitation, columns
-from multiphi_exudyn.level import Level, cleared
+from multiphi_exudyn.level import Level
 from multiphi_exudyn.transition import LoadedLevel, Transition
 
 __all__ = ["DrivenLevel", "DrivenTransition", "ExtendedLevel"]

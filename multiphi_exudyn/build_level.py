@@ -1,0 +1,132 @@
+"""Building a level: its modes, and the rows by which gaps and contact forces follow from them.
+
+Each direction of positive stiffness added interlaces: omega_i(open) <= omega_i(level) <= omega_i+c(open), one of
+negative stiffness downwards; asserted when a level is built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from multiphi_exudyn.base import Base, cleared
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.level import Level
+from multiphi_exudyn.level_modes import level_modes
+from multiphi_exudyn.supports import INDEPENDENT, Supports
+
+__all__ = ["build_level", "independent"]
+
+ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
+INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
+UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
+NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
+
+
+def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) -> Level:
+    """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
+    closed = list(indices)
+    supports = base.supports(closed, base.gaps[closed])
+    if not independent(base, held := [i for i in closed if base.contacts[i].rigid]):
+        names = ", ".join(base.contacts[i].name for i in held)
+        raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
+    squares, vectors, accuracy = level_modes(base, supports, modes)
+    rigid_body = _rigid_body_modes(base, supports)
+    squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
+    squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
+    zero = squares == 0
+    _check(base, squares, vectors, supports, accuracy)
+    damping = base.resistance(closed)
+    gap_rows = cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
+    forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
+    return Level(
+        closed=tuple(base.contacts[i].name for i in closed),
+        indices=indices,
+        base=base,
+        squares=squares,
+        vectors=vectors,
+        damping=_projected_damping(damping, squares, vectors),
+        gap_rows=gap_rows,
+        force_rows=forces,
+        force_rate_rows=rates,
+        neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
+    )
+
+
+def _force_rows(
+    base: Base, closed: list[int], squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray, gap_rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
+    rigid = np.isinf(base.stiffnesses[closed])
+    forces = np.zeros((len(closed), len(squares)))
+    rates = np.zeros_like(forces)
+    pinned, sprung = base.directions[:, closed][:, rigid], base.directions[:, closed][:, ~rigid]
+    forces[~rigid] = -base.stiffnesses[closed][~rigid][:, None] * gap_rows[~rigid]
+    rates[~rigid] = -base.dampings[closed][~rigid][:, None] * gap_rows[~rigid]
+    if np.any(rigid):
+        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, sprung @ forces[~rigid])
+        rates[rigid] = np.linalg.lstsq(pinned, damping @ vectors, rcond=None)[0]
+    return forces, rates
+
+
+def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own."""
+    projected: np.ndarray = vectors.T @ damping @ vectors
+    free = squares == 0
+    if not np.any(free):
+        return projected
+    negligible = np.abs(projected) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    projected[negligible & (free[:, None] | free[None, :])] = 0.0
+    return projected
+
+
+def independent(base: Base, rigid: Sequence[int]) -> bool:
+    """Whether none of these rigid contacts follows from the others, so that they can be closed together."""
+    pinned = base.directions[:, list(rigid)]
+    if pinned.shape[1] == 0:
+        return True
+    diagonal = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
+    return pinned.shape[1] <= base.modes.count and bool(np.min(diagonal) > INDEPENDENT * np.max(diagonal))
+
+
+def _rigid_body_modes(base: Base, supports: Supports) -> int:
+    """Rigid-body motions that no closed contact resists."""
+    rigid = supports.resisting[: base.modes.rigid]
+    if rigid.size == 0:
+        return base.modes.rigid
+    singular = np.linalg.svd(rigid, compute_uv=False)
+    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * supports.size))
+
+
+def _reaction_rows(
+    base: Base, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
+) -> np.ndarray:
+    """Reaction of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho, solved for rho (c, r).
+
+    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
+    """
+    squared = base.modes.omega[:, None] ** 2
+    total = squared + np.abs(squares)
+    smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
+    weights = 1 / np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
+    residuals = (squared - squares) * vectors - spring_forces
+    grams = (pinned.T * weights.T[:, None, :]) @ pinned
+    given = (pinned.T @ (weights * residuals)).T
+    return np.asarray(np.linalg.solve(grams, given[:, :, None])[:, :, 0].T)
+
+
+def _check(base: Base, squares: np.ndarray, vectors: np.ndarray, supports: Supports, accuracy: float) -> None:
+    """Mass normalisation and interlacing."""
+    error = np.max(np.abs(vectors.T @ vectors - np.eye(len(squares))), initial=0.0)
+    stiffening, softening = int(np.sum(supports.stiffness > 0)), int(np.sum(supports.stiffness < 0))
+    given = base.modes.omega**2
+    slack = INTERLACING * (given + accuracy) + np.finfo(float).eps * np.max(given, initial=0.0)
+    below, above = (given - slack)[: len(squares) - softening], (given + slack)[stiffening:]
+    count = min(len(above), len(squares))
+    interlaced = np.all(squares[softening:] >= below) and np.all(squares[:count] <= above[:count])
+    if not (error <= ORTHONORMAL and interlaced):
+        raise NumericalFailure(
+            f"level: its modes fail their invariants (mass normalisation off by {error:g}, "
+            f"interlacing {'holds' if interlaced else 'violated'})"
+        )

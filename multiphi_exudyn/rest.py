@@ -1,0 +1,54 @@
+"""Rest: contact forces and configuration under a load, in the coordinates of a base (eq. 38.5, with the static force).
+
+    y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
+
+P the directions of the supports, f (d,) the forces along them; e elastic, 0 rigid-body coordinates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.base import Base, cleared
+from multiphi_exudyn.supports import INDEPENDENT, Supports
+
+__all__ = ["rest"]
+
+
+def rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (d,) along the supports and configuration y (m,) at rest, motion nobody resists left out."""
+    elastic, free = slice(base.modes.rigid, None), slice(base.modes.rigid)
+    compliance = base.modes.omega[elastic] ** -2.0
+    touching = supports.directions[elastic]
+    sprung = supports.stiffness != 0  # the others push with G, whatever y is
+    own = np.where(sprung, 1 / np.where(sprung, supports.stiffness, 1.0), 1.0)
+    flexibility = sprung[:, None] * (touching.T @ (compliance[:, None] * touching)) + np.diag(own)
+    carried = _range(supports.resisting[free], INDEPENDENT * supports.size)
+    coupling = supports.directions[free].T @ carried
+    none = np.zeros((carried.shape[1],) * 2)
+    matrix = np.block([[flexibility, sprung[:, None] * coupling], [coupling.T, none]])
+    pressed = -supports.offsets - sprung * (touching.T @ (compliance * load[elastic]))
+    solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]))
+    forces = solution[: len(own)]
+    total = cleared(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
+    configuration = np.concatenate([carried @ solution[len(own) :], compliance * total])
+    left = supports.offsets + own * forces + sprung * (supports.directions.T @ configuration)
+    further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]))  # what soft modes magnified
+    added = np.concatenate([carried @ further[len(own) :], compliance * (touching @ further[: len(own)])])
+    return forces + further[: len(own)], configuration + added
+
+
+def _solved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """The solution, the smallest one where the matrix is singular: springs that cancel, under a load they allow."""
+    try:
+        return np.linalg.solve(matrix, given)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(matrix, given, rcond=None)[0]
+
+
+def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:
+    """Orthonormal basis of the column space, singular values up to ``negligible`` taken for zero."""
+    if matrix.size == 0:
+        return np.zeros((matrix.shape[0], 0))
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    return left[:, singular > negligible]

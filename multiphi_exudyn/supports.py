@@ -1,0 +1,50 @@
+"""Supports: what closed contacts are along each of their directions.
+
+Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
+K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["INDEPENDENT", "Supports"]
+
+INDEPENDENT = 1e-10  # of the largest: singular values of contact directions below it are dependent contacts
+
+
+@dataclass(frozen=True)
+class Supports:
+    """What closed contacts are along each of their d directions p.
+
+    members: the contacts of each. directions: (m, d). stiffness: K (d,) [N/m], inf where rigid.
+    offsets: (d,) G / K [m], the gap of a single contact; G [N] where K is zero.
+    """
+
+    members: tuple[tuple[int, ...], ...]
+    directions: np.ndarray
+    stiffness: np.ndarray
+    offsets: np.ndarray
+
+    @property
+    def rigid(self) -> np.ndarray:
+        """(d,) bool."""
+        return np.isinf(self.stiffness)
+
+    @property
+    def resisting(self) -> np.ndarray:
+        """Directions (m, .) in which there is a stiffness."""
+        return self.directions[:, self.stiffness != 0]
+
+    @property
+    def size(self) -> float:
+        """The largest norm of these."""
+        return float(np.linalg.norm(self.resisting, axis=0).max(initial=0.0))
+
+    @property
+    def constants(self) -> np.ndarray:
+        """G (d,) [N], zero where rigid."""
+        finite = np.where(self.rigid | (self.stiffness == 0), 1.0, self.stiffness)
+        return np.where(self.rigid, 0.0, finite * self.offsets)
