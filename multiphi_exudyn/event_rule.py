@@ -39,201 +39,23 @@ instant is a failure, with its cause.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
-from multiphi_exudyn.base import cleared
 from multiphi_exudyn.build_level import independent
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.model import SIGNAL_TABLES, MultiPhiModel
-from multiphi_exudyn.recent import Recent
-from multiphi_exudyn.root_search import ZERO
-from multiphi_exudyn.state import Change, Loss, Phase, Row, Rows, SignalTable, State, sign_of
-from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
+from multiphi_exudyn.passage import RESTING, Passage
+from multiphi_exudyn.state import Change, Loss, Phase, Rows, SignalTable, State, sign_of
+from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
 
 __all__ = ["EventRule"]
 
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
-RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
 
 
-@dataclass
-class _Known:
-    """What is kept of a level, beside itself: all of it is made when it is first asked for.
-
-    functions: s by contact. together: those of its ``ends``. tables: what is watched, by phases. ways: maps to other
-    levels, by their closed contacts.
-    """
-
-    level: LoadedLevel
-    functions: dict[int, Row] = field(default_factory=dict)
-    together: Rows | None = None
-    ends: tuple[int, ...] = ()
-    tables: dict[tuple[Phase, ...], tuple[list[tuple[int, bool]], SignalTable]] = field(default_factory=dict)
-    ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
-
-
-class EventRule:
+class EventRule(Passage):
     """Applies the rule to one model under one static load (m,) in base coordinates."""
-
-    def __init__(self, model: MultiPhiModel, load: np.ndarray) -> None:
-        self.model = model
-        self.load = load
-        self.transitions = 0
-        self.compiled: Any = None  # what the compiled loop keeps for later runs
-        self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
-        self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
-        self._armed = (Phase.ARMED,) * len(self._rigid)
-        self._all = tuple(range(len(self._rigid)))
-        self.mapped = 0  # ways between levels that have been computed
-        self._known = Recent[tuple[int, ...], _Known](model.most_levels, self._close)
-
-    def level(self, closed: Iterable[int]) -> LoadedLevel:
-        """The level with these contacts closed, under this load."""
-        key = tuple(sorted(closed))
-        self.model.level_at(key)  # of the levels that the model keeps it is now the one used last
-        return self._of(key).level
-
-    def forget(self, closed: tuple[int, ...]) -> None:
-        """Let go of what is kept of a level."""
-        self._known.drop(closed)
-
-    def _of(self, closed: tuple[int, ...]) -> _Known:
-        return self._known.find(closed) or self._known.keep(closed, _Known(self._loaded(closed)))
-
-    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
-        return LoadedLevel.of(self.model.level_at(closed), self.load)
-
-    def _close(self, closed: tuple[int, ...], gone: _Known) -> None:
-        """The ways to a level that is not kept any more."""
-        for _, known in self._known.items():
-            known.ways.pop(closed, None)
-
-    @property
-    def levels_kept(self) -> int:
-        """Number of levels of which something is kept."""
-        return len(self._known)
-
-    @property
-    def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """From and to which closed contacts maps between levels are kept."""
-        return [(source, target) for source, known in self._known.items() for target in known.ways]
-
-    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        """The map between two levels, computed once as long as they are kept."""
-        ways = self._of(source.level.indices).ways
-        if target.level.indices not in ways:
-            ways[target.level.indices] = self._map(source, target)
-            self.mapped += 1
-        return ways[target.level.indices]
-
-    def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        return Transition(source, target)
-
-    def function(self, level: LoadedLevel, contact: int) -> Row:
-        """s of a contact in a level."""
-        functions = self._of(level.level.indices).functions
-        if contact not in functions:
-            functions[contact] = self._function(level, contact)
-        return functions[contact]
-
-    def _function(self, level: LoadedLevel, contact: int) -> Row:
-        own = level.level
-        if contact not in own.indices:
-            return Row(own.gap_rows[contact], np.zeros(own.modes), float(level.gap_constants[contact]))
-        if not self._never_pulls(contact):
-            return Row(-own.gap_rows[contact], np.zeros(own.modes), -float(level.gap_constants[contact]))
-        k = own.indices.index(contact)
-        return Row(own.force_rows[k], own.force_rate_rows[k], float(level.asymptotic.forces[k]))
-
-    def _rows(self, level: LoadedLevel) -> Rows:
-        """s of the ``ends`` in a level, together."""
-        known, own = self._of(level.level.indices), level.level
-        if known.together is None:
-            ends = self.ends(own.indices)
-            position, constant = own.gap_rows[list(ends)], level.gap_constants[list(ends)]
-            rate = np.zeros_like(position)
-            for k, contact in enumerate(ends):
-                if contact in own.indices:
-                    row = self.function(level, contact)
-                    position[k], rate[k], constant[k] = row.position, row.rate, row.constant
-            known.together = Rows(position, rate if np.any(rate) else None, constant)
-        return known.together
-
-    def entered_function(self, level: LoadedLevel, contact: int) -> Row:
-        """s that a contact would have after a change of its state, as a function of the present level's state."""
-        target = self.level(set(level.level.indices) ^ {contact})
-        move, there = self.transition(level, target), self.function(target, contact)
-        terms = there.position * move.offset
-        constant = 0.0 if sign_of(terms, there.constant) == 0 else there.constant + float(np.sum(terms))
-        return Row(
-            cleared(there.position @ move.matrix, np.abs(there.position) @ np.abs(move.matrix)),
-            there.rate @ move.velocity_matrix,
-            constant,
-        )
-
-    def _never_pulls(self, contact: int) -> bool:
-        """Whether a contact's s is its force while it is closed."""
-        return self._rigid[contact] or contact in self._viscous
-
-    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
-        """Contacts that can ask first while all are armed: of a force law the ends of its chains."""
-        if not self.model.chains:
-            return self._all
-        known = self._of(closed)
-        if not known.ends:
-            chains, held = self.model.chains, set(closed)
-            linked = {i for chain in chains for i in chain}
-            found = {i for i in range(len(self._rigid)) if i not in linked}
-            for chain in chains:
-                found.update(_ends(chain, held))
-            known.ends = tuple(sorted(found))
-        return known.ends
-
-    def candidates(self, closed: tuple[int, ...], phases: tuple[Phase, ...]) -> tuple[int, ...]:
-        """The ``ends``, and all of a chain that is not armed."""
-        ends = self.ends(closed)
-        unsettled = [chain for chain in self.model.chains if any(phases[i] is not Phase.ARMED for i in chain)]
-        return tuple(sorted({*ends, *(i for chain in unsettled for i in chain)})) if unsettled else ends
-
-    def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
-        """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
-        settled = phases is self._armed  # the hash of many phases takes its time
-        key = () if settled else phases
-        tables = self._of(state.closed).tables
-        found = tables.get(key)
-        if found is None:
-            waiting, rows, rates = self.watched(state.level, phases)
-            if len(tables) >= SIGNAL_TABLES:
-                tables.clear()
-            found = tables[key] = waiting, SignalTable(state.basis, state.shapes, rows, rates)
-        return found
-
-    def watched(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], Rows, list[bool]]:
-        """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
-        if phases is self._armed:
-            ends = self.ends(level.level.indices)
-            return [(contact, True) for contact in ends], self._rows(level), [False] * len(ends)
-        found = [
-            (contact, *wait)
-            for contact in self.candidates(level.level.indices, phases)
-            for wait in self._waiting_for(level, contact, phases[contact])
-        ]
-        rows = Rows.of([item[2] for item in found], level.level.modes)
-        return [(item[0], item[1]) for item in found], rows, [item[3] for item in found]
-
-    def _waiting_for(self, level: LoadedLevel, contact: int, phase: Phase) -> list[tuple[bool, Row, bool]]:
-        """(asks, function, whether its rate is meant) of what ends a contact's phase by falling through zero."""
-        own = self.function(level, contact)
-        if phase is Phase.ARMED:
-            return [(True, own, False)]
-        if phase is Phase.RECOVERING:
-            return [(False, -own, False), (True, own, True)]
-        return [(False, -own, False), (True, -self.entered_function(level, contact), False)]
-
-    # ------------------------------------------------------------------ decisions at one instant
 
     def start(
         self, displacement: np.ndarray, velocity: np.ndarray, penetrating: Sequence[int], touching: Sequence[int]
@@ -263,15 +85,6 @@ class EventRule:
         )
         state, lost, made = self.decide(state, set())
         return state, loss + lost, changes + made
-
-    @property
-    def stop_speeds(self) -> np.ndarray:
-        """Velocities (c,) [m/s] of the stops at the present instant, along h."""
-        return np.zeros(len(self._rigid))
-
-    def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
-        """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
-        return self.model.base.strain(displacement, penetrating) - float(self.load @ displacement)
 
     def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
         """State right after an instant at which these contacts ask to change."""
@@ -450,30 +263,6 @@ class EventRule:
         damped = (own.rate @ self.transition(struck.level, level).velocity_matrix) * struck.velocity
         return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset))
 
-    def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
-        """Displacement straight from the level before the impact, velocity from the one it was computed in."""
-        level = self.level(closed)
-        displacement = self.transition(state.level, level).displacement(state.displacement)
-        velocity = self.transition(struck.level, level).velocity(struck.velocity)
-        return replace(state, level=level, displacement=displacement, velocity=velocity)
-
-    def _loss(self, state: State, after: State, collided: float = 0.0, plastic: Loss | None = None) -> Loss:
-        """What was lost between two states of one instant, the energy ``collided`` in an impact with its own loss."""
-        relaxed = self._relaxed(state, after) if self._viscous else 0.0
-        kinetic, strain = state.kinetic - after.kinetic - collided, state.potential - after.potential - relaxed
-        if plastic is None:
-            return Loss(0.0, kinetic, strain, 0.0, relaxed)
-        return Loss(plastic.impact, kinetic, strain, plastic.stop_work, relaxed)
-
-    def _relaxed(self, state: State, after: State) -> float:
-        """Strain energy [J] of viscous contacts that opened inside their stop, less that of those that closed there."""
-        total = 0.0
-        for i in self._viscous:
-            opened = (i in state.closed) - (i in after.closed)
-            gap = state.level.gap(i, state.displacement) if opened else 0.0
-            total += opened * 0.5 * float(self.model.base.stiffnesses[i]) * gap**2
-        return total
-
     def _changes(
         self, state: State, striking: set[int], after: State, compliant: set[int], pushed: dict[int, float]
     ) -> list[Change]:
@@ -483,28 +272,6 @@ class EventRule:
         rebounds = {change.contact for change in struck} - closed
         sprung = [Change(i, "close") for i in sorted(compliant - before)]
         return struck + sprung + [Change(i, "open") for i in sorted(rebounds | (before - closed))]
-
-    def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
-        """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
-        rows = state.level.level.speed_rows[touching]
-        free = self._free(state.level)
-        velocity, impulses = nearest_admissible(rows, state.velocity, free)
-        if np.linalg.norm(velocity[:free]) <= RESTING * np.linalg.norm(state.velocity[:free]):
-            velocity[:free] = 0.0  # round-off of rest, which would rock on redundant stops until it underflows
-        after = replace(state, velocity=velocity)
-        lost = state.kinetic - after.kinetic
-        plastic = self._plastic(lost, rows @ state.velocity, impulses)
-        return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
-
-    @staticmethod
-    def _free(level: LoadedLevel) -> int:
-        """How many coordinates of a level an impulse can change, the first ones."""
-        return level.level.modes
-
-    @staticmethod
-    def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
-        """Energy [J] that an impact dissipates: what the structure lost, as long as no stop moves."""
-        return lost
 
     def _pressing(self, released: State, state: State, touching: list[int]) -> set[int]:
         """Contacts at rest relative to their stop after an impact whose free motion would close them further.
@@ -525,41 +292,3 @@ class EventRule:
         return pressing or self._joining(
             state, set(), {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
         )
-
-    def _unseen(self, state: State, rows: np.ndarray, touching: list[int]) -> np.ndarray:
-        """Gap velocities (k,) that the free motion turns back before the gap is more than round-off of its terms."""
-        level, place = state.level, np.abs(state.displacement)
-        gaps = np.abs(level.level.gap_rows[touching]) @ place + np.abs(level.gap_constants[touching])
-        return np.sqrt(2 * ZERO * gaps * np.maximum(-(rows @ state.acceleration), 0.0))
-
-    def _sizes(self, rows: np.ndarray, *states: State) -> np.ndarray:
-        """What gap velocities (k,) could be at the speeds of these states, whose directions an impact mixes."""
-        free = self._free(states[0].level)
-        lengths, sizes = np.linalg.norm(rows[:, :free], axis=1), np.zeros(len(rows))
-        for state in states:
-            prescribed = np.abs(rows[:, free:]) @ np.abs(state.velocity[free:])
-            sizes += lengths * np.linalg.norm(state.velocity[:free]) + prescribed
-        return sizes
-
-    def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
-        """The state in another level (eq. 38.6), and what truncation took."""
-        if level.level.indices == state.closed:
-            return state, Loss()
-        move = self.transition(state.level, level)
-        displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
-        after = replace(state, level=level, displacement=displacement, velocity=velocity)
-        return after, self._loss(state, after)
-
-    def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
-        """A state given in base coordinates, in a level's modes."""
-        vectors = level.level.vectors.T
-        eta = vectors @ (displacement - level.asymptotic.configuration)
-        return State(level, eta, vectors @ velocity, (Phase.ARMED,) * len(self._rigid))
-
-
-def _ends(chain: tuple[int, ...], closed: set[int]) -> tuple[int, ...]:
-    """Last closed and first open spring of a chain; the whole chain where its closed springs are not the first ones."""
-    count = sum(i in closed for i in chain)
-    if not all(i in closed for i in chain[:count]):
-        return chain
-    return chain[max(count - 1, 0) : count + 1]

@@ -22,7 +22,6 @@ import math
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse
 
 from multiphi_exudyn.base import Base
 from multiphi_exudyn.modes import right_singular_vectors

@@ -1,0 +1,110 @@
+"""Passage: from one level into another at one instant, and what is lost on the way: by impact, truncation, relaxation.
+
+A plastic impact takes the part of the velocity that contacts cannot have (Moreau), the map of eq. (38.6) what the
+modes of the next level cannot hold; a viscous contact that opens inside its stop what its spring held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from multiphi_exudyn.contact_functions import ContactFunctions
+from multiphi_exudyn.root_search import ZERO
+from multiphi_exudyn.state import Loss, Phase, State
+from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
+
+__all__ = ["RESTING", "Passage"]
+
+RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
+
+
+class Passage(ContactFunctions):
+    """States carried from level to level, and through impacts."""
+
+    @property
+    def stop_speeds(self) -> np.ndarray:
+        """Velocities (c,) [m/s] of the stops at the present instant, along h."""
+        return np.zeros(len(self._rigid))
+
+    def potential(self, displacement: np.ndarray, penetrating: Sequence[int]) -> float:
+        """Strain energy less the potential of the load [J] of a configuration y (m,), nothing truncated."""
+        return self.model.base.strain(displacement, penetrating) - float(self.load @ displacement)
+
+    def _at_rest_on(self, state: State, struck: State, closed: set[int]) -> State:
+        """Displacement straight from the level before the impact, velocity from the one it was computed in."""
+        level = self.level(closed)
+        displacement = self.transition(state.level, level).displacement(state.displacement)
+        velocity = self.transition(struck.level, level).velocity(struck.velocity)
+        return replace(state, level=level, displacement=displacement, velocity=velocity)
+
+    def _loss(self, state: State, after: State, collided: float = 0.0, plastic: Loss | None = None) -> Loss:
+        """What was lost between two states of one instant, the energy ``collided`` in an impact with its own loss."""
+        relaxed = self._relaxed(state, after) if self._viscous else 0.0
+        kinetic, strain = state.kinetic - after.kinetic - collided, state.potential - after.potential - relaxed
+        if plastic is None:
+            return Loss(0.0, kinetic, strain, 0.0, relaxed)
+        return Loss(plastic.impact, kinetic, strain, plastic.stop_work, relaxed)
+
+    def _relaxed(self, state: State, after: State) -> float:
+        """Strain energy [J] of viscous contacts that opened inside their stop, less that of those that closed there."""
+        total = 0.0
+        for i in self._viscous:
+            opened = (i in state.closed) - (i in after.closed)
+            gap = state.level.gap(i, state.displacement) if opened else 0.0
+            total += opened * 0.5 * float(self.model.base.stiffnesses[i]) * gap**2
+        return total
+
+    def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
+        """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
+        rows = state.level.level.speed_rows[touching]
+        free = self._free(state.level)
+        velocity, impulses = nearest_admissible(rows, state.velocity, free)
+        if np.linalg.norm(velocity[:free]) <= RESTING * np.linalg.norm(state.velocity[:free]):
+            velocity[:free] = 0.0  # round-off of rest, which would rock on redundant stops until it underflows
+        after = replace(state, velocity=velocity)
+        lost = state.kinetic - after.kinetic
+        plastic = self._plastic(lost, rows @ state.velocity, impulses)
+        return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
+
+    @staticmethod
+    def _free(level: LoadedLevel) -> int:
+        """How many coordinates of a level an impulse can change, the first ones."""
+        return level.level.modes
+
+    @staticmethod
+    def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
+        """Energy [J] that an impact dissipates: what the structure lost, as long as no stop moves."""
+        return lost
+
+    def _unseen(self, state: State, rows: np.ndarray, touching: list[int]) -> np.ndarray:
+        """Gap velocities (k,) that the free motion turns back before the gap is more than round-off of its terms."""
+        level, place = state.level, np.abs(state.displacement)
+        gaps = np.abs(level.level.gap_rows[touching]) @ place + np.abs(level.gap_constants[touching])
+        return np.sqrt(2 * ZERO * gaps * np.maximum(-(rows @ state.acceleration), 0.0))
+
+    def _sizes(self, rows: np.ndarray, *states: State) -> np.ndarray:
+        """What gap velocities (k,) could be at the speeds of these states, whose directions an impact mixes."""
+        free = self._free(states[0].level)
+        lengths, sizes = np.linalg.norm(rows[:, :free], axis=1), np.zeros(len(rows))
+        for state in states:
+            prescribed = np.abs(rows[:, free:]) @ np.abs(state.velocity[free:])
+            sizes += lengths * np.linalg.norm(state.velocity[:free]) + prescribed
+        return sizes
+
+    def _moved(self, state: State, level: LoadedLevel) -> tuple[State, Loss]:
+        """The state in another level (eq. 38.6), and what truncation took."""
+        if level.level.indices == state.closed:
+            return state, Loss()
+        move = self.transition(state.level, level)
+        displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
+        after = replace(state, level=level, displacement=displacement, velocity=velocity)
+        return after, self._loss(state, after)
+
+    def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
+        """A state given in base coordinates, in a level's modes."""
+        vectors = level.level.vectors.T
+        eta = vectors @ (displacement - level.asymptotic.configuration)
+        return State(level, eta, vectors @ velocity, (Phase.ARMED,) * len(self._rigid))
