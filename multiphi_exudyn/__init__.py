@@ -23,7 +23,8 @@ from multiphi_exudyn.loads import (
     SweepLoad,
 )
 from multiphi_exudyn.matrix_files import read_structure
-from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
+from multiphi_exudyn.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.section import Section
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.state import Event

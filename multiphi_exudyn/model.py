@@ -18,46 +18,18 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.first_root import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
 from multiphi_exudyn.level import Level, LevelOverride
+from multiphi_exudyn.mode_choice import Tolerance, UpTo, is_count
 from multiphi_exudyn.nonnegative import nonnegative_least_squares
 from multiphi_exudyn.recent import Recent
-from multiphi_exudyn.structure import LinearStructure, is_real
+from multiphi_exudyn.structure import LinearStructure
 
-__all__ = ["MultiPhiModel", "Tolerance", "UpTo"]
+__all__ = ["MultiPhiModel"]
 
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
 RULES = 8  # static loads for which a model keeps what simulations have made of its levels
 SIGNAL_TABLES = 16  # kept of a level: sets of phases of its contacts; few come back
 INFEASIBLE = 1e-7  # residual of a least distance: below it the distance is some 1e7 of its nearest constraint
-
-
-@dataclass(frozen=True)
-class UpTo:
-    """Every level with its modes up to a cut-off frequency [Hz], at least one and at most ``most``.
-
-    A closed contact raises frequencies, so no level has more modes than the open one.
-    """
-
-    frequency: float
-    most: int = 60
-
-    def __post_init__(self) -> None:
-        _check_limits(self, "frequency", self.frequency, self.most)
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Wanted truncation error of a run, from which its cut-off frequency follows.
-
-    error: of ``truncation_indicator``, an estimate of the relative error of displacements; 0.01 is 1 %.
-    most: modes that a level is given at most.
-    """
-
-    error: float
-    most: int = 60
-
-    def __post_init__(self) -> None:
-        _check_limits(self, "error", self.error, self.most)
 
 
 @dataclass(frozen=True)
@@ -266,7 +238,7 @@ class MultiPhiModel:
         if isinstance(self.modes, (UpTo, Tolerance)) or (isinstance(self.modes, str) and self.modes == "all"):
             return
         needed = "need an integer >= 1, 'all', UpTo or Tolerance"
-        if not _is_count(self.modes):
+        if not is_count(self.modes):
             raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
         if int(self.modes) < 1:
             raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
@@ -291,18 +263,6 @@ def _check_overrides(given: Any) -> None:
     for key, value in given.items():
         if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
             raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")
-
-
-def _is_count(value: object) -> bool:
-    return is_real(value) and isinstance(value, (int, np.integer))
-
-
-def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -> None:
-    kind = type(given).__name__
-    if not is_real(value) or not _is_count(most):
-        raise MultiPhiTypeError(f"{kind}: got {value!r} and {most!r}, need a number and an integer")
-    if not (math.isfinite(value) and value > 0 and most >= 1):
-        raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {name} > 0 and most >= 1")
 
 
 def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:

@@ -22,7 +22,8 @@ from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiVal
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.force_law import Contact
 from multiphi_exudyn.loads import Load
-from multiphi_exudyn.model import MultiPhiModel, Tolerance
+from multiphi_exudyn.mode_choice import Tolerance
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.motion import CompiledMotion, Motion
 from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Start, Trajectory

@@ -23,7 +23,8 @@ import numpy as np
 from multiphi_exudyn.courses import Harmonic
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
-from multiphi_exudyn.model import MultiPhiModel, Tolerance
+from multiphi_exudyn.mode_choice import Tolerance
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real
 from multiphi_exudyn.trajectory import Trajectory

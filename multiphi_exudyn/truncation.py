@@ -29,7 +29,8 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.level import Level
-from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
+from multiphi_exudyn.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.trajectory import Trajectory
 

@@ -20,7 +20,8 @@ from multiphi_exudyn.exudyn_plugin.interface import Interface, interface_rows
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.loads import Load
-from multiphi_exudyn.model import MultiPhiModel, Tolerance
+from multiphi_exudyn.mode_choice import Tolerance
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.simulate import started
 from multiphi_exudyn.structure import At, is_real

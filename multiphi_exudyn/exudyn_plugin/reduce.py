@@ -42,7 +42,8 @@ from multiphi_exudyn.exudyn_plugin.linearize import (
 )
 from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
 from multiphi_exudyn.loads import ConstantLoad, FunctionLoad, Load
-from multiphi_exudyn.model import MultiPhiModel, Tolerance, UpTo
+from multiphi_exudyn.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import Matrix, ModalDamping, RayleighDamping
 
 __all__ = ["Item", "Reduction", "reduce"]

@@ -20,7 +20,8 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.level import LevelOverride
 from multiphi_exudyn.loads import Load
-from multiphi_exudyn.model import MultiPhiModel, Tolerance
+from multiphi_exudyn.mode_choice import Tolerance
+from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
