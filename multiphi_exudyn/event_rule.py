@@ -135,9 +135,10 @@ class EventRule(Passage):
         if value > 0:
             return Phase.ARMED
         rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
-        if value == 0 or rate == 0:
-            table = SignalTable(state.basis, state.shapes, Rows.of([own, own], len(state.shapes)), [False, True])
-            value, rate = state.finder.signs(table.signals(state.coefficients()))
+        if rate == 0:
+            table = SignalTable(state.basis, state.shapes, Rows.of([own], len(state.shapes)), [False])
+            (rate,) = state.finder.signs(table.signals(state.coefficients()), since=2)
+        value = value or rate
         if value >= 0:
             return Phase.ARMED
         stays = contact in self._viscous or (self._rigid[contact] and contact in state.closed)

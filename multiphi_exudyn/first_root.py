@@ -109,14 +109,18 @@ class DescentFinder:
         result: list[int] = down.nonzero()[0].tolist()
         return result
 
-    def signs(self, signals: Signals) -> list[int]:
-        """For each signal: +1 or -1 as it is, or becomes at once, positive or negative at t = 0; 0 if it vanishes."""
+    def signs(self, signals: Signals, since: int = 0) -> list[int]:
+        """For each signal: +1 or -1 as it is, or becomes at once, positive or negative at t = 0; 0 if it vanishes.
+
+        since: derivatives of a lower order are known to be zero.
+        """
         derivatives = self._derivatives(signals.coefficients, DERIVATIVES)
         values = (derivatives @ self.basis.at(0.0)).real
         values[0] += signals.constants
         noise = ZERO * (np.abs(derivatives) @ np.abs(self.basis.at(0.0)))  # t^d, d > 0, is zero and has none
         noise[0] += ZERO * np.abs(signals.constants)
         decided = np.abs(values) > noise
+        decided[:since] = False
         first = np.argmax(decided, axis=0)
         return [int(np.sign(values[order, s])) if decided[order, s] else 0 for s, order in enumerate(first)]
 

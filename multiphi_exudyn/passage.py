@@ -62,8 +62,9 @@ class Passage(ContactFunctions):
         rows = state.level.level.speed_rows[touching]
         free = self._free(state.level)
         velocity, impulses = nearest_admissible(rows, state.velocity, free)
-        if np.linalg.norm(velocity[:free]) <= RESTING * np.linalg.norm(state.velocity[:free]):
-            velocity[:free] = 0.0  # round-off of rest, which would rock on redundant stops until it underflows
+        before, left = np.abs(state.velocity[:free]), np.abs(velocity[:free])
+        stopped = left <= RESTING * before  # round-off of rest, which would bounce and rock on until it underflows
+        velocity[:free][stopped | (np.linalg.norm(left) <= RESTING * np.linalg.norm(before))] = 0.0
         after = replace(state, velocity=velocity)
         lost = state.kinetic - after.kinetic
         plastic = self._plastic(lost, rows @ state.velocity, impulses)

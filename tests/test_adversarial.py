@@ -330,6 +330,11 @@ class TestCampaign:
         assert not np.any(case.velocity)
         assert {kind for kind, _ in verdicts(number)} <= {"ok", "sensitive"}
 
+    @pytest.mark.parametrize("number", [1933, 109663])
+    def test_round_off_of_an_impact_is_rest_in_both_loops(self, number):
+        """A plastic impact leaves 1e-16 of a speed: bounces of it, or of a gap that faces the stop, never end."""
+        assert verdicts(number) == [("ok", "")]
+
     def test_loops_that_differ_are_told(self, monkeypatch):
         """A compiled loop that is 1e-5 off, in a case that no nudge changes."""
         run = random_campaign._run

@@ -135,10 +135,10 @@ def potential(k: Levels, a: int, x: np.ndarray) -> float:
 
 
 @inlined
-def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, skipped: int) -> int:
-    """Sign of the first derivative of s that is not round-off, from the one of order ``skipped`` on."""
+def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, since: int) -> int:
+    """Sign of the first derivative of s that is not round-off, from the one of order ``since`` >= 1 on."""
     p = k.sizes[a, 1]
-    for order in range(skipped, DERIVATIVES + skipped):
+    for order in range(since, DERIVATIVES):
         value = size = 0.0
         for j in range(p):
             re = k.own_signal[a, contact, 0, j] * c[0, j] - k.own_signal[a, contact, 1, j] * c[1, j]
@@ -150,8 +150,7 @@ def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, skipped: int) -> 
                 )
             value += re
             size += math.sqrt(re * re + im * im)
-        constant = k.own_constant[a, contact] if order == 0 else 0.0
-        sign = sign_of(value + constant, size + abs(constant))
+        sign = sign_of(value, size)
         if sign != 0:
             return sign
     return 0
@@ -167,9 +166,10 @@ def standing(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, c: n
     if k.rated[a]:
         accelerate(k, a, x, v, work)
     rate = rate_sign(k, a, row, x, v, work)
-    if value == 0 or rate == 0:
-        value = first_sign(k, a, contact, c, 0)
-        rate = first_sign(k, a, contact, c, 1)
+    if rate == 0:
+        rate = first_sign(k, a, contact, c, 2)
+    if value == 0:
+        value = rate
     if value >= 0:
         return ARMED
     pulls = k.rigid[contact] and k.closed[a, contact]
@@ -207,7 +207,10 @@ def strike(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, work: 
         return NOT_PLAIN, 0.0
     impulse = -speed / square
     for i in range(r):
+        before = abs(v[i])
         v[i] += impulse * row[0, i]
+        if abs(v[i]) <= RESTING * before:
+            v[i] = 0.0
     left, _, more = push(row, v, r)
     accelerate(k, a, x, v, work)
     pressing, _, noise = push(row, work, r)
