@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse
 
 from multiphi_exudyn import LinearStructure, ModalDamping, MultiPhiModel, RayleighDamping, UnilateralContact
+from multiphi_exudyn.simulate import started
 
 N, POINTS, MODES = 20_000, 20, 2
 VECTOR = 8 * N  # bytes
@@ -55,3 +56,28 @@ def test_points_keep_only_what_is_not_zero_of_their_rows():
     np.testing.assert_array_equal(np.flatnonzero(again.points["p7"]), [7])
     np.testing.assert_array_equal(again.row("mean")[:3], [0.5, 0.5, 0.0])
     assert peak(build)[1] < bare + 5 * VECTOR
+
+
+def string(n, stops=16):
+    """A string of unit mass and tension over its stops, in n pieces: its motion is the same for every n."""
+    tension = n * scipy.sparse.diags_array([2 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1])
+    places = {f"p{i}": (i + 1) * n // (stops + 1) for i in range(stops)}
+    structure = LinearStructure(scipy.sparse.eye_array(n) / n, tension.tocsr(), points=places)
+    contacts = [UnilateralContact(f"c{i}", f"p{i}", 1e-2 * (1 + i % 3), 50.0) for i in range(stops)]
+    return MultiPhiModel(structure, contacts, modes=8)
+
+
+def test_events_take_what_they_take_whatever_the_size_of_the_structure():
+    """The second run knows its levels; the first builds them. Neither makes an array of n numbers."""
+    taken = []
+    for n in (1020, 51_000):
+        model = string(n)
+        velocity = -np.sign(model.level(()).shapes[n // 2, 0]) * model.level(()).shapes[:, 0]
+        for _ in range(2):
+            motion = started(model, 0.3, None, velocity, (), compiled=False)
+            _, most = peak(lambda motion=motion: motion.advance(0.3))
+            assert motion.message == ""
+            assert len(motion.events) > 15
+            taken.append((len(motion.events), most))
+    assert taken[0][0] == taken[2][0]
+    assert all(np.array(taken)[2:, 1] < 1.1 * np.array(taken)[:2, 1])
