@@ -139,3 +139,16 @@ def test_bed_of_stops(capsys, monkeypatch, tmp_path):
     assert first[0] == pytest.approx(first[1], rel=1e-4)
     assert capsys.readouterr().out.count("1.05e+06") == 2
     assert picture.stat().st_size > 10_000
+
+
+def test_meshed_bed(capsys, monkeypatch):
+    """Times are for a quiet machine; the events of two meshes and the size of their bases are the same on any."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    example = importlib.import_module("meshed_bed")
+    monkeypatch.setattr(example, "QUICK", ((50, 2), (100, 2)))
+    coarse, fine = example.main([], stops=20, t_end=0.012, repeats=1)
+    assert (coarse.n, fine.n) == (1000, 2000)
+    assert coarse.size == fine.size
+    assert coarse.events == fine.events > 10
+    assert min(coarse.new, coarse.known, fine.new, fine.known) > 0
+    assert "levels known: the finest mesh to the coarsest" in capsys.readouterr().out
