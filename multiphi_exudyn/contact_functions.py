@@ -167,7 +167,7 @@ class ContactFunctions:
 
     def watch(self, state: State, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], SignalTable]:
         """Signals whose first descent is next, with (contact, whether it then asks to change or is armed)."""
-        settled = phases is self._armed  # the hash of many phases takes its time
+        settled = phases == self._armed  # the hash of many phases takes its time
         key = () if settled else phases
         tables = self._of(state.closed).tables
         found = tables.get(key)
@@ -180,7 +180,7 @@ class ContactFunctions:
 
     def watched(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], Rows, list[bool]]:
         """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
-        if phases is self._armed:
+        if phases == self._armed:
             ends = self.ends(level.level.indices)
             return [(contact, True) for contact in ends], self._rows(level), [False] * len(ends)
         found = [
