@@ -11,6 +11,7 @@ from run_checks import complaints
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.beam import Beam, planar_beam
 from multiphi_exudyn.build_level import build_level
+from multiphi_exudyn.modes import right_singular_vectors
 from multiphi_exudyn.section import Section
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes
@@ -48,6 +49,21 @@ class TestFewModesOfALevel:
             assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < SUBSPACES
             shown = few.force_rows @ few.vectors.T - full.force_rows[:, :12] @ wanted.T
             assert np.abs(shown).max(initial=0) <= SUBSPACES * np.abs(full.force_rows).max(initial=0)
+
+    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
+    @pytest.mark.parametrize("closed", [1, 20])
+    def test_take_no_singular_values_but_theirs(self, monkeypatch, stiffness, closed):
+        """A base of 200: what all its modes would cost is not paid for a quarter of them."""
+        base, columns = bed(stiffness, n=200).base, []
+
+        def counted(matrix):
+            columns.append(matrix.shape[1])
+            return right_singular_vectors(matrix)
+
+        monkeypatch.setattr("multiphi_exudyn.level.right_singular_vectors", counted)
+        for modes in (12, 48):
+            assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
+        assert columns == [12, 48]
 
     def test_rigid_contacts_do_not_move_in_them(self):
         level = bed(math.inf).level(("c3", "c20"))
