@@ -6,7 +6,7 @@ once, and in a run's first and last state. Every mesh is run several times in tu
 another program on the machine can only lengthen it. For runs that build their levels the number of modes goes up by one
 from run to run, and the mean counts.
 
-Run: python examples/meshed_bed.py [--full]        --full: the finest mesh too, a minute or two, 1.5 GB
+Run: python examples/meshed_bed.py [--full]        --full: the finest mesh too, a minute or two, 1.7 GB
 """
 
 from __future__ import annotations
