@@ -139,7 +139,7 @@ def main(arguments: list[str], stops: int = STOPS, t_end: float = END, repeats: 
     for cost in costs:
         print(
             f"n = {cost.n:6d}: base {cost.size}, offline {cost.offline:.1f} s, start {1e3 * cost.start:.1f} ms, "
-            f"{cost.events} events, each {1e3 * cost.new:.2f} ms, with its level known {1e3 * cost.known:.2f} ms"
+            f"{cost.events} events, each {1e3 * cost.new:.2f} ms while levels are built, {1e3 * cost.known:.2f} ms then"
         )
     for name in ("new", "known"):
         times = [getattr(cost, name) for cost in costs]

@@ -43,6 +43,19 @@ def test_a_base_takes_a_few_times_its_shapes_whatever_the_damping(damping):
     assert base.modes.shapes.nbytes <= taken < COPIES * base.modes.shapes.nbytes
 
 
+def test_a_base_holds_nothing_beside_its_shapes_that_is_as_large():
+    tracemalloc.start()
+    try:
+        points = {f"p{i}": i * N // POINTS for i in range(POINTS)}
+        structure = LinearStructure(scipy.sparse.eye_array(N), STIFFNESS, points=points)
+        model = MultiPhiModel(structure, [UnilateralContact("stop", "p1", 1e-3, 10.0)], modes=MODES)
+        shapes = model.level(("stop",)).base.modes.shapes
+        held = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert shapes.nbytes < held < 1.2 * shapes.nbytes
+
+
 def test_points_keep_only_what_is_not_zero_of_their_rows():
     def build():
         points = {f"p{i}": i for i in range(100)} | {"mean": np.r_[0.5, 0.5, np.zeros(N - 2)]}
