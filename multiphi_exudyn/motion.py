@@ -56,10 +56,11 @@ class Motion:
             self._record(changes, self.start_loss)
             self.start_loss = Loss()
 
-    def advance(self, end: float) -> None:
-        """Carries the state to ``end``, or to the failure that stops it."""
+    def advance(self, end: float, to_change: bool = False) -> None:
+        """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""
+        known = len(self.events)
         try:
-            while not self.message and self.time < end:
+            while not self.message and self.time < end and not (to_change and len(self.events) > known):
                 self._continue(end)
         except MultiPhiError as failure:
             self.message = f"at t = {self.time:.9g} s: {failure}"

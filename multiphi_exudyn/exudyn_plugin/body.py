@@ -17,7 +17,7 @@ A load or connector at coordinate k of the node acts on mode k of whichever leve
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -40,6 +40,8 @@ NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbala
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
 PHASES = tuple(Phase)
+
+ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # a modal force (s,) by the closed contacts of a level
 
 
 class MultiPhiBody:
@@ -218,31 +220,50 @@ class MultiPhiBody:
     def _travel(
         self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray, given: SteppedLevel
     ) -> State:
-        """State now, of the exact motion from ``before`` under ``force`` in its level and ``entered`` in others.
+        """State now, of the exact motion from ``before`` under ``force`` until a contact changes, then ``entered``.
 
         given: the level in whose modes ``entered`` is told.
         """
-        closed, motion, rule = self._state.closed, self._motion, self._rule
+        closed = self._state.closed
 
-        def force_in(level: tuple[int, ...]) -> np.ndarray:
-            return force if level == closed else self._carried(entered, given, self._stepped(level))
+        def after(level: tuple[int, ...]) -> np.ndarray:
+            return self._carried(entered, given, self._stepped(level))
 
-        if np.any(force) or np.any(entered):
-            rule = ForcedRule(rule, force_in)
+        def until(level: tuple[int, ...]) -> np.ndarray:
+            return force if level == closed else after(level)
+
         q, q_t, _ = self._split(before)
-        loaded = rule.level(closed)
-        total = force + self._own_force(closed, begun)
-        r, eta_t = loaded.level.modes, self._stepped(closed).velocity(q, q_t, total)
-        state = State(loaded, q[:r] - shift(loaded.level, force), eta_t[:r], self._state.phases)
-        motion.rule, motion.state, motion.time = *self._set_out(rule, state, begun), begun
-        motion.advance(self.time)
+        eta_t = self._stepped(closed).velocity(q, q_t, force + self._own_force(closed, begun))
+        loaded = self._rule.level(closed)
+        r = loaded.level.modes
+        state = State(loaded, q[:r], eta_t[:r], self._state.phases)
+        if not (np.any(force) or np.any(entered)):
+            return self._advanced(state, begun, None)
+        changed = self._advanced(state, begun, until, to_change=entered is not force)
+        return changed if self._motion.time == self.time else self._advanced(changed, self._motion.time, after)
+
+    def _advanced(self, state: State, begun: float, force_in: ForceIn | None, to_change: bool = False) -> State:
+        """The state now, or at the first event before, of the exact motion under modal forces by levels."""
+        motion = self._motion
+        rule = self._rule if force_in is None else ForcedRule(self._rule, force_in)
+
+        def centre(level: tuple[int, ...]) -> np.ndarray | float:
+            return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
+
+        shifted = replace(
+            state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed)
+        )
+        motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
+        motion.advance(self.time, to_change)
         if motion.message:
             raise NumericalFailure(f"body {self.name!r}: {motion.message}")
-        motion.segments.pop()  # those that remain end with events: the chatter check counts them
+        if motion.time == self.time:
+            motion.segments.pop()  # those that remain end with events: the chatter check counts them
         del motion.segments[: -motion.window - 1]
         end = self._plain(motion.state)
-        centre = shift(end.level.level, force_in(end.closed))
-        return State(self._rule.level(end.closed), end.displacement + centre, end.velocity, end.phases)
+        return State(
+            self._rule.level(end.closed), end.displacement + centre(end.closed), end.velocity, end.phases
+        )
 
     def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
         """Rule and state of an exact motion from a time on."""
