@@ -15,6 +15,7 @@ from exudyn.itemInterface import (
     NodePointGround,
     ObjectConnectorCoordinate,
     ObjectContactCoordinate,
+    ObjectGenericODE2,
     SensorNode,
 )
 from scipy.integrate import solve_ivp
@@ -28,14 +29,21 @@ pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
 STEP, END = 1e-3, 0.25  # s
 SPRING, DAMPER, MASS = 800.0, 2.0, 0.4  # N/m, N s/m, kg
-GAP, STIFFNESS = 1e-3, 3e4  # m, N/m
+GAP, SECOND_GAP, STIFFNESS = 1e-3, 3e-3, 3e4  # m, m, N/m
 START = np.array([0.0, 0.0, 0.01])  # m
 
 
-def chain(stiffness):
-    """Three masses of 1 kg in a row with a stop at the second, all modes."""
-    matrix = 1e4 * (2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
-    structure = mp.LinearStructure(np.eye(3), matrix, mp.RayleighDamping(0.5, 1e-5), {f"m{i}": i for i in range(3)})
+def chain(stiffness, coupling=0.0, added_mass=0.0, added_damping=0.0):
+    """Three masses of 1 kg in a row with a stop at the second, all modes.
+
+    coupling: of neighbours' masses [kg]; with it an impact on the second moves the others too. added_mass,
+    added_damping: of the third [kg, N s/m].
+    """
+    neighbours, third = np.eye(3, k=1) + np.eye(3, k=-1), np.diag([0.0, 0.0, 1.0])
+    matrix = 1e4 * (2 * np.eye(3) - neighbours)
+    masses, damping = np.eye(3) + coupling * neighbours, 0.5 * np.eye(3) + 1e-5 * matrix
+    points = {f"m{i}": i for i in range(3)}
+    structure = mp.LinearStructure(masses + added_mass * third, matrix, damping + added_damping * third, points)
     return mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m1", GAP, stiffness)], modes="all")
 
 
@@ -51,8 +59,7 @@ def coordinate(mbs, node):
     return mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
 
 
-def watch(mbs, node):
-    kind = exu.OutputVariableType.Coordinates
+def watch(mbs, node, kind=exu.OutputVariableType.Coordinates):
     return mbs.AddSensor(SensorNode(nodeNumber=node, outputVariableType=kind, storeInternal=True))
 
 
@@ -180,26 +187,130 @@ def test_a_damped_mass_beside_a_rigid_stop_converges_with_order_two_to_one_struc
     assert error < 1e-4
 
 
+def test_a_damper_on_a_point_that_impacts_move_converges_with_order_two_to_the_damped_structure():
+    def damper(mbs, items):
+        ends = [coordinate(mbs, mbs.AddNode(NodePointGround())), coordinate(mbs, items["nInterface"]["m2"])]
+        mbs.AddObject(CoordinateSpringDamper(markerNumbers=ends, damping=20.0))
+
+    body = chain(math.inf, coupling=0.25)
+    native = mp.simulate(chain(math.inf, coupling=0.25, added_damping=20.0), END, displacement=START)
+    assert sum(event.impulse > 0.05 for event in native.events) >= 2
+    order, error = order_and_error(
+        lambda step: run(body, step, damper, matchedStepSize=step)[0][:, 0], lambda t: native.at("m2", t)
+    )
+    assert order > 1.8
+    assert error < 1e-4
+
+
+@pytest.mark.parametrize("tied", [False, True], ids=["on it", "tied to it"])
+def test_a_mass_on_a_point_converges_with_order_two_to_the_structure_with_the_mass(tied):
+    native = mp.simulate(chain(STIFFNESS, 0.25, added_mass=MASS), END, displacement=START)
+    steps = END / np.array([250, 360, 500, 710, 1000, 1400, 2000])
+    errors = []
+    for step in steps:
+        y, _, events = run(chain(STIFFNESS, 0.25), step, mass_tied if tied else mass_on)
+        expected = native.at("m2", np.minimum(np.arange(len(y)) * step, END))
+        errors.append(np.linalg.norm(y[:, 0] - expected) / np.linalg.norm(expected))
+    assert len(events) == len(native.events) >= 4
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] < 1e-3
+
+
+def mass_on(mbs, items):
+    mbs.AddObject(ObjectGenericODE2(name="mass", nodeNumbers=[items["nInterface"]["m2"]], massMatrix=[[MASS]]))
+
+
+def mass_tied(mbs, items):
+    node = mbs.AddNode(Node1D(referenceCoordinates=[0.0], initialCoordinates=[START[2]]))
+    mbs.AddObject(Mass1D(nodeNumber=node, mass=MASS))
+    ends = [coordinate(mbs, node), coordinate(mbs, items["nInterface"]["m2"])]
+    mbs.AddObject(ObjectConnectorCoordinate(name="tie", markerNumbers=ends))
+
+
+@pytest.mark.parametrize(
+    ("attach", "told"), [(mass_on, "GenericODE2 'mass'"), (mass_tied, "ConnectorCoordinate 'tie'")]
+)
+def test_a_mass_that_would_take_part_in_impacts_is_refused(attach, told):
+    with pytest.raises(ValueError, match=f"interface of 'b': got Object{told} on it beside rigid contacts, need"):
+        run(chain(math.inf), STEP, attach)
+
+
+@pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf], ids=["compliant", "rigid"])
+@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
+def test_rates_of_interface_coordinates_are_those_of_the_body_at_every_step(stiffness, matched):
+    model, container = chain(stiffness, 0.25), exu.SystemContainer()
+    mbs = container.AddSystem()
+    step = STEP if matched else None
+    items = CreateMultiPhiBody(mbs, model, "b", displacement=START, matchedStepSize=step, interface=("m2",))
+    spring_and_mass(mbs, items)
+    outputs = exu.OutputVariableType
+    sensors = [watch(mbs, items["nInterface"]["m2"], kind) for kind in (outputs.Coordinates_t, outputs.Coordinates_tt)]
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(STEP), solverType=TRAPEZOIDAL)
+    body, point = mbs.variables["multiPhi"]["b"], model.structure.row("m2")
+    level = mbs.GetSensorStoredData(items["sLevel"])[:, 1] > 0.5
+    assert len(body.events) >= 4
+    for sensor, key in zip(sensors, ("sCoordinates_t", "sCoordinates_tt"), strict=True):
+        own, y = mbs.GetSensorStoredData(items[key])[:, 1:], mbs.GetSensorStoredData(sensor)[:, 1]
+        shapes = [body.stepped_level((0,) if closed else ()).loaded.level.shapes for closed in level]
+        shown = np.array([point @ s @ q[: s.shape[1]] for s, q in zip(shapes, own, strict=True)])
+        assert np.max(np.abs(y - shown)) < 1e-9 * np.max(np.abs(shown))
+
+
+@pytest.mark.parametrize("from_end", [False, True], ids=["initial state", "state at the end"])
+def test_a_static_solution_after_a_run_is_the_equilibrium_in_the_level_it_starts_from(from_end):
+    model, container = chain(STIFFNESS), exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, displacement=-2 * START, interface=("m2",))
+    spring(mbs, items)
+    mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["m2"]), load=-60.0))
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(STEP), solverType=TRAPEZOIDAL)
+    closed = mbs.GetNodeOutput(items["nGenericData"], exu.OutputVariableType.Coordinates)[0] > 0.5
+    assert closed
+    if from_end:
+        displacement, velocity, *rest = mbs.systemData.GetSystemState()
+        mbs.systemData.SetSystemState([displacement, 0 * velocity, *rest], exu.ConfigurationType.Initial)
+    mbs.SolveStatic(settings(STEP))
+    row, stop = np.diag([0.0, 0.0, SPRING]), np.diag([0.0, STIFFNESS * from_end, 0.0])
+    force = np.array([0.0, -STIFFNESS * GAP * from_end, -60.0])
+    expected = np.linalg.solve(model.structure.stiffness + row + stop, force)[2]
+    y = mbs.GetNodeOutput(items["nInterface"]["m2"], exu.OutputVariableType.Coordinates)
+    assert y == pytest.approx(expected, rel=1e-7)
+
+
 def test_a_contact_on_an_interface_coordinate_converges_with_order_two_to_a_contact_of_the_model():
-    model, gap = chain(STIFFNESS), 3e-3
-
-    def stop(mbs, items):
-        ground = coordinate(mbs, mbs.AddNode(NodePointGround()))
-        data = mbs.AddNode(NodeGenericData(initialCoordinates=[gap], numberOfDataCoordinates=1))
-        ends = [ground, coordinate(mbs, items["nInterface"]["m2"])]
-        mbs.AddObject(
-            ObjectContactCoordinate(markerNumbers=ends, nodeNumber=data, contactStiffness=STIFFNESS, offset=-gap)
-        )
-
+    model, gap = chain(STIFFNESS), SECOND_GAP
     second = mp.UnilateralContact("second", "m2", gap, STIFFNESS)
     both = mp.MultiPhiModel(model.structure, [*model.contacts, second], modes="all")
     native = mp.simulate(both, END, displacement=START)
     assert {event.contact for event in native.events} == {"stop", "second"}
     order, error = order_and_error(
-        lambda step: run(model, step, stop, matchedStepSize=step)[0][:, 0], lambda t: native.at("m2", t)
+        lambda step: run(model, step, second_stop, matchedStepSize=step)[0][:, 0], lambda t: native.at("m2", t)
     )
     assert order > 1.8
     assert error < 6e-4  # Exudyn switches its contact at the ends of steps
+
+
+def second_stop(mbs, items):
+    ends = [coordinate(mbs, mbs.AddNode(NodePointGround())), coordinate(mbs, items["nInterface"]["m2"])]
+    data = mbs.AddNode(NodeGenericData(initialCoordinates=[SECOND_GAP], numberOfDataCoordinates=1))
+    law = {"contactStiffness": STIFFNESS, "offset": -SECOND_GAP}
+    mbs.AddObject(ObjectContactCoordinate(markerNumbers=ends, nodeNumber=data, **law))
+
+
+def test_steps_that_a_contact_of_exudyn_shortens_are_refused_with_matched_modes(monkeypatch):
+    def shortened(step):
+        chosen = fixed(step)
+        chosen.timeIntegration.discontinuous.useRecommendedStepSize = True
+        return chosen
+
+    fixed = settings
+    monkeypatch.setitem(globals(), "settings", shortened)
+    with pytest.raises(
+        ValueError, match=r"need the same \(beside contacts of Exudyn too: .*useRecommendedStepSize=False"
+    ):
+        run(chain(STIFFNESS), STEP, second_stop, matchedStepSize=STEP)
 
 
 def test_a_base_on_a_driven_slider_converges_with_order_two_to_the_structure_with_the_slider():

@@ -151,6 +151,7 @@ class MultiPhiBody:
         solver = running_solver(mbs, t)
         if solver is None:
             self._step = math.nan
+            self._begin_static(mbs)
             return False
         if solver.it.currentStepIndex == 0:
             self._begin(mbs, t)
@@ -168,7 +169,7 @@ class MultiPhiBody:
         if self.matched_step is not None and abs(step - self.matched_step) > SAME_STEP * step:
             raise MultiPhiValueError(
                 f"matchedStepSize of {self.name!r}: got {self.matched_step:g} s and a solver's step of "
-                f"{step:g} s, need the same"
+                f"{step:g} s, need the same (beside contacts of Exudyn too: discontinuous.useRecommendedStepSize=False)"
             )
         self._step, self._rounding = step, SAME_STEP * step
         self._tests.clear()
@@ -250,9 +251,7 @@ class MultiPhiBody:
         def centre(level: tuple[int, ...]) -> np.ndarray | float:
             return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
 
-        shifted = replace(
-            state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed)
-        )
+        shifted = replace(state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed))
         motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
         motion.advance(self.time, to_change)
         if motion.message:
@@ -261,9 +260,7 @@ class MultiPhiBody:
             motion.segments.pop()  # those that remain end with events: the chatter check counts them
         del motion.segments[: -motion.window - 1]
         end = self._plain(motion.state)
-        return State(
-            self._rule.level(end.closed), end.displacement + centre(end.closed), end.velocity, end.phases
-        )
+        return State(self._rule.level(end.closed), end.displacement + centre(end.closed), end.velocity, end.phases)
 
     def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
         """Rule and state of an exact motion from a time on."""
@@ -289,6 +286,13 @@ class MultiPhiBody:
 
     # ------------------------------------------------------------------ start of a run
 
+    def _begin_static(self, mbs: Any) -> None:
+        """Give a static solution the level that the system has at its start, whatever the last run ended in."""
+        self._attach(mbs)
+        closed, _ = self._stored_level()
+        if closed != self._in_solver.closed:
+            self._load_matrices(mbs, closed)
+
     def _begin(self, mbs: Any, t: float) -> None:
         """Take state and level from the system as it stands at the start of a run."""
         self._check_settings(mbs)
@@ -299,7 +303,7 @@ class MultiPhiBody:
         own, (q, q_t, q_tt) = self._in_solver, self._views
         closed, phases = self._stored_level()
         if closed != own.closed:  # the accelerations have been computed with stale matrices
-            own = self._load_matrices(mbs, closed)
+            own = self._enter(mbs, closed)
             force = self._applied(mbs)
             q_tt[:] = own.acceleration(q, q_t, force)
         force = own.force(self._read())
@@ -341,6 +345,8 @@ class MultiPhiBody:
             raise MultiPhiValueError(
                 f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )
+        if self.interface is not None and any(contact.rigid for contact in self.model.contacts):
+            self.interface.check_impacts()
 
     def check_called(self, mbs: Any, t: float) -> None:
         """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""
@@ -358,7 +364,7 @@ class MultiPhiBody:
         """Put a state at the end of a step into the system, with the acceleration under a modal force."""
         stepped = self._in_solver
         if state.closed != self._in_solver.closed:
-            stepped = self._load_matrices(mbs, state.closed)
+            stepped = self._enter(mbs, state.closed)
         force = force + self._own_force(state.closed, self.time)
         for view, values in zip(self._views, stepped.state(state.displacement, state.velocity, force), strict=True):
             view[:] = values
@@ -366,16 +372,21 @@ class MultiPhiBody:
             self.interface.write(stepped, self._views)
         self._keep(state)
 
+    def _enter(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
+        """Make a level that of the dynamic solver at work."""
+        stepped = self._load_matrices(mbs, closed)
+        if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
+            mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
+        mbs.solverSignalJacobianUpdate = True
+        return stepped
+
     def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
-        """Give the solver the matrices of a level."""
+        """Give the system the matrices of a level."""
         stepped = self._in_solver = self._stepped(closed)
         for parameter, value in matrices(stepped, self.force_vector(stepped)).items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         if self.interface is not None:
             self.interface.load(stepped)
-        if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
-            mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
-        mbs.solverSignalJacobianUpdate = True
         return stepped
 
     def _keep(self, state: State) -> None:

@@ -50,7 +50,9 @@ def CreateMultiPhiBody(
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
     stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
-    (interface.py); needs TrapezoidalIndex2 and constant loads. show: as in other Create functions. drawing: None, or
+    (interface.py); needs TrapezoidalIndex2 and constant loads. Where an ObjectContactCoordinate acts on them, set
+    ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps than the others are no gain, and
+    with matchedStepSize an error. show: as in other Create functions. drawing: None, or
     how the renderer shows the body.
 
     Returns typed indices: nInterface ({name: NodeIndex}, one coordinate each, only if asked for), nGenericODE2,

@@ -12,8 +12,10 @@ velocity (stepped_level.py).
 Within the step of an event the f of its mean acts before the event, that of its end after it: exact for a force that
 is constant, of second order for one that varies (a single halving of the step gains between 1.5 and 2.4 powers, as the
 place of an event in its step changes too). f comes from p, so the rows must be independent in every level; a point that
-rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not. A mass tied to y
-by a constraint is no part of an impact on a rigid contact: it takes the velocity that the body has after it.
+rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not.
+
+An impact on a rigid contact is one of the body alone: springs and dampers on y are no part of it, being finite, but a
+mass on y or a constraint would be, and is refused beside rigid contacts. Compliant ones have no impacts.
 """
 
 from __future__ import annotations
@@ -21,11 +23,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.items import is_constraint
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.structure import At, LinearStructure
 
@@ -121,6 +125,26 @@ class Interface:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
         self.places = np.array([self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()])
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+
+    def check_impacts(self) -> None:
+        """Raises for a mass or a constraint on y, which would take part in impacts."""
+        data, own = self._mbs.systemData, {int(tie) for tie in self._ties}
+        markers = (self._mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
+        on_y = {i for i, marker in enumerate(markers) if self._acted_on([marker.get("nodeNumber")])}
+        for i in set(range(data.NumberOfObjects())) - own:
+            item = self._mbs.GetObject(exu.ObjectIndex(i))
+            tied = (
+                is_constraint(item) and item["activeConnector"] and on_y.intersection(map(int, item["markerNumbers"]))
+            )
+            if tied or (self._acted_on(item.get("nodeNumbers", ())) and np.any(item.get("massMatrix", 0.0))):
+                raise MultiPhiValueError(
+                    f"interface of {self._name!r}: got Object{item['objectType']} {item['name']!r} on it beside rigid "
+                    "contacts, need compliant contacts, the mass as part of the structure, or a spring between"
+                )
+
+    def _acted_on(self, nodes: Iterable[Any]) -> bool:
+        """Whether one of some nodes is an interface coordinate."""
+        return any(node is not None and int(node) in map(int, self.nodes.values()) for node in nodes)
 
     def load(self, stepped: SteppedLevel) -> None:
         """Give the ties R and c of a level."""

@@ -14,6 +14,7 @@ __all__ = [
     "Item",
     "has_contact",
     "has_stops",
+    "is_constraint",
     "left_out_objects",
     "load_item",
     "rough_parameters",
@@ -48,6 +49,12 @@ def has_stops(item: Mapping[str, Any]) -> bool:
 def has_contact(item: Mapping[str, Any]) -> bool:
     """True for an active object that gives the model one contact or two."""
     return _is_active(item) and (has_stops(item) or (_is_contact(item) and not _refusal(item)))
+
+
+def is_constraint(item: Mapping[str, Any]) -> bool:
+    """True for a joint or another connector that holds coordinates, whatever forces that takes."""
+    kind = str(item["objectType"])
+    return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
 
 
 def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
@@ -102,11 +109,6 @@ def _is_contact(item: Mapping[str, Any]) -> bool:
     return str(item["objectType"]).startswith("Contact")
 
 
-def _is_constraint(item: Mapping[str, Any]) -> bool:
-    kind = str(item["objectType"])
-    return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
-
-
 def _refusal(item: Mapping[str, Any]) -> str:
     """Why an active contact object is no unilateral spring; empty if it is one."""
     if item["objectType"] != "ContactCoordinate":
@@ -130,7 +132,7 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return "constraints hold the gaps of its limit stops"
     if item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION):
         return "friction"
-    if _is_constraint(item) and (user_function(item) or _prescribes_velocity(item)):
+    if is_constraint(item) and (user_function(item) or _prescribes_velocity(item)):
         return "the motion it prescribes; its coordinate is held where it is"
     if user_function(item):
         return "what its user function does away from the current state"
@@ -146,7 +148,7 @@ def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return f"contact, {item['contactStiffness']:g} N/m{_damper(item['contactDamping'])}"
     if item["objectType"] == "Ground":
         return "ground"
-    if _is_constraint(item):
+    if is_constraint(item):
         return "constraint, its directions taken out"
     stops = _stops(item, contacts)
     if not stops:
