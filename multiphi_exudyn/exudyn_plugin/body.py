@@ -192,7 +192,11 @@ class MultiPhiBody:
         self._wait = LOOK_AGAIN
 
     def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
-        """Do the step from ``before`` again, exactly, and write what came out if anything happened in it."""
+        """Do the step from ``before`` again, exactly, and write what came out if anything happened in it.
+
+        After the event the force of the mean acts, and what the event changed in loads and connectors. Forces of
+        constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the mean.
+        """
         own, start, known = self._in_solver, self._state, len(self.events)
         given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
         force = self._significant((own.force(before) + own.force(after) - given) / 2, after)
@@ -203,10 +207,10 @@ class MultiPhiBody:
         if self._alone:
             self._write(mbs, state, force)
             return
-        reaction = own.force(after) - self._applied(mbs)  # of constraints: known from the level before
+        rest = force + self._own_force(start.closed, self.time) - self._applied(mbs)
         entered = self._stepped(state.closed)
         self._write(mbs, state, self._carried(force, own, entered))
-        outside = self._applied(mbs) + self._carried(reaction, own, entered) - self._own_force(state.closed, self.time)
+        outside = self._applied(mbs) + self._carried(rest, own, entered) - self._own_force(state.closed, self.time)
         present = self._significant(outside, after)
         if np.any(present != force):
             del self.events[known:]

@@ -9,9 +9,9 @@ ObjectConnectorCoordinateVector per point holds the equation. At a transition R 
 written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
 velocity (stepped_level.py).
 
-Within the step of an event the f of its mean acts before the event, that of its end after it: exact for a force that
-is constant, of second order for one that varies (a single halving of the step gains between 1.5 and 2.4 powers, as the
-place of an event in its step changes too). f comes from p, so the rows must be independent in every level; a point that
+Within the step of an event the f of its mean acts before the event, and after it with what the event changed in loads
+and connectors: exact for a force that is constant, of second order for one that varies (single halvings of the step
+scatter about it, as the place of an event in its step changes too). f comes from p, so the rows must be independent in every level; a point that
 rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not.
 
 An impact on a rigid contact is one of the body alone: springs and dampers on y are no part of it, being finite, but a
