@@ -39,7 +39,10 @@ from reference_models.rig import rig_beam
 from reference_models.solver_settings import simulation_settings
 
 T_END, SAMPLES = 0.3, 1e-3  # s: the run, and the period of what is compared
-STEPS, FINE = tuple(SAMPLES / k for k in (5, 7, 10, 14, 20)), 5e-6  # s: the steps compared, that of converged answers
+STEPS, FINE = (
+    tuple(SAMPLES / k for k in (5, 7, 10, 14, 20, 28, 40)),
+    5e-6,
+)  # s: the steps compared, that of converged answers
 ELEMENTS, MODES, SMALL_STEP = 10, 6, 2.5e-4  # of the full beam; of the small reduced one, and its step [s]
 REPEATS = 5  # runs of which the median CPU time counts
 STOP = mp.UnilateralContact("support", "node2", 1.35e-6, 1e5)  # m, N/m: small enough for a linear beam
@@ -123,8 +126,8 @@ def slider(mbs: Any, base: Any) -> None:
 
 
 def prescribed(mbs: Any, base: Any) -> None:
-    """The base goes down and up by 0.04 mm at 9 Hz, whatever force that takes."""
-    ground, omega = coordinate(mbs, mbs.AddNode(eii.NodePointGround())), 2 * math.pi * 9.0
+    """The base goes up and down by 0.04 mm at 5 Hz, whatever force that takes."""
+    ground, omega = coordinate(mbs, mbs.AddNode(eii.NodePointGround())), 2 * math.pi * 5.0
 
     def way(mbs: Any, t: float, item: int, offset: float) -> float:
         return offset * (1 - math.cos(omega * t))
@@ -134,7 +137,7 @@ def prescribed(mbs: Any, base: Any) -> None:
 
     mbs.AddObject(
         eii.ObjectConnectorCoordinate(
-            markerNumbers=[ground, base], offset=-2e-5, offsetUserFunction=way, offsetUserFunction_t=speed
+            markerNumbers=[ground, base], offset=2e-5, offsetUserFunction=way, offsetUserFunction_t=speed
         )
     )
 
@@ -293,10 +296,10 @@ def draw(found: dict[str, Comparison], path: str) -> None:
         )
         right.loglog(STEPS, runs.errors, "o-", color="#D55E00", label=f"all modes, order {order(runs.errors):.2f}")
         right.loglog(SMALL_STEP, runs.small_error, "*", color="#0072B2", markersize=12, label=f"{MODES} modes, matched")
-        shown = (*STEPS[::2], SMALL_STEP)
+        shown = (*STEPS[2::2], SMALL_STEP)
         right.set_xticks(shown, [f"{1e3 * step:g}" for step in shown])
         right.minorticks_off()
-        right.set(title="relative error of the tip", xlabel="step [ms]", xlim=(4e-5, 3.2e-4), ylim=(1e-6, 5e-2))
+        right.set(title="relative error of the tip", xlabel="step [ms]", xlim=(2e-5, 3.2e-4), ylim=(1e-6, 5e-2))
         right.legend(fontsize="small", loc="upper left")
         left.legend(loc="upper left", fontsize="small")
         left.set_xlabel("time [s]")

@@ -107,16 +107,20 @@ def test_draw_body(monkeypatch, tmp_path):
 
 def test_coupled_body(capsys, monkeypatch, tmp_path):
     example, picture = load("coupled_body"), tmp_path / "coupled.png"
-    monkeypatch.setattr(example, "T_END", 0.2)
-    monkeypatch.setattr(example, "FINE", 1e-5)
+    monkeypatch.setattr(example, "CASES", example.CASES[1:4:2])  # others: test_interface.py
+    monkeypatch.setattr(example, "T_END", 0.25)
+    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:2])
+    monkeypatch.setattr(example, "FINE", 1.25e-5)
+    monkeypatch.setattr(example, "REPEATS", 1)
     found = example.main([str(picture)])
     for runs in found.values():
         assert runs.errors[-1] < 3e-4
-        assert runs.order > 1.5
+        assert example.order(runs.errors) == pytest.approx(2.0, abs=0.35)
+        assert runs.apart < 5e-5
         assert runs.small_error < 3e-3
         assert runs.small.events >= 2
     assert picture.stat().st_size > 10_000
-    assert capsys.readouterr().out.count("order") == 3
+    assert capsys.readouterr().out.count("apart") == 2
 
 
 def test_reduce_your_model(capsys, tmp_path):

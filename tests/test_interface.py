@@ -28,6 +28,7 @@ pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
 STEP, END = 1e-3, 0.25  # s
+STEPS = END / np.array([250, 360, 500, 710, 1000, 1400, 2000])  # s: an order is fitted to all of them
 SPRING, DAMPER, MASS = 800.0, 2.0, 0.4  # N/m, N s/m, kg
 GAP, SECOND_GAP, STIFFNESS = 1e-3, 3e-3, 3e4  # m, m, N/m
 START = np.array([0.0, 0.0, 0.01])  # m
@@ -205,15 +206,47 @@ def test_a_damper_on_a_point_that_impacts_move_converges_with_order_two_to_the_d
 @pytest.mark.parametrize("tied", [False, True], ids=["on it", "tied to it"])
 def test_a_mass_on_a_point_converges_with_order_two_to_the_structure_with_the_mass(tied):
     native = mp.simulate(chain(STIFFNESS, 0.25, added_mass=MASS), END, displacement=START)
-    steps = END / np.array([250, 360, 500, 710, 1000, 1400, 2000])
     errors = []
-    for step in steps:
+    for step in STEPS:
         y, _, events = run(chain(STIFFNESS, 0.25), step, mass_tied if tied else mass_on)
         expected = native.at("m2", np.minimum(np.arange(len(y)) * step, END))
         errors.append(np.linalg.norm(y[:, 0] - expected) / np.linalg.norm(expected))
     assert len(events) == len(native.events) >= 4
-    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
     assert errors[-1] < 1e-3
+
+
+def test_a_point_moved_as_prescribed_converges_with_order_two_to_the_rest_of_the_structure_under_its_forces():
+    model, omega = chain(STIFFNESS, 0.25), 2 * math.pi * 7.0
+    s, (rest, held) = model.structure, (slice(0, 2), 2)
+
+    def motion(t):
+        """Displacement, velocity and acceleration of the third mass."""
+        return START[2] * np.array(
+            [math.cos(omega * t), -omega * math.sin(omega * t), -(omega**2) * math.cos(omega * t)]
+        )
+
+    def force(row):
+        return lambda t: -float(np.array([s.stiffness[row, held], s.damping[row, held], s.mass[row, held]]) @ motion(t))
+
+    def prescribe(mbs, items):
+        ends = [coordinate(mbs, mbs.AddNode(NodePointGround())), coordinate(mbs, items["nInterface"]["m2"])]
+        ways = [lambda mbs, t, item, offset, k=k: offset / START[2] * motion(t)[k] for k in (0, 1)]
+        moved = {"offsetUserFunction": ways[0], "offsetUserFunction_t": ways[1]}
+        mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=ends, offset=START[2], **moved))
+
+    others = mp.LinearStructure(s.mass[rest, rest], s.stiffness[rest, rest], s.damping[rest, rest], {"m0": 0, "m1": 1})
+    stop = mp.UnilateralContact("stop", "m1", GAP, STIFFNESS)
+    loads = [mp.FunctionLoad(f"m{row}", force(row), 1e-9) for row in (0, 1)]
+    native = mp.simulate(mp.MultiPhiModel(others, [stop], modes="all"), END, loads=loads)
+    errors = []
+    for step in STEPS:
+        y, _, events = run(model, step, prescribe, interface=("m1", "m2"), matchedStepSize=step)
+        expected = native.at("m1", np.minimum(np.arange(len(y)) * step, END))
+        errors.append(np.linalg.norm(y[:, 0] - expected) / np.linalg.norm(expected))
+    assert len(events) == len(native.events) >= 4
+    assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] < 1e-5
 
 
 def mass_on(mbs, items):

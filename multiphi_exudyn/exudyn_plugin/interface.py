@@ -11,8 +11,9 @@ velocity (stepped_level.py).
 
 Within the step of an event the f of its mean acts before the event, and after it with what the event changed in loads
 and connectors: exact for a force that is constant, of second order for one that varies (single halvings of the step
-scatter about it, as the place of an event in its step changes too). f comes from p, so the rows must be independent in every level; a point that
-rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts are not.
+scatter about it, as the place of an event in its step changes too). f comes from p, so the rows must be independent in
+every level; a point that rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts
+are not. The modes are those of free points: one whose motion is prescribed takes more of them.
 
 An impact on a rigid contact is one of the body alone: springs and dampers on y are no part of it, being finite, but a
 mass on y or a constraint would be, and is refused beside rigid contacts. Compliant ones have no impacts.
