@@ -440,16 +440,24 @@ def test_what_an_interface_cannot_hold_is_refused():
         (("m7",), mp.errors.MultiPhiValueError, "point: got 'm7'"),
         ({"none": np.zeros(3)}, mp.errors.MultiPhiValueError, "a row of zeros"),
         ({3: "m2"}, mp.errors.MultiPhiTypeError, "interface: got 3"),
-        ({"a": "m2", "b": {"m2": 2.0}}, mp.errors.MultiPhiValueError, "depend neither on each other"),
+        ({"a": "m2", "b": {"m2": 2.0}}, mp.errors.MultiPhiValueError, "got 'b', which moves with 'a', need"),
     ]:
         with pytest.raises(error, match=told):
             CreateMultiPhiBody(mbs, model, interface=interface)
-    with pytest.raises(mp.errors.MultiPhiValueError, match="'m1', need points that depend"):
-        CreateMultiPhiBody(mbs, chain(math.inf), interface=("m1",))
+    for interface, told in [
+        (("m0", "m1"), r"got 'm1', which rigid contacts hold \('stop'\), need a point"),
+        ({"m0": "m0", "mean": {"m0": 1.0, "m1": 1.0}}, "got 'mean', which moves with 'm0', 'stop', need a point"),
+    ]:
+        with pytest.raises(mp.errors.MultiPhiValueError, match=told):
+            CreateMultiPhiBody(mbs, chain(math.inf), interface=interface)
+    between = mp.MultiPhiModel(
+        model.structure, [mp.UnilateralContact(name, {"m1": way}, GAP) for name, way in (("up", -1.0), ("down", 1.0))]
+    )
+    assert list(CreateMultiPhiBody(mbs, between, "between", interface=("m2",))["nInterface"]) == ["m2"]
     few = mp.MultiPhiModel(model.structure, model.contacts, modes=1)
     with pytest.raises(mp.errors.MultiPhiValueError, match="2 points that 1 modes do not tell apart"):
         CreateMultiPhiBody(mbs, few, interface=("m0", "m2"))
-    with pytest.raises(mp.errors.MultiPhiValueError, match="need constant ones"):
+    with pytest.raises(mp.errors.MultiPhiValueError, match="got HarmonicLoad with an interface, need constant"):
         CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
     with pytest.raises(ValueError, match="need TrapezoidalIndex2"):
         run(model, STEP, spring, solver=exu.DynamicSolverType.GeneralizedAlpha)

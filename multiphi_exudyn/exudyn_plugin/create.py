@@ -19,7 +19,7 @@ from multiphi_exudyn.exudyn_plugin.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.interface import Interface, interface_rows
 from multiphi_exudyn.exudyn_plugin.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
-from multiphi_exudyn.loads import Load
+from multiphi_exudyn.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mode_choice import Tolerance
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.motion import Motion
@@ -77,7 +77,11 @@ def CreateMultiPhiBody(
     rows = interface_rows(model.structure, model.contacts, interface)
     body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
     if rows and isinstance(body, DrivenBody):
-        raise MultiPhiValueError("loads: got some that vary in time, need constant ones with interface coordinates")
+        varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
+        raise MultiPhiValueError(
+            f"loads: got {', '.join(sorted(varying))} with an interface, need constant loads (a varying force can be a "
+            "load of the system on an interface coordinate)"
+        )
     body.items.update(_add_items(mbs, body, show, drawing))
     if rows:
         _add_interface(mbs, body, rows)

@@ -53,13 +53,24 @@ def interface_rows(
     for name, row in rows.items():
         if not np.any(row):
             raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
-    held = [structure.row(contact.direction) for contact in contacts if contact.rigid]
-    if rows and _rank([*rows.values(), *held]) < len(rows) + _rank(held):
-        raise MultiPhiValueError(
-            f"interface: got {', '.join(map(repr, rows))}, need points that depend neither on each other nor on "
-            "those of rigid contacts (compliant ones may act there)"
-        )
+    rigid = {c.name: structure.row(c.direction) for c in contacts if c.rigid}
+    known = list(rigid.values())
+    for name, row in rows.items():
+        if _rank([*known, row]) == _rank(known):
+            raise MultiPhiValueError(_dependent(name, row, {n: r for n, r in rows.items() if n != name}, rigid))
+        known.append(row)
     return rows
+
+
+def _dependent(name: str, row: np.ndarray, others: Mapping[str, np.ndarray], rigid: Mapping[str, np.ndarray]) -> str:
+    """What to say of a point that depends on others and rigid contacts."""
+    held = _rank([*rigid.values(), row]) == _rank(list(rigid.values()))
+    by = f"which rigid contacts hold ({_listed(rigid)})" if held else f"which moves with {_listed([*others, *rigid])}"
+    return f"interface: got {name!r}, {by}, need a point that depends on no other and on no rigid contact"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(map(repr, names))
 
 
 def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
