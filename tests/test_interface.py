@@ -450,9 +450,8 @@ def test_what_an_interface_cannot_hold_is_refused():
     ]:
         with pytest.raises(mp.errors.MultiPhiValueError, match=told):
             CreateMultiPhiBody(mbs, chain(math.inf), interface=interface)
-    between = mp.MultiPhiModel(
-        model.structure, [mp.UnilateralContact(name, {"m1": way}, GAP) for name, way in (("up", -1.0), ("down", 1.0))]
-    )
+    stops = [mp.UnilateralContact(name, {"m1": way}, GAP) for name, way in (("up", -1.0), ("down", 1.0))]
+    between = mp.MultiPhiModel(model.structure, stops, modes="all")
     assert list(CreateMultiPhiBody(mbs, between, "between", interface=("m2",))["nInterface"]) == ["m2"]
     few = mp.MultiPhiModel(model.structure, model.contacts, modes=1)
     with pytest.raises(mp.errors.MultiPhiValueError, match="2 points that 1 modes do not tell apart"):
