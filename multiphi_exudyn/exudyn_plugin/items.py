@@ -10,11 +10,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 __all__ = [
     "Item",
     "has_contact",
     "has_stops",
     "is_constraint",
+    "is_curved",
     "left_out_objects",
     "load_item",
     "rough_parameters",
@@ -57,6 +60,12 @@ def is_constraint(item: Mapping[str, Any]) -> bool:
     return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
 
 
+def is_curved(item: Mapping[str, Any]) -> bool:
+    """True for an active constraint that is not linear in the coordinates, whose force gives stiffness."""
+    bent = np.any(item.get("quadraticTermMarker0", 0.0)) or np.any(item.get("quadraticTermMarker1", 0.0))
+    return is_constraint(item) and _is_active(item) and bool(str(item["objectType"]).startswith(_CONSTRAINTS) or bent)
+
+
 def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Parameters that take contact and friction out of an object, and their values without."""
     if _is_contact(item) and _is_active(item):
@@ -68,8 +77,8 @@ def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
 
 def user_function(item: Mapping[str, Any]) -> str:
     """Key of an item's first user function that is not for graphics, empty without one."""
-    keys = (key for key, value in item.items() if "UserFunction" in key and value)
-    return next((key for key in keys if not key.startswith("V")), "")
+    keys = (key for key in item if key.endswith(("UserFunction", "UserFunction_t")) and not key.startswith("V"))
+    return next((key for key in keys if item[key]), "")
 
 
 def value_key(load: Mapping[str, Any]) -> str:
