@@ -18,6 +18,7 @@ __all__ = [
     "has_stops",
     "is_constraint",
     "is_curved",
+    "left_out_functions",
     "left_out_objects",
     "load_item",
     "rough_parameters",
@@ -30,13 +31,17 @@ _EXT = "ConnectorCoordinateSpringDamperExt"
 _FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor", "stickingStiffness")
 _LINEAR = {"Mass1D", "RotationalMass1D", "MassPoint", "MassPoint2D", "ConnectorCoordinateSpringDamper", _EXT}
 _LINEAR |= {"GenericODE2"}
+_ONE_SIDED = {
+    "ConnectorRollingDiscPenalty": "its contact and its friction away from the current state",
+    "ConnectorReevingSystemSprings": "that its rope gets slack",
+}
 _CONSTRAINTS = ("Joint", "ConnectorDistance")
 _COORDINATE_CONSTRAINTS = {"ConnectorCoordinate", "ConnectorCoordinateVector"}
 
 
 @dataclass(frozen=True)
 class Item:
-    """One item of the system: its name, index among objects or loads, type, and what it became."""
+    """One item of the system: its name, index among objects or loads (0 for the system), type, and what it became."""
 
     name: str
     index: int
@@ -62,8 +67,9 @@ def is_constraint(item: Mapping[str, Any]) -> bool:
 
 def is_curved(item: Mapping[str, Any]) -> bool:
     """True for an active constraint that is not linear in the coordinates, whose force gives stiffness."""
-    bent = np.any(item.get("quadraticTermMarker0", 0.0)) or np.any(item.get("quadraticTermMarker1", 0.0))
-    return is_constraint(item) and _is_active(item) and bool(str(item["objectType"]).startswith(_CONSTRAINTS) or bent)
+    bent = [item.get(key) for key in ("quadraticTermMarker0", "quadraticTermMarker1", "constraintUserFunction")]
+    curved = str(item["objectType"]).startswith(_CONSTRAINTS) or any(np.any(term) for term in bent if term is not None)
+    return is_constraint(item) and _is_active(item) and curved
 
 
 def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
@@ -99,6 +105,13 @@ def left_out_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[
         reason = _reason(item, contacts)
         if reason:
             yield _object_item(i, item), reason
+
+
+def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
+    """User functions of the system itself, which may do anything in a run."""
+    for kind in ("PreStep", "PostStep", "PostNewton", "PreNewtonResidual"):
+        if getattr(mbs, f"Get{kind}UserFunction")():
+            yield Item("mbs", 0, f"{kind}UserFunction"), "what it does in a run"
 
 
 def load_item(index: int, load: Mapping[str, Any], became: str = "") -> Item:
@@ -141,7 +154,9 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return "constraints hold the gaps of its limit stops"
     if item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION):
         return "friction"
-    if is_constraint(item) and (user_function(item) or _prescribes_velocity(item)):
+    if item["objectType"] in _ONE_SIDED:
+        return _ONE_SIDED[item["objectType"]]
+    if is_constraint(item) and (user_function(item).startswith("offset") or _prescribes_velocity(item)):
         return "the motion it prescribes; its coordinate is held where it is"
     if user_function(item):
         return "what its user function does away from the current state"

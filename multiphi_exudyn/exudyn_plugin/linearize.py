@@ -6,8 +6,8 @@ q [m, rad, ...] are the system's ODE2 coordinates, q_0 the current ones, S a bas
 constraints leave free (orthonormal columns, from the constraint Jacobian at q_0), z the coordinates of
 the linear structure. The state must be an equilibrium of everything but the contacts and the constraint
 forces: a linear structure has no constant force. What a linear structure cannot hold is not looked for
-beyond that: user functions and other nonlinear forces enter by their tangent at q_0, loads only by what
-constraints carry of them (constraint_stiffness.py, which Exudyn's own ComputeLinearizedSystem leaves out).
+beyond that: user functions and other nonlinear forces enter by their tangent at q_0, loads only by
+their geometric stiffness (geometric_stiffness.py).
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ import numpy as np
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.constraint_stiffness import constraint_stiffness, static_solver
-from multiphi_exudyn.exudyn_plugin.items import is_curved
+from multiphi_exudyn.exudyn_plugin.geometric_stiffness import generalised_forces, geometric_stiffness, static_solver
 from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 
@@ -165,16 +164,10 @@ def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
         row = (item["factor1"] * second - item["factor0"] * first) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    if _has_curved_constraints(mbs):
-        full = mbs.ComputeLinearizedSystem(projectIntoConstraintNullspace=False)
-        stiffness += basis.T @ constraint_stiffness(mbs, np.array(full[0]), forces(mbs)) @ basis
+    stiffness += basis.T @ geometric_stiffness(mbs) @ basis
     if basis.shape[1] == 0:
         raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
     return _symmetric("mass", mass), _symmetric("stiffness", stiffness), _symmetric("damping", damping), basis
-
-
-def _has_curved_constraints(mbs: Any) -> bool:
-    return any(is_curved(mbs.GetObject(exu.ObjectIndex(i))) for i in range(mbs.systemData.NumberOfObjects()))
 
 
 def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
@@ -226,8 +219,7 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
 def forces(mbs: Any) -> np.ndarray:
     """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
     with static_solver(mbs) as solver:
-        solver.ComputeODE2RHS(mbs)
-        return np.array(solver.GetSystemResidual())[: solver.GetODE2size()]
+        return generalised_forces(mbs, solver)
 
 
 def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:

@@ -26,6 +26,7 @@ from multiphi_exudyn.exudyn_plugin.items import (
     Item,
     has_contact,
     has_stops,
+    left_out_functions,
     left_out_objects,
     load_item,
     rough_parameters,
@@ -119,7 +120,7 @@ def reduce(
         velocity,
         (*([ConstantLoad(static, 1.0)] if np.any(static) else []), *_taken_of(varying).values()),
         (*taken_objects(objects, names), *_taken_loads(loads, _taken_of(varying))),
-        (*left_out_objects(objects, names), *_left_out_loads(loads, varying)),
+        (*left_out_objects(objects, names), *_left_out_loads(loads, varying), *left_out_functions(mbs)),
     )
 
 
