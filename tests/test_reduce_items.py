@@ -138,6 +138,23 @@ def test_a_force_beside_the_centre_of_a_turning_body_gives_its_stiffness_unless_
         assert system.mbs.GetLoad(exu.LoadIndex(0))["loadVector"].tolist() == [0.0, -10.0, 0.0]
 
 
+def test_a_load_that_turns_with_a_body_on_springs_is_taken_in_its_present_direction():
+    system = System()
+    node = system.mbs.AddNode(eii.NodeRigidBody2D(referenceCoordinates=[0.0, 0.0, 0.0]))
+    body = system.mbs.AddObject(eii.ObjectRigidBody2D(mass=1.0, inertia=0.5, nodeNumber=node))
+    centre = system.mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body))
+    system.mbs.AddObject(
+        eii.ObjectConnectorRigidBodySpringDamper(
+            markerNumbers=[system.body, centre], stiffness=np.diag([100.0, 200.0, 0.0, 0.0, 0.0, 5.0])
+        )
+    )
+    system.mbs.AddLoad(eii.LoadForceVector(name="jet", markerNumber=centre, loadVector=[0.0, 7.0, 0.0], bodyFixed=True))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    assert squares(reduction.structure) == pytest.approx([10.0, 100.0, 200.0], rel=1e-6)
+    assert "'jet': constant load in its present direction" in reduction.report
+
+
 def test_a_pendulum_that_strikes_a_stop_moves_as_in_exudyn():
     system = System()
     body, _ = bar(system)
