@@ -91,6 +91,7 @@ class Interface:
         self._names = tuple(rows)
         self._ties: list[Any] = []
         self._known: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
+        self._inverses: dict[tuple[int, ...], np.ndarray] = {}  # of R^T, by closed contacts as above
         self._mbs = mbs
 
     def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
@@ -131,6 +132,7 @@ class Interface:
                 )
             offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
             self._known[stepped.closed] = rows, offset
+            self._inverses[stepped.closed] = np.linalg.pinv(rows.T)
         return self._known[stepped.closed]
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
@@ -177,5 +179,5 @@ class Interface:
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
         (old, _), (new, _) = self.of(given), self.of(wanted)
-        acting = np.linalg.lstsq(old.T, force, rcond=None)[0]
+        acting = self._inverses[given.closed] @ force
         return np.asarray(force + acting @ (new - old))

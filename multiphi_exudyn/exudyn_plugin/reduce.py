@@ -3,8 +3,9 @@
     q = q_0 + S z,   M z'' + C z' + K z = p + (contact forces),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
 q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
-friction and loads by user functions, S the directions the constraints leave free. p is a constant load: a state out of
-balance starts to move as the system does. A LoadCoordinate by a function of time is a FunctionLoad, t = 0 being the
+friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
+is a constant load: a state out of balance starts to move as the system does. K holds what constraint forces and weights
+give (geometric_stiffness.py). A LoadCoordinate by a function of time is a FunctionLoad, t = 0 being the
 system's current time. What is no part of the model is in ``left_out``, with the reason.
 
 Exudyn's contact dampers pull at separation; those of the model do not (contact.py).
