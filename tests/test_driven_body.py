@@ -5,6 +5,7 @@ import math
 import exudyn as exu
 import numpy as np
 import pytest
+from exudyn.itemInterface import CoordinateSpringDamper, LoadCoordinate, MarkerNodeCoordinate, NodePointGround
 from small_structures import chain
 
 import multiphi_exudyn as mp
@@ -37,11 +38,13 @@ def model_of(contacts, modes):
     return mp.MultiPhiModel(structure, contacts, modes=modes)
 
 
-def solved(model, loads, steps, *, matched=False, prepare=None):
+def solved(model, loads, steps, *, matched=False, prepare=None, attach=None):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     with quiet():
         items = CreateMultiPhiBody(mbs, model, loads=loads, matchedStepSize=T_END / steps if matched else None)
+        if attach:
+            attach(mbs, items["nGenericODE2"])
         mbs.Assemble()
         if prepare:
             prepare(mbs)
@@ -64,6 +67,25 @@ def test_the_difference_to_the_native_run_falls_with_the_square_of_the_step(case
         assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
     assert errors[1] < 5e-4
     assert math.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("contacts", [SOFT, RIGID], ids=["compliant", "rigid"])
+def test_under_forces_of_the_system_and_a_vanishing_load_a_driven_body_moves_as_a_plain_one(contacts):
+    def attach(mbs, node):
+        own = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+        ground = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=mbs.AddNode(NodePointGround()), coordinate=0))
+        mbs.AddObject(CoordinateSpringDamper(markerNumbers=[ground, own], damping=0.3))
+        mbs.AddLoad(
+            LoadCoordinate(markerNumber=own, load=3.0, loadUserFunction=lambda mbs, t, load: load * math.cos(2 * t))
+        )
+
+    model = model_of(contacts, "all")
+    plain, driven = (
+        solved(model, loads, 500, matched=True, attach=attach) for loads in ([], [mp.HarmonicLoad("m1", 1e-13, 0.3)])
+    )
+    assert [(e.contact, e.kind) for e in plain.events] == [(e.contact, e.kind) for e in driven.events]
+    assert len(plain.events) >= 4
+    assert np.max(np.abs(plain.points["m1"] - driven.points["m1"])) < 1e-10 * np.max(np.abs(plain.points["m1"]))
 
 
 def test_gaps_and_forces_see_the_moving_stop():

@@ -11,7 +11,8 @@ velocity (stepped_level.py).
 
 Within the step of an event the f of its mean acts before the event, and after it with what the event changed in loads
 and connectors: exact for a force that is constant, of second order for one that varies (single halvings of the step
-scatter about it, as the place of an event in its step changes too). f comes from p, so the rows must be independent in
+scatter about it, as the place of an event in its step changes too), of first order where a contact damper makes the
+force of a constraint or of a mass on y jump. f comes from p, so the rows must be independent in
 every level; a point that rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts
 are not. The modes are those of free points: one whose motion is prescribed takes more of them.
 
