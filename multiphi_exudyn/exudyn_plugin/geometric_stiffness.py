@@ -23,6 +23,8 @@ from multiphi_exudyn.exudyn_plugin.items import is_curved
 
 __all__ = ["generalised_forces", "geometric_stiffness", "static_solver"]
 
+STRAIGHT = ("MassPoint", "Mass1D", "ANCF", "Ground")  # bodies whose points move linearly with the coordinates
+
 
 @contextmanager
 def static_solver(mbs: Any) -> Iterator[Any]:
@@ -46,13 +48,18 @@ def geometric_stiffness(mbs: Any) -> np.ndarray:
         if any(is_curved(mbs.GetObject(exu.ObjectIndex(i))) for i in range(mbs.systemData.NumberOfObjects())):
             found += _of_constraints(mbs, solver)
         loads = {i: mbs.GetLoad(exu.LoadIndex(i)) for i in range(mbs.systemData.NumberOfLoads())}
-        vectors = {i: load["loadVector"] for i, load in loads.items() if _may_turn(load)}
+        vectors = {i: load["loadVector"] for i, load in loads.items() if _may_turn(mbs, load)}
         return found + _of_loads(mbs, solver, vectors) if vectors else found
 
 
-def _may_turn(load: Mapping[str, Any]) -> bool:
+def _may_turn(mbs: Any, load: Mapping[str, Any]) -> bool:
     """Whether the generalised force of a load can depend on the coordinates."""
-    return not load.get("bodyFixed") and bool(np.any(load.get("loadVector", 0.0)))
+    if load.get("bodyFixed") or not np.any(load.get("loadVector", 0.0)):
+        return False
+    marker = mbs.GetMarker(exu.MarkerIndex(load["markerNumber"]))
+    if load["loadType"] == "TorqueVector" or marker["markerType"] != "NodePosition" and "bodyNumber" not in marker:
+        return True
+    return "bodyNumber" in marker and not mbs.GetObject(marker["bodyNumber"])["objectType"].startswith(STRAIGHT)
 
 
 def _of_constraints(mbs: Any, solver: Any) -> np.ndarray:
