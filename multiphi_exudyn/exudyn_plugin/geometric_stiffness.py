@@ -57,9 +57,9 @@ def _may_turn(mbs: Any, load: Mapping[str, Any]) -> bool:
     if load.get("bodyFixed") or not np.any(load.get("loadVector", 0.0)):
         return False
     marker = mbs.GetMarker(exu.MarkerIndex(load["markerNumber"]))
-    if load["loadType"] == "TorqueVector" or marker["markerType"] != "NodePosition" and "bodyNumber" not in marker:
-        return True
-    return "bodyNumber" in marker and not mbs.GetObject(marker["bodyNumber"])["objectType"].startswith(STRAIGHT)
+    if "bodyNumber" not in marker or load["loadType"] == "TorqueVector":
+        return bool(marker["markerType"] != "NodePosition")
+    return not mbs.GetObject(marker["bodyNumber"])["objectType"].startswith(STRAIGHT)
 
 
 def _of_constraints(mbs: Any, solver: Any) -> np.ndarray:
