@@ -29,10 +29,14 @@ from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
 from reference_models.point_law import PointLaw
 
-__all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "build_beam_system"]
+__all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "bending_coordinates", "build_beam_system"]
 
 AXIAL, DEFLECTION = 0, 1  # coordinates of a node of either kind
 _ROTATION = {"ancf": 3, "geometrically-exact": 2}  # the slope y', or the angle
+_BENDS = {
+    "ancf": (False, True, False, True),
+    "geometrically-exact": (False, True, True),
+}  # of (x, y, x', y'), (x, y, phi)
 _CIRCLE_SEGMENTS = 3  # straight pieces an element is divided into where it meets a round support
 
 
@@ -118,6 +122,12 @@ def build_beam_system(
     first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
     points = {point: nodes.index(place.node) for point, place in places.items()}
     return BeamSystem(container, mbs, nodes, first, points, load, driver, stops)
+
+
+def bending_coordinates(kind: str, count: int) -> np.ndarray:
+    """Which of the ``count`` coordinates of beams, node after node, are deflections or rotations, (count,)."""
+    bends = _BENDS[kind]
+    return np.tile(bends, count // len(bends))
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.loads import Load
 from reference_models.actions import Actions, actions_of
-from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
+from reference_models.beam_system import DEFLECTION, BeamSystem, bending_coordinates, build_beam_system
 from reference_models.beams import Beams, as_beams
 from reference_models.drive import Drive
 from reference_models.energy_history import contact_losses, dissipated_energy, energy_history, work_of
@@ -120,8 +120,9 @@ class FullBeam:
         """Pull at ``load_at`` until ``measured_at`` deflects by ``displacement`` [m], let go, integrate.
 
         Without these three the beam starts straight and at rest. damping: C [N s/m], (n, n), in the coordinates of
-        ``structure``. loads: set in at t = 0, not before; their rows are in the coordinates of ``structure`` too. A
-        numerical failure is a status of the result; MultiPhiValueError is for the arguments only.
+        ``structure``; it acts on deflections and rotations alone. loads: set in at t = 0, not before; their rows are in
+        the coordinates of ``structure`` too. A numerical failure is a status of the result; MultiPhiValueError is for
+        the arguments only.
         """
         if not (math.isfinite(t_end) and t_end > 0):
             raise MultiPhiValueError(f"t_end: got {t_end!r}, need a finite time > 0")
@@ -168,13 +169,19 @@ class FullBeam:
         return _Start(str(load_at), str(measured_at), displacement)
 
     def _full_damping(self, damping: np.ndarray) -> np.ndarray:
-        """C in Exudyn's coordinates, (n_full, n_full): S C S^T, as S has orthonormal columns."""
+        """C in Exudyn's coordinates, (n_full, n_full): S C S^T, as S has orthonormal columns, without axial entries.
+
+        A beam that bends shortens by the integral of w'^2 / 2, which strains nothing. Axial entries of a constant C, of
+        a stiffness thousands of times that of bending, would dissipate in it; damping by rates of strain does not.
+        """
         matrix, n = np.asarray(damping, dtype=float), self.structure.n
         if matrix.shape != (n, n) or not np.all(np.isfinite(matrix)):
             raise MultiPhiValueError(f"damping: got shape {matrix.shape}, need {(n, n)} of finite numbers")
         if np.max(np.abs(matrix - matrix.T)) > SYMMETRY * np.max(np.abs(matrix)):
             raise MultiPhiValueError("damping: got an asymmetric matrix, need a symmetric one")
-        return self.structure.coordinates @ matrix @ self.structure.coordinates.T
+        full = self.structure.coordinates @ matrix @ self.structure.coordinates.T
+        bends = bending_coordinates(self.settings.kind, len(full))
+        return full * np.outer(bends, bends)
 
     def _flexibility(self, load_at: str, measured_at: str) -> float:
         """Linear contact-free deflection of one point under a unit force at another [m/N]."""
