@@ -9,13 +9,16 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
+from multiphi_exudyn.beam import Beam, Section
 from multiphi_exudyn.cli import animate_command
 from multiphi_exudyn.study.comparison.animation import CLOSED, frame_count, frames, gif
 from multiphi_exudyn.study.comparison.film import LONGEST, MOST_FRAMES, PERIOD_SHOWN, film_of, run_stage, stage_of
+from multiphi_exudyn.study.comparison.placement import Placement, placements
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
+from reference_models.beams import Beams
 
 FULL = {"kind": "full", "name": "full", "elements": 4, "step": 1e-4}
 PLAIN = changed(["outputs", "interval"], 1e-4)  # closures between two samples of 1 ms would be averaged
@@ -82,7 +85,7 @@ def test_a_stop_stands_where_the_gap_is_closed_and_tells_when_it_is(scene):
         (line,) = take.lines
         struck = line.deflection[np.argmin(np.abs(line.x - stop.x))]
         assert stop.z == pytest.approx(-1e-3, abs=1e-9)
-        assert (stop.x, stop.below) == (0.3, True)
+        assert (stop.x, stop.side) == (0.3, "below")
         assert 0 < np.sum(stop.closed) < len(film.time)
         assert np.all(struck[stop.closed] < -1e-3 + 1e-9)
         assert np.all(struck[~stop.closed] > -1e-3 - 1e-9)
@@ -94,7 +97,7 @@ def test_a_stop_above_and_one_that_moves(tmp_path):
     data = changed(["contacts", 0, "direction"], {"middle": -1.0}, PLAIN) | {"loads": loads}
     film = filmed(write(tmp_path / "above.toml", data), model="r6", reference="r6", slow=5.0)
     (stop,) = film.takes[0].stops
-    assert not stop.below
+    assert stop.side == "above"
     assert stop.z == pytest.approx(1e-3 - 2e-4 * np.cos(2 * np.pi * 30.0 * film.time), abs=1e-6)
 
 
@@ -160,9 +163,70 @@ def test_matrices_and_scenes_without_a_reduced_model_are_refused(tmp_path, capsy
     np.savez(tmp_path / "m.npz", mass=np.eye(2), stiffness=np.diag([1e4, 4e4]))
     data = changed(["structure"], {"matrices": "m.npz", "points": {"middle": 0, "tip": 1}})
     path = write(tmp_path / "matrices.toml", changed(["models"], [BEAM["models"][0]], data))
-    assert (
-        refused(capsys, path)
-        == f"{path}: structure: got matrices or several beams, need one beam, whose shape is drawn along x\n"
-    )
+    assert refused(capsys, path) == f"{path}: structure: got matrices, need beams, whose shapes are drawn along x\n"
     alone = write(tmp_path / "full.toml", changed(["models"], [FULL], WITH_FULL))
     assert "models: got none that is reduced" in refused(capsys, alone)
+
+
+PART = BEAM["structure"]["beam"]
+CLAP = {"name": "clap", "direction": {"a.tip": 2.0, "b.middle": -2.0}, "gap": 1e-3, "stiffness": 1e5}
+PAIR = {
+    "structure": {"beams": {"a": PART, "b": PART, "far": PART}},
+    "contacts": [CLAP, CLAP | {"name": "stop", "direction": {"b.tip": -1.0}}],
+    "start": {"load_at": "a.tip", "measured_at": "a.tip", "displacement": 0.01},
+    "models": [{"kind": "reduced", "name": "r", "modes": 12}],
+    "comparison": {"reference": "r"},
+    "outputs": {"t_end": 0.1, "interval": 1e-4, "points": ["a.tip"]},
+}
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """A film of beams a over b, that clap; b under a stop; a third beam that nothing touches."""
+    return filmed(write(tmp_path_factory.mktemp("pair") / "pair.toml", PLAIN | PAIR), slow=8.0)
+
+
+def line_at(line, x):
+    return line.height + line.deflection[np.argmin(np.abs(line.x - x))]
+
+
+def test_two_beams_are_drawn_touching_where_and_when_their_contact_is_closed(pair):
+    take = pair.takes[0]
+    clap, _ = take.stops
+    a, b, _ = take.lines
+    assert clap.side == "between"
+    assert 0 < np.sum(clap.closed) < len(pair.time)
+    distance = line_at(a, clap.x) - line_at(b, clap.x)
+    assert distance[0] == pytest.approx(1e-3 / 2 + 0.01, abs=1e-6)
+    assert np.all(distance[clap.closed] < 1e-9)
+    assert np.all(distance[~clap.closed] > -1e-9)
+    assert clap.z == pytest.approx((line_at(a, clap.x) + line_at(b, clap.x)) / 2)
+
+
+def test_a_stop_of_a_beam_that_is_drawn_lower_is_drawn_lower(pair):
+    take = pair.takes[0]
+    _, stop = take.stops
+    assert stop.side == "above"
+    assert stop.z - take.lines[1].height == pytest.approx(1e-3)
+
+
+def test_a_beam_that_nothing_touches_is_drawn_below_all_others(pair):
+    *others, far = pair.takes[0].lines
+    assert far.name == "far"
+    assert far.height < min(np.min(line.height + line.deflection) for line in others)
+
+
+def test_beams_in_contact_have_the_colour_of_it_and_open_ones_have_no_mark(pair):
+    closed = [any(stop.closed[k] for stop in pair.takes[0].stops) for k in range(len(pair.time))]
+    assert [has(image, CLOSED) for image in frames(pair)] == closed
+    assert len(set(closed)) == 2
+
+
+def test_beams_tied_to_each_other_have_one_height_and_the_tie_one_place():
+    section = Section.rectangle(0, 0.5, width=0.03, height=0.004, youngs_modulus=7e10, density=2700)
+    part = Beam([section], {"tip": 0.5, "middle": 0.3})
+    beams = Beams({"a": part, "b": part, "c": part}, ({"b.tip": 1.0, "a.middle": -1.0}, {"c.tip": 1.0}))
+    found = placements(beams, [mp.UnilateralContact("below", {"c.tip": -1.0, "b.middle": 1.0}, 2e-3, 1e5)])
+    assert found["a"] == Placement(0.0, 0.0, 0)
+    assert (found["b"].shift, found["b"].height, found["b"].group) == pytest.approx((-0.2, 0.0, 0))
+    assert (found["c"].shift, found["c"].height, found["c"].group) == pytest.approx((-0.4, -2e-3, 0))

@@ -34,8 +34,16 @@ MARGIN = 0.12  # of the range of the heights, above and below
 HELD = 1500  # ms, of the last frame
 SHADES = 9  # of every colour, from itself to white
 CLOSED, AXIS, TEXT = "#D55E00", "#BBBBBB", "#555555"
-BELOW, ABOVE = Path([(0, 0), (-1, -1.5), (1, -1.5)]), Path([(0, 0), (-1, 1.5), (1, 1.5)])  # tips touch the beam
+SHAPES: dict[str, Path | str] = {
+    "below": Path([(0, 0), (-1, -1.5), (1, -1.5)]),  # tips touch the beam
+    "above": Path([(0, 0), (-1, 1.5), (1, 1.5)]),
+    "between": "o",
+}
 STOP_SIZE, BEAM_WIDTH = 13.0, 3.0  # points
+ROW_WIDTH = 400.0  # points, that a row of stops may take: many stops are drawn smaller
+SMALLEST_STOP, BETWEEN_SIZE = 4.0, 9.0  # points
+LIGHTEST = 0.65  # share of white in the last of several beams' colour
+WALL = 14.0  # points, height of the mark where a beam is clamped
 HISTORY_WIDTHS = (1.2, 2.6)  # points, of the model and of the reference below it
 
 
@@ -62,6 +70,7 @@ class _Shape:
         for stop, artist in self.stops:
             artist.set_ydata([1e3 * stop.z[frame]])
             artist.set_color(CLOSED if stop.closed[frame] else FULL)
+            artist.set_visible(bool(stop.closed[frame]) or stop.side != "between")
         shown = slice(0, frame + 1)
         self.history.set_data(time[shown], 1e3 * self.take.history[shown])
         self.head.set_data(time[frame : frame + 1], 1e3 * self.take.history[frame : frame + 1])
@@ -123,24 +132,41 @@ def _drawn(film: Film, figure: Figure, shapes: list[_Shape], clock: Text) -> Ite
 
 
 def _shape(take: Take, axes: Axes, colour: str, lower: Axes, width: float) -> _Shape:
+    shades = _shades(colour, len(take.lines))
     beams = tuple(
-        (line, axes.plot(line.x, np.zeros(len(line.x)), "-", color=colour, lw=BEAM_WIDTH, animated=True)[0])
-        for line in take.lines
+        (line, axes.plot(line.x, np.zeros(len(line.x)), "-", color=shade, lw=BEAM_WIDTH, animated=True)[0])
+        for line, shade in zip(take.lines, shades, strict=True)
     )
-    for line in take.lines:
-        axes.axhline(1e3 * line.height, color=AXIS, lw=0.8, zorder=0)
+    for line, shade in zip(take.lines, shades, strict=True):
+        z = 1e3 * line.height
+        axes.plot(line.x[[0, -1]], [z, z], color=AXIS, lw=0.8, zorder=0)
+        axes.plot(line.x[:1], [z], marker="|", ms=WALL, mew=BEAM_WIDTH, color=shade, zorder=1)
+    size = _stop_size(len(take.stops))
     return _Shape(
         take=take,
         beams=beams,
-        stops=tuple((stop, _stop(axes, stop)) for stop in take.stops),
+        stops=tuple((stop, _stop(axes, stop, size)) for stop in take.stops),
         history=lower.plot([], [], "-", color=colour, lw=width, animated=True)[0],
         head=lower.plot([], [], "o", color=colour, ms=5, animated=True)[0],
     )
 
 
-def _stop(axes: Axes, stop: Stop) -> Line2D:
-    shape = BELOW if stop.below else ABOVE
-    return axes.plot([stop.x], [0.0], marker=shape, ms=STOP_SIZE, ls="none", mec="none", animated=True)[0]
+def _shades(colour: str, count: int) -> list[tuple[float, float, float]]:
+    """The colour for the first beam, lighter ones for the others, (r, g, b) each."""
+    shares = np.linspace(0.0, LIGHTEST, count) if count > 1 else np.zeros(1)
+    red, green, blue = to_rgb(colour)
+    return [(red + (1 - red) * s, green + (1 - green) * s, blue + (1 - blue) * s) for s in shares.tolist()]
+
+
+def _stop_size(count: int) -> float:
+    """Points; of so many stops that they fit beside each other."""
+    return min(STOP_SIZE, max(SMALLEST_STOP, ROW_WIDTH / max(count, 1)))
+
+
+def _stop(axes: Axes, stop: Stop, size: float) -> Line2D:
+    size = min(size, BETWEEN_SIZE) if stop.side == "between" else size
+    shape = SHAPES[stop.side]
+    return axes.plot([stop.x], [0.0], marker=shape, ms=size, ls="none", mec="none", zorder=3, animated=True)[0]
 
 
 def _frame_shapes(film: Film, upper: list[Axes]) -> None:
@@ -149,10 +175,11 @@ def _frame_shapes(film: Film, upper: list[Axes]) -> None:
     z = 1e3 * np.concatenate([*map(np.ravel, drawn), *(stop.z for take in film.takes for stop in take.stops)])
     x = np.concatenate([line.x for take in film.takes for line in take.lines])
     room = MARGIN * np.ptp(z) or 1.0
+    several = len(film.takes[0].lines) > 1
     for axes in upper:
-        axes.set_xlim(np.min(x), np.max(x) + 0.02 * np.ptp(x))
+        axes.set_xlim(np.min(x) - 0.02 * np.ptp(x), np.max(x) + 0.02 * np.ptp(x))
         axes.set_ylim(np.min(z) - room, np.max(z) + room)
-        axes.set_ylabel("w [mm]")
+        axes.set_ylabel("z [mm]" if several else "w [mm]")
     upper[0].set_xticklabels([])
     upper[-1].set_xlabel("x [m]")
 
@@ -178,8 +205,38 @@ def _titles(film: Film, figure: Figure, shapes: list[_Shape]) -> None:
         axes, run = shape.beams[0][1].axes, shape.take.run
         assert isinstance(axes, Axes), "the beam has been drawn"
         axes.set_title(f"{run.label}: computed in {seconds(run.online_s)}", fontsize=10, loc="left")
-    stops = [Line2D([], [], marker=BELOW, ms=STOP_SIZE, ls="none", mec="none", color=c) for c in (FULL, CLOSED)]
+    _name_beams(shapes)
     beams = [Line2D([], [], color=shape.history.get_color(), lw=BEAM_WIDTH) for shape in shapes]
     names = [shape.take.run.name for shape in shapes]
-    handles, labels = ([*beams, *stops], [*names, "open stop", "closed stop"]) if shapes[0].stops else (beams, names)
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    stops, states = _legend_of_contacts(shapes[0].take.stops)
+    figure.legend([*beams, *stops], [*names, *states], loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+
+
+def _name_beams(shapes: list[_Shape]) -> None:
+    """Names of several beams, in the colours that each model's have."""
+    for shape in shapes:
+        if len(shape.beams) > 1:
+            handles = [Line2D([], [], color=artist.get_color(), lw=BEAM_WIDTH) for _, artist in shape.beams]
+            axes, names = shape.beams[0][1].axes, [line.name for line, _ in shape.beams]
+            assert isinstance(axes, Axes), "the beam has been drawn"
+            axes.legend(handles, names, loc="lower left", fontsize=8, frameon=False, ncols=len(names))
+
+
+def _legend_of_contacts(stops: tuple[Stop, ...]) -> tuple[list[Line2D], list[str]]:
+    """What stops look like, open and closed, and a closed contact between two beams; an open one is not drawn."""
+    looks = {"open stop": ("below", FULL), "closed stop": ("below", CLOSED), "beams in contact": ("between", CLOSED)}
+    between = {stop.side == "between" for stop in stops}
+    shown = {name: look for name, look in looks.items() if (look[0] == "between") in between}
+    handles = [
+        Line2D(
+            [],
+            [],
+            marker=SHAPES[side],
+            ms=STOP_SIZE if side == "below" else BETWEEN_SIZE,
+            ls="none",
+            mec="none",
+            color=colour,
+        )
+        for side, colour in shown.values()
+    ]
+    return handles, list(shown)

@@ -2,7 +2,8 @@
 
 A shape is the deflection w(x, t) at the nodes of the mesh both models are made from; every node is a point of the
 structure here, which leaves matrices and mesh as they are. A stop stands where its contact would touch the beam,
-z(t) = w(x_c, t) - g(t) / c with gap g and coefficient c of the contact, so one that moves is seen to move.
+z(t) = w(x_c, t) - g(t) / c with gap g and coefficient c of the contact, so one that moves is seen to move. Several
+beams stand where placement.py puts them: those that meet touch when their lines touch.
 """
 
 from __future__ import annotations
@@ -10,19 +11,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.study.comparison.placement import Placement, meeting, placements
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scene_file import CraigBamptonModel, FullModel
 from multiphi_exudyn.study.scene.scenes import Scene
 from multiphi_exudyn.study.scene.workbench import Workbench, mesh_nodes, prepare
-from reference_models.beams import as_beams
 
 __all__ = ["FRAME_RATE", "Film", "Line", "Stage", "Stop", "Take", "film_of", "run_stage", "stage_of"]
 
@@ -30,11 +32,12 @@ FRAME_RATE = 25.0  # frames a second
 PERIOD_SHOWN = 10.0  # s, for the longest period of the open structure: bounces of a hundredth of it last several frames
 LONGEST = 40.0  # s, of a film whose slow motion nobody has chosen
 MOST_FRAMES = 3000  # two minutes, some 15 MB: beyond that a typing error is likelier than a wish
+ROOM = 0.2  # between groups of beams that have nothing to do with each other, of the height they take
 
 
 @dataclass(frozen=True)
 class Line:
-    """A beam: nodes x (k,) [m], its height when undeformed [m], and its deflection (k, frames) [m]."""
+    """A beam: where its nodes are drawn, x (k,) [m], its height when undeformed [m], its deflection (k, frames) [m]."""
 
     name: str
     x: np.ndarray
@@ -44,11 +47,15 @@ class Line:
 
 @dataclass(frozen=True)
 class Stop:
-    """A stop at x [m]: its z (frames,) [m], and whether its contact is closed (frames,). below: under the beam."""
+    """A contact at x [m]: its z (frames,) [m], and whether it is closed (frames,).
+
+    side: of the beam on which the stop is, "below" or "above"; "between" for a contact of two beams, which has no stop
+    and stands midway.
+    """
 
     name: str
     x: float
-    below: bool
+    side: Literal["below", "above", "between"]
     z: np.ndarray
     closed: np.ndarray
 
@@ -78,8 +85,18 @@ class Film:
 
 
 @dataclass(frozen=True)
+class Laid:
+    """A beam and where it is drawn: its nodes' x (k,) [m] on itself; nodes: names of the points there."""
+
+    name: str
+    x: np.ndarray
+    nodes: tuple[str, ...]
+    place: Placement
+
+
+@dataclass(frozen=True)
 class Stage:
-    """A scene ready to be filmed: its nodes x (k,) [m] are points of the bench, named by ``nodes``.
+    """A scene ready to be filmed: the nodes of its beams are points of the bench.
 
     models: the reduced model's name and the reference's; judged: points a film may follow; slow: see Film.
     """
@@ -87,8 +104,7 @@ class Stage:
     bench: Workbench
     models: tuple[str, str]
     judged: tuple[str, ...]
-    x: np.ndarray
-    nodes: tuple[str, ...]
+    beams: Mapping[str, Laid]
     slow: float
 
 
@@ -100,18 +116,19 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     models = _chosen(scene, model, reference)
     scene = _with_reference(scene, models[1])
     mechanics = mechanics_of(scene)
-    if mechanics.beam is None:
-        raise MultiPhiValueError(
-            f"{scene.path}: structure: got matrices or several beams, need one beam, whose shape is drawn along x"
-        )
-    x = mesh_nodes(scene, mechanics)
-    nodes = {f"x = {place!r} m": float(place) for place in x.tolist()}
+    beams = mechanics.beams
+    if beams is None:
+        raise MultiPhiValueError(f"{scene.path}: structure: got matrices, need beams, whose shapes are drawn along x")
+    mesh = mesh_nodes(scene, mechanics)
     judged = scene.file.outputs.judged_points or scene.file.outputs.points or mechanics.points
-    shown = dict.fromkeys([*judged, *_struck(mechanics.contacts), *nodes])
-    beam = replace(mechanics.beam, points={**mechanics.beam.points, **nodes})
-    bench = prepare(_with_points(scene, tuple(shown)), replace(mechanics, beams=as_beams(beam)))
+    places = placements(beams, mechanics.contacts)
+    laid = {name: Laid(name, x, _node_points(name, x), places[name]) for name, x in mesh.items()}
+    nodes = [point for each in laid.values() for point in each.nodes]
+    shown = dict.fromkeys([*judged, *(point for c in mechanics.contacts for point in meeting(c)), *nodes])
+    parts = {name: _with_nodes(beam, mesh[name]) for name, beam in beams.parts.items()}
+    bench = prepare(_with_points(scene, tuple(shown)), replace(mechanics, beams=replace(beams, parts=parts)))
     factor = _checked(slow, bench.t_end) if slow is not None else _slow_motion(bench)
-    return Stage(replace(bench, repeats=1), models, tuple(judged), x, tuple(nodes), factor)
+    return Stage(replace(bench, repeats=1), models, tuple(judged), laid, factor)
 
 
 def film_of(stage: Stage, runs: Mapping[str, ModelRun]) -> Film:
@@ -119,7 +136,8 @@ def film_of(stage: Stage, runs: Mapping[str, ModelRun]) -> Film:
     time = np.arange(0.0, stage.bench.t_end, 1 / (FRAME_RATE * stage.slow))
     reduced, reference = (runs[name] for name in stage.models)
     point = max(stage.judged, key=lambda name: float(np.ptp(reference.points[name])))
-    takes = (_take(stage, reduced, time, point), _take(stage, reference, time, point))
+    heights = _heights(stage, reference)
+    takes = (_take(stage, reduced, time, point, heights), _take(stage, reference, time, point, heights))
     return Film(stage.bench.scene.file.title, stage.slow, time, point, takes)
 
 
@@ -169,35 +187,71 @@ def _checked(slow: float, t_end: float) -> float:
     return slow
 
 
-def _take(stage: Stage, run: ModelRun, time: np.ndarray, point: str) -> Take:
-    beam = stage.bench.mechanics.beam
-    assert beam is not None, "checked when the stage was built"
-    deflection = np.array([_at(run, name, time) for name in stage.nodes])
-    contacts = [contact for contact in stage.bench.mechanics.contacts if len(_struck([contact])) == 1]
-    stops = tuple(_stop(run, contact, beam, time) for contact in contacts)
-    return Take(run, (Line("beam", stage.x, 0.0, deflection),), stops, _at(run, point, time))
+def _node_points(beam: str, x: np.ndarray) -> tuple[str, ...]:
+    """Names of the points at a beam's nodes."""
+    return tuple(f"{beam}.{name}" if beam else name for name in _nodes(x))
 
 
-def _stop(run: ModelRun, contact: UnilateralContact, beam: Beam, time: np.ndarray) -> Stop:
-    ((point, coefficient),) = _coefficients(contact).items()
-    z = _at(run, point, time) - np.interp(time, run.time, run.gaps[contact.name]) / coefficient
+def _with_nodes(beam: Beam, x: np.ndarray) -> Beam:
+    return replace(beam, points={**beam.points, **_nodes(x)})
+
+
+def _nodes(x: np.ndarray) -> dict[str, float]:
+    return {f"x = {place!r} m": float(place) for place in x.tolist()}
+
+
+def _heights(stage: Stage, run: ModelRun) -> dict[str, float]:
+    """Height of every beam [m]: of its place in its group, each group below all that the one before it does."""
+    heights: dict[str, float] = {}
+    floor = None
+    for group in sorted({laid.place.group for laid in stage.beams.values()}):
+        members = [laid for laid in stage.beams.values() if laid.place.group == group]
+        reached = [laid.place.height + np.array([run.points[name] for name in laid.nodes]) for laid in members]
+        low, high = min(np.min(each) for each in reached), max(np.max(each) for each in reached)
+        lift = 0.0 if floor is None else floor - ROOM * (high - low) - high
+        heights |= {laid.name: laid.place.height + lift for laid in members}
+        floor = low + lift
+    return heights
+
+
+def _take(stage: Stage, run: ModelRun, time: np.ndarray, point: str, heights: Mapping[str, float]) -> Take:
+    lines = tuple(
+        Line(
+            laid.name or "beam",
+            laid.x + laid.place.shift,
+            heights[laid.name],
+            np.array([_at(run, node, time) for node in laid.nodes]),
+        )
+        for laid in stage.beams.values()
+    )
+    contacts = stage.bench.mechanics.contacts
+    stops = tuple(_stop(stage, run, contact, time, heights) for contact in contacts if len(meeting(contact)) <= 2)
+    return Take(run, lines, stops, _at(run, point, time))
+
+
+def _stop(
+    stage: Stage, run: ModelRun, contact: UnilateralContact, time: np.ndarray, heights: Mapping[str, float]
+) -> Stop:
+    """A stop touches the beam where its gap is closed; between two beams there is what is midway."""
+    beams, points = stage.bench.mechanics.beams, meeting(contact)
+    assert beams is not None, "checked when the stage was built"
+    of = [beams.points[point] for point in points]
+    z = np.mean([heights[name] + _at(run, point, time) for point, (name, _) in zip(points, of, strict=True)], axis=0)
+    x = float(np.mean([stage.beams[name].place.shift + along for name, along in of]))
     intervals = run.contact_intervals[contact.name]
     closed = np.any((intervals[:, :1] <= time) & (time <= intervals[:, 1:]), axis=0)
-    return Stop(contact.name, beam.points[point], coefficient > 0, z, closed)
+    if len(points) == 2:
+        return Stop(contact.name, x, "between", z, closed)
+    coefficient = _coefficient(contact)
+    z = z - np.interp(time, run.time, run.gaps[contact.name]) / coefficient
+    return Stop(contact.name, x, "below" if coefficient > 0 else "above", z, closed)
 
 
 def _at(run: ModelRun, point: str, time: np.ndarray) -> np.ndarray:
     return np.interp(time, run.time, run.points[point])
 
 
-def _struck(contacts: tuple[UnilateralContact, ...] | list[UnilateralContact]) -> list[str]:
-    """The points that contacts act on."""
-    return [point for contact in contacts for point in _coefficients(contact)]
-
-
-def _coefficients(contact: UnilateralContact) -> dict[str, float]:
+def _coefficient(contact: UnilateralContact) -> float:
+    """Of a contact on one point."""
     given = contact.direction
-    if isinstance(given, str):
-        return {given: 1.0}
-    assert isinstance(given, Mapping), "contacts of a scene act on points"
-    return dict(given)
+    return next(iter(given.values())) if isinstance(given, Mapping) else 1.0

@@ -40,7 +40,7 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration"]
+__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
@@ -173,10 +173,11 @@ def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
     return model.static_equilibrium({start.load_at: root.root * needed})
 
 
-def mesh_nodes(scene: Scene, mechanics: Mechanics) -> np.ndarray:
-    """Node positions (k,) [m] of the mesh that the structure of a scene's one beam is made from."""
-    assert mechanics.beam is not None, "checked by who asks"
-    return beam_nodes(mechanics.beam, _mesh(scene, mechanics).elements)
+def mesh_nodes(scene: Scene, mechanics: Mechanics) -> dict[str, np.ndarray]:
+    """Of every beam, node positions (k,) [m] of the mesh that a scene's structure is made from."""
+    assert mechanics.beams is not None, "checked by who asks"
+    elements = _mesh(scene, mechanics).elements
+    return {name: beam_nodes(beam, elements) for name, beam in mechanics.beams.parts.items()}
 
 
 def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:
