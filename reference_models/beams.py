@@ -14,7 +14,7 @@ from multiphi_exudyn.assemble import Tie
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.errors import MultiPhiValueError
 
-__all__ = ["Beams", "as_beams"]
+__all__ = ["NAMELESS", "Beams", "as_beams"]
 
 NAMELESS = ""
 TIED = 2  # points of a tie at most: one to the ground, or two to each other

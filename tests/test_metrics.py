@@ -43,11 +43,30 @@ def test_the_largest_difference_is_that_of_its_window():
 
 
 @given(PAIR)
-def test_running_nrmse_is_the_nrmse_of_every_window(pair):
+def test_running_nrmse_is_the_nrmse_of_every_window_in_which_the_reference_moves(pair):
     values, reference = pair
     time = np.arange(20.0)
-    expected = [metrics.nrmse(values, reference, time, until) for until in time]
-    np.testing.assert_allclose(metrics.running_nrmse(values, reference), np.nan_to_num(expected), rtol=1e-9)
+    moves = np.sqrt(np.cumsum(reference**2)) > 1.001 * metrics.STILL * np.linalg.norm(reference)
+    expected = np.array([metrics.nrmse(values, reference, time, until) for until in time])
+    found = metrics.running_nrmse(values, reference)
+    np.testing.assert_allclose(found[moves], expected[moves], rtol=1e-9)
+    assert np.all(np.diff(found[~moves]) >= 0)
+
+
+def test_a_point_still_at_rest_does_not_end_agreement():
+    moving = np.where(TIME > 0.5, HISTORY, 0.0)
+    noise = moving + 1e-12 * np.sin(300 * TIME)
+    assert metrics.agreement_horizon([(noise, moving)], TIME, 0.01) == 1.0
+    assert metrics.agreement_horizon([(noise + 0.02 * (TIME > 0.3), moving)], TIME, 0.05) == pytest.approx(0.31)
+
+
+def test_levels_held_are_those_between_the_ends_of_intervals():
+    intervals = {"a": np.array([[0.0, 0.2], [0.5, 0.7]]), "b": np.array([[0.1, 0.6]]), "c": np.empty((0, 2))}
+    held = metrics.held_levels(intervals, 1.0)
+    assert held == pytest.approx({("a",): 0.2, ("a", "b"): 0.2, ("b",): 0.3, (): 0.3})
+    assert metrics.union(intervals.values()) == pytest.approx(np.array([[0.0, 0.7]]))
+    assert metrics.union([intervals["c"]]).shape == (0, 2)
+    assert metrics.held_levels({}, 2.0) == {(): 2.0}
 
 
 @given(PAIR, st.sampled_from([1e-3, 1e3]))

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_scene import changed, write
+from small_scene import BEAM, changed, write
 
+import multiphi_exudyn as mp
 from multiphi_exudyn.study.comparison import plots
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.comparison.contact_totals import contact_totals
 from multiphi_exudyn.study.comparison.findings import engineering, findings, percent, seconds, times
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
@@ -72,7 +74,7 @@ def drawn(bench, name, share, online_s):
 
 @pytest.fixture(scope="module")
 def page(comparison):
-    return render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+    return render(comparison, level_modes(comparison), loss_tables(comparison.bench))
 
 
 def text_of(page):
@@ -170,7 +172,7 @@ def test_a_failed_model_is_a_row_with_its_cause(comparison):
 def test_without_its_reference_the_report_says_so_and_measures_nothing(comparison):
     failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence at 0.02 s")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"full": failed})
-    text = text_of(render(spoiled, level_modes(spoiled.bench), ()))
+    text = text_of(render(spoiled, level_modes(spoiled), ()))
     assert "The reference failed, so nothing can be measured: no convergence at 0.02 s" in text
     content = summary(spoiled)
     assert content["errors"] == {} == content["reference_uncertainty"] == content["agreement_horizon_s"]
@@ -205,15 +207,67 @@ def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
     scene = load_scene(write(tmp_path / "matrices.toml", changed(["models", 1, "modes"], 1, data)))
     compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
     assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
-    assert level_modes(compared.bench) == ()
+    assert level_modes(compared) == ()
     assert "a static force of +1 N at tip" in text_of(render(compared, (), loss_tables(compared.bench)))
 
 
-def test_modes_along_the_beam_have_the_frequencies_of_the_runs(bench):
-    free, closed = level_modes(bench)
+def test_modes_along_the_beam_have_the_frequencies_of_the_runs(bench, comparison):
+    free, closed = level_modes(comparison)
     assert free.frequencies[0] == pytest.approx(1 / bench.longest_period)
     assert np.all(np.diff(np.ravel(np.column_stack([free.frequencies, closed.frequencies]))) >= 0)
-    assert np.interp(0.3, closed.x, closed.shapes[0]) == pytest.approx(0, abs=1e-9)
+    own = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts, modes=4).level(("stop",))
+    assert closed.frequencies == pytest.approx(own.frequencies)
+    row = bench.structure.row("middle") @ own.shapes / np.max(np.abs(bench.structure.row("tip") @ own.shapes[:, 0]))
+    (beam,) = closed.beams
+    assert abs(np.interp(0.3, beam.x, beam.shapes[0])) == pytest.approx(abs(row[0]), rel=1e-2)
+    assert beam.contacts == (0.3,)
+    assert (free.share, closed.share) == pytest.approx((0.92, 0.08))
+
+
+def test_modes_of_several_beams_are_of_the_levels_the_reference_held_longest(tmp_path):
+    parts = dict.fromkeys("abc", BEAM["structure"]["beam"])
+    directions = {"ab": {"a.tip": 1.0, "b.tip": -1.0}, "bc": {"b.tip": 1.0, "c.tip": -1.0}}
+    given = {"gap": 1e-3, "stiffness": 1e4}
+    data = changed(["structure"], {"beams": parts}) | {
+        "contacts": [{"name": name, "direction": at} | given for name, at in directions.items()],
+        "start": {"load_at": "a.tip", "measured_at": "a.tip", "displacement": 0.01},
+        "outputs": {"t_end": 0.2, "points": ["a.tip"], "interval": 1e-3},
+    }
+    scene = load_scene(write(tmp_path / "three.toml", data))
+    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    levels = level_modes(compared)
+    assert levels[0].closed == ()
+    assert sum(level.share for level in levels) == pytest.approx(1)
+    longest = [level.share for level in levels[1:]]
+    assert len(longest) > 1
+    assert longest == sorted(longest, reverse=True)
+    for level in levels:
+        assert [beam.name for beam in level.beams] == ["a", "b", "c"]
+        assert np.max([np.abs(beam.shapes) for beam in level.beams], axis=(0, 2)) == pytest.approx(np.ones(4))
+    touching = next(level for level in levels if level.closed == ("ab",))
+    first, second, _ = (beam.shapes[0][-1] for beam in touching.beams)
+    assert first == pytest.approx(second, rel=0.05)
+    page = render(compared, levels, ())
+    assert page.count("data:image/png") == 1 + 1 + 2 + 1 + 1
+    assert "the contact ab between a.tip and b.tip (gap 1 mm, 10 kN/m)" in text_of(page)
+
+
+def test_many_contacts_are_told_of_together(tmp_path):
+    points = {"p{i}": {"first": 0.1, "last": 0.5, "count": 6}, "tip": 0.5}
+    rows = [{"name": "s{i}", "direction": "p{i}", "gap": 1e-3, "stiffness": 1e4, "count": 6}]
+    beam = BEAM["structure"]["beam"] | {"points": points}
+    data = changed(["structure", "beam"], beam) | {"contacts": rows}
+    data = changed(["outputs"], {"t_end": 0.1, "points": ["tip"], "interval": 1e-3}, data)
+    scene = load_scene(write(tmp_path / "bed.toml", data))
+    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    page = render(compared, level_modes(compared), loss_tables(compared.bench))
+    assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1
+    assert "meets 6 contacts from s1 to s6 (gap 1 mm, 10 kN/m each)" in text_of(page)
+    totals = contact_totals(compared.reference, 0.1)
+    assert 1 < totals.most_at_once <= totals.touched <= 6
+    assert totals.intervals == sum(len(given) for given in compared.reference.contact_intervals.values())
+    assert totals.impulse == pytest.approx(sum(compared.reference.impulse.values()))
+    assert "Of 6 contacts." in text_of(page)
 
 
 @pytest.mark.parametrize(

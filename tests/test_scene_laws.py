@@ -197,7 +197,7 @@ class TestReport:
         assert f"by {len(law.slopes)} straight segments from -5 to 5 mm, to {percent(law.error)} of" in followed
         assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in left
         assert comparison.runs["r6"].label == "Multi-Phi, levels of force laws, r = 6"
-        page = render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+        page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
         assert "Without the force laws" in page
         assert summary(comparison)["scene"]["force_laws"][0]["k3"] == 2e6
 
@@ -209,7 +209,7 @@ class TestReport:
         rigid = {"kind": "reduced", "name": "rigid", "modes": 6, "contact": "rigid"}
         comparison = compared(tmp_path, viscous(models=[MODELS[0], rigid]))
         assert comparison.runs["rigid"].message == ""
-        assert [level.name for level in level_modes(comparison.bench)] == ["open", "stop closed"]
+        assert [level.name for level in level_modes(comparison)] == ["open", "stop closed"]
         assert "100 kN/m, 300 N s/m" in findings(comparison).compared
         assert summary(comparison)["scene"]["contacts"]["stop"]["damping"] == 300.0
 

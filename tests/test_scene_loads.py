@@ -189,7 +189,7 @@ class TestReport:
         assert "released" not in told
 
     def test_energies_are_shares_of_the_largest(self, comparison):
-        page = render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+        page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
         assert "Shares of the largest energy of the run" in page
         assert "<th>work of loads</th>" in page
         run = comparison.runs["r6"]

@@ -50,7 +50,7 @@ def _write(comparison: Comparison, folder: Path) -> None:
     arrays = io.BytesIO()
     np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
     content = json.dumps(summary(comparison), indent=1, allow_nan=False)
-    page = render(comparison, level_modes(comparison.bench), loss_tables(comparison.bench))
+    page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
     write_whole(folder / "histories.npz", arrays.getvalue())
     write_whole(folder / "summary.json", content.encode())
     write_whole(folder / "report.html", page.encode())

@@ -18,7 +18,7 @@ import numpy as np
 from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.comparison.placement import Placement, meeting, placements
+from multiphi_exudyn.study.comparison.placement import Placement, coefficient, meeting, placements
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -225,7 +225,7 @@ def _take(stage: Stage, run: ModelRun, time: np.ndarray, point: str, heights: Ma
         for laid in stage.beams.values()
     )
     contacts = stage.bench.mechanics.contacts
-    stops = tuple(_stop(stage, run, contact, time, heights) for contact in contacts if len(meeting(contact)) <= 2)
+    stops = tuple(_stop(stage, run, contact, time, heights) for contact in contacts if len(meeting(contact)) in (1, 2))
     return Take(run, lines, stops, _at(run, point, time))
 
 
@@ -242,16 +242,10 @@ def _stop(
     closed = np.any((intervals[:, :1] <= time) & (time <= intervals[:, 1:]), axis=0)
     if len(points) == 2:
         return Stop(contact.name, x, "between", z, closed)
-    coefficient = _coefficient(contact)
-    z = z - np.interp(time, run.time, run.gaps[contact.name]) / coefficient
-    return Stop(contact.name, x, "below" if coefficient > 0 else "above", z, closed)
+    c = coefficient(contact)
+    z = z - np.interp(time, run.time, run.gaps[contact.name]) / c
+    return Stop(contact.name, x, "below" if c > 0 else "above", z, closed)
 
 
 def _at(run: ModelRun, point: str, time: np.ndarray) -> np.ndarray:
     return np.interp(time, run.time, run.points[point])
-
-
-def _coefficient(contact: UnilateralContact) -> float:
-    """Of a contact on one point."""
-    given = contact.direction
-    return next(iter(given.values())) if isinstance(given, Mapping) else 1.0

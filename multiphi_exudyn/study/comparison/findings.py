@@ -11,6 +11,8 @@ import numpy as np
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.contact_totals import LISTED
+from multiphi_exudyn.study.comparison.placement import meeting
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
@@ -84,17 +86,44 @@ def first_of(comparison: Comparison, kind: str) -> ModelRun | None:
 
 
 def _compared(comparison: Comparison) -> str:
-    contacts = comparison.bench.mechanics.contacts
-    stops = " and ".join(
-        f"the contact {c.name} (gap {1e3 * c.gap:g} mm, {'rigid' if c.rigid else f'{engineering(c.stiffness)}N/m'}"
-        f"{_damped(c)})"
-        for c in contacts
-    )
+    stops = _contacts(comparison.bench.mechanics.contacts)
     return (
         f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}"
         f"{_driven(comparison)}{', and meets ' + stops if stops else ''}{_on_it(comparison)}. "
         f"The reference is the {comparison.reference.label}."
     )
+
+
+def _contacts(contacts: Sequence[UnilateralContact]) -> str:
+    """Few contacts one by one, of many how many; nothing without one."""
+    if len(contacts) <= LISTED:
+        return " and ".join(
+            f"the contact {c.name}{_between(c)} ({_gap([c])}, {_stiffness([c])}{_damped(c)})" for c in contacts
+        )
+    return (
+        f"{len(contacts)} contacts from {contacts[0].name} to {contacts[-1].name} "
+        f"({_gap(contacts)}, {_stiffness(contacts)} each)"
+    )
+
+
+def _between(contact: UnilateralContact) -> str:
+    """The points of a contact that has two."""
+    points = meeting(contact)
+    return f" between {' and '.join(points)}" if len(points) == 2 else ""
+
+
+def _gap(contacts: Sequence[UnilateralContact]) -> str:
+    gaps = [1e3 * contact.gap for contact in contacts]
+    return f"gap {_span([f'{gap:g}' for gap in (min(gaps), max(gaps))])} mm"
+
+
+def _stiffness(contacts: Sequence[UnilateralContact]) -> str:
+    values = [contact.stiffness for contact in contacts]
+    return _span(["rigid" if math.isinf(k) else f"{engineering(k)}N/m" for k in (min(values), max(values))])
+
+
+def _span(ends: Sequence[str]) -> str:
+    return " to ".join(dict.fromkeys(ends))
 
 
 def _on_it(comparison: Comparison) -> str:
@@ -145,7 +174,7 @@ def _headline_runs(comparison: Comparison) -> list[ModelRun]:
 def _answer(comparison: Comparison, run: ModelRun) -> str:
     return (
         f"{run.label} differs from the reference by {_error(comparison, run)} to {comparison.headline_window:g} s "
-        f"(NRMSE, worst of {_listed(comparison.bench.judged_points)}) and takes {seconds(run.online_s)} instead of "
+        f"(NRMSE{_judged(comparison)}) and takes {seconds(run.online_s)} instead of "
         f"{seconds(comparison.reference.online_s)}: {times(comparison.speedup(run))} faster."
     )
 
@@ -262,13 +291,14 @@ def _reached(comparison: Comparison, law: ForceLaw) -> np.ndarray:
 def _key_figures(comparison: Comparison) -> Iterable[tuple[str, str, str]]:
     if not comparison.reference.ok:
         return
-    judged = f"NRMSE to {comparison.headline_window:g} s, worst of {_listed(comparison.bench.judged_points)}"
+    judged = f"NRMSE to {comparison.headline_window:g} s{_judged(comparison)}"
     own, cheapest = comparison.coarser, [run for run in comparison.cheapest if run.ok]
     if own is not None and own.name in comparison.measured:
         yield "the reference's own uncertainty", _error(comparison, own), f"{judged}; against {own.name}"
     if cheapest:
         worst = max(cheapest, key=lambda run: comparison.worst_error(run, comparison.headline_window))
-        source = f"{judged}, and of {len(cheapest)} nearby steps; online {seconds(cheapest[0].online_s)}"
+        nearby = f", worst of {len(cheapest)} nearby steps" if len(cheapest) > 1 else ""
+        source = f"{judged}{nearby}; online {seconds(cheapest[0].online_s)}"
         yield "the full model at its cheapest fair setting", _error(comparison, worst), source
     for run in _headline_runs(comparison):
         yield f"{run.name} over the reference", *_faster(comparison, run, comparison.reference)
@@ -297,6 +327,11 @@ def _faster(comparison: Comparison, run: ModelRun, than: ModelRun) -> tuple[str,
 
 def _error(comparison: Comparison, run: ModelRun) -> str:
     return percent(comparison.worst_error(run, comparison.headline_window))
+
+
+def _judged(comparison: Comparison) -> str:
+    points = comparison.bench.judged_points
+    return f"{', worst' if len(points) > 1 else ''} of {_listed(points)}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -37,14 +37,14 @@ class LossTable:
 
 
 def loss_tables(bench: Workbench) -> tuple[LossTable, ...]:
-    """One table per kind of level, of the scene's first contact; none where there is nothing to count.
+    """One table per kind of level, of a scene with one contact; none where there is nothing to count.
 
     Nor under loads or with force laws: the tables are of a start that is scaled.
     """
     if (
         bench.scene.file.loads
         or bench.mechanics.force_laws
-        or not (bench.mechanics.contacts and np.isfinite(bench.longest_period))
+        or not (len(bench.mechanics.contacts) == 1 and np.isfinite(bench.longest_period))
         or _starts_closed(bench)
     ):
         return ()

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from multiphi_exudyn.contact import UnilateralContact
 from reference_models.beams import Beams
 
-__all__ = ["Placement", "meeting", "placements"]
+__all__ = ["Placement", "coefficient", "meeting", "placements"]
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,17 @@ def placements(beams: Beams, contacts: Sequence[UnilateralContact]) -> dict[str,
 
 
 def meeting(contact: UnilateralContact) -> tuple[str, ...]:
-    """The points a contact acts on."""
+    """The points a contact acts on; none where it acts on a row of coordinates."""
     given = contact.direction
     if isinstance(given, str):
         return (given,)
-    assert isinstance(given, Mapping), "contacts of a scene act on points"
-    return tuple(given)
+    return tuple(given) if isinstance(given, Mapping) else ()
+
+
+def coefficient(contact: UnilateralContact) -> float:
+    """c of the first point a contact acts on."""
+    given = contact.direction
+    return next(iter(given.values())) if isinstance(given, Mapping) else 1.0
 
 
 def _place_next_to(beam: str, links: Sequence[_Link], placed: dict[str, Placement]) -> list[str]:
@@ -77,9 +82,9 @@ def _place_next_to(beam: str, links: Sequence[_Link], placed: dict[str, Placemen
 def _contact_links(beams: Beams, contacts: Sequence[UnilateralContact]) -> list[_Link]:
     links = []
     for contact in contacts:
-        if isinstance(contact.direction, Mapping) and len(contact.direction) == 2:
-            (point, coefficient), (other, _) = contact.direction.items()
-            links += _link(beams, point, other, contact.gap / coefficient)
+        if len(meeting(contact)) == 2:
+            point, other = meeting(contact)
+            links += _link(beams, point, other, contact.gap / coefficient(contact))
     return links
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,15 +22,28 @@ from matplotlib.typing import LineStyleType
 
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
+from multiphi_exudyn.study.comparison.placement import coefficient, meeting
+from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
-__all__ = ["contact_figure", "energy_figure", "error_time_figure", "history_figure", "mode_figure", "panels", "png"]
+__all__ = [
+    "energy_figure",
+    "error_time_figure",
+    "first_contact_span",
+    "history_figure",
+    "mode_figure",
+    "panels",
+    "pictured",
+    "png",
+    "styles",
+]
 
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#8A6D00", "#7F3C8D")
 REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
 MARKERS = {"reduced": "o", "user-object": "D", "full": "s", "craig-bampton": "^", "solve-ivp": "v", "global-basis": "P"}
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
+APART = 2.3  # between beams drawn over each other, of the largest value of a mode
 SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture
 LOSSES = {
     "final": ("still in motion", "#0072B2"),
@@ -97,21 +110,29 @@ def error_time_figure(comparison: Comparison) -> Figure:
 
 
 def mode_figure(levels: Sequence[LevelModes]) -> Figure:
-    """The lowest mode shapes of every level along the beam."""
-    count = max(len(level.frequencies) for level in levels)
-    figure = _canvas(2.1 * len(levels) + 0.3)
-    grid = figure.subplots(len(levels), count, sharex=True, sharey=True, squeeze=False)
-    for row, level in zip(grid, levels, strict=True):
+    """The lowest mode shapes of every level: its beams, from top to bottom, along x."""
+    figure = _canvas((1.2 + 0.9 * len(levels[0].beams)) * len(levels) + 0.3)
+    for part, level in zip(figure.subfigures(len(levels), 1, squeeze=False)[:, 0], levels, strict=True):
+        held = "" if level.share is None else f": {100 * level.share:.3g} % of the reference's run"
+        part.suptitle(level.name + held, x=0.01, ha="left", fontsize=10)
+        row = part.subplots(1, len(level.frequencies), sharex=True, sharey=True, squeeze=False)[0]
         for i, axes in enumerate(row):
-            axes.axhline(0.0, color="#BBBBBB", linewidth=0.8)
-            axes.plot(level.x, level.shapes[i], color=COLOURS[0], linewidth=1.6)
-            for places, marker, colour in ((level.masses, "s", "#000000"), (level.contacts, "^", "#D55E00")):
-                axes.plot(places, np.interp(places, level.x, level.shapes[i]), marker, color=colour, ms=6)
-            axes.set_title(f"{level.name}, mode {i + 1}\n{level.frequencies[i]:.2f} Hz", fontsize=9)
-            axes.set_yticks([])
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]")
+            _mode(axes, level, i)
+        names = [beam.name for beam in level.beams] if len(level.beams) > 1 else []
+        row[0].set_yticks(-APART * np.arange(len(names)), names, fontsize=9)
     return figure
+
+
+def _mode(axes: Axes, level: LevelModes, mode: int) -> None:
+    for number, beam in enumerate(level.beams):
+        zero, shape = -APART * number, beam.shapes[mode]
+        axes.plot(beam.x[[0, -1]], [zero, zero], color="#BBBBBB", linewidth=0.8)
+        axes.plot(beam.x, zero + shape, color=COLOURS[0], linewidth=1.6)
+        for places, marker, colour in ((beam.masses, "s", "#000000"), (beam.contacts, "^", "#D55E00")):
+            axes.plot(places, zero + np.interp(places, beam.x, shape), marker, color=colour, ms=6)
+    axes.set_title(f"mode {mode + 1}, {level.frequencies[mode]:.2f} Hz", fontsize=9)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel("x [m]", fontsize=9)
 
 
 def energy_figure(comparison: Comparison) -> Figure:
@@ -129,26 +150,6 @@ def energy_figure(comparison: Comparison) -> Figure:
     curves.set_ylim(0, None)
     curves.legend(frameon=False, fontsize=8)
     _ledger_bars(bars, comparison)
-    return figure
-
-
-def contact_figure(comparison: Comparison, contact: str) -> Figure:
-    """Contact intervals of all models under each other, whole and in the first contact phase."""
-    runs = [run for run in comparison.runs.values() if run.ok]
-    figure, both = panels(1.6 + 0.46 * len(runs), 2, heights=(1, 1))
-    style = styles(comparison)
-    for axes in both:
-        for row, run in enumerate(runs):
-            bars = [(a, b - a) for a, b in run.contact_intervals[contact]]
-            axes.broken_barh(bars, (row - 0.36, 0.72), color=style[run.name].colour, linewidth=0)
-        axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
-        axes.set_ylim(len(runs) - 0.5, -0.5)
-        axes.grid(axis="x", color="#E8E8E8")
-        axes.set_axisbelow(True)
-        axes.set_xlabel("time [s]")
-    both[0].set_xlim(0, comparison.bench.t_end)
-    both[0].set_title(f"In contact with {contact}: whole run, and the first contact phase", fontsize=10)
-    both[1].set_xlim(*first_contact_span(comparison))
     return figure
 
 
@@ -171,9 +172,10 @@ def pictured(comparison: Comparison) -> list[ModelRun]:
     return own or reduced(comparison)
 
 
-def first_contact_span(comparison: Comparison) -> tuple[float, float]:
-    """Start and end [s] of the detail around the reference's first contact phase."""
-    phases = [comparison.first_phase(comparison.reference, name) for name in comparison.reference.contact_intervals]
+def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = None) -> tuple[float, float]:
+    """Start and end [s] of the detail around the reference's first contact phase, of some contacts or of all."""
+    names = comparison.reference.contact_intervals if contacts is None else contacts
+    phases = [comparison.first_phase(comparison.reference, name) for name in names]
     phases = [phase for phase in phases if len(phase)]
     if not phases:
         return 0.0, comparison.bench.t_end
@@ -203,9 +205,8 @@ def _lines(axes: Axes, comparison: Comparison, runs: Sequence[ModelRun], point: 
         drawn = style[run.name]
         time = per_second * run.time
         axes.plot(time, 1e3 * run.points[point], drawn.line, color=drawn.colour, lw=drawn.width)
-    for intervals in comparison.reference.contact_intervals.values():
-        for start, end in per_second * intervals:
-            axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
+    for start, end in per_second * union(comparison.reference.contact_intervals.values()):
+        axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
     axes.set_ylabel(f"{point} [mm]")
 
 
@@ -217,8 +218,8 @@ def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point
     axes.set_xlim(1e3 * start, 1e3 * end)
     axes.set_ylim(np.min(values) - margin, np.max(values) + margin)
     for contact in comparison.bench.mechanics.contacts:
-        if contact.direction == point:
-            level = -1e3 * contact.gap
+        if meeting(contact) == (point,):
+            level = -1e3 * contact.gap / coefficient(contact)
             axes.axhline(level, color="#444444", linestyle="--", linewidth=0.8)
             place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 3), "textcoords": "offset points"}
             _note(axes, f"{contact.name}, {level:g} mm", (0.005, level), va="bottom", **place)

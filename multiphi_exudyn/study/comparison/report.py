@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison import contact_plots, plots
 from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotals, contact_totals
 from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
@@ -25,6 +26,9 @@ HISTORY = (
     "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
 )
+MANY = "A bar is a time span in contact; the contacts are numbered as the scene has them."
+MODES = "Square: point mass. Triangle: closed contact, {}. The largest value of each mode is drawn alike."
+RIGID, COMPLIANT = "rigid, as in the published tables", "of the scene's own stiffness, so it may move"
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,17 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
         metrics=metrics,
         definitions=[metrics.METRICS[name] for name in DEFINED],
         pictures=list(_pictures(comparison, levels)),
+        totals=_totals(comparison),
         contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
     )
+
+
+def _totals(comparison: Comparison) -> dict[str, ContactTotals]:
+    """Of every model that ran, where the contacts are too many to be told of one by one."""
+    if len(comparison.bench.mechanics.contacts) <= LISTED:
+        return {}
+    end = comparison.bench.t_end
+    return {name: contact_totals(run, end) for name, run in comparison.runs.items() if run.ok}
 
 
 def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[Picture]:
@@ -66,17 +79,25 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
             "Lower left is better. In the grey band a model is as good as the reference can tell. "
             "Colours are the same in all pictures.",
         )
-        for contact in comparison.reference.contact_intervals:
-            yield _picture("contact", plots.contact_figure(comparison, contact), "A bar is a time span in contact.")
+        yield from _contact_pictures(comparison)
         yield _picture(
             "energy",
             plots.energy_figure(comparison),
             "Where a bar ends short of 100 %, time integration has lost energy; beyond, it has gained some.",
         )
     if levels:
-        yield _picture(
-            "modes", plots.mode_figure(levels), "Square: point mass. Triangle: closed contact. Each scaled to 1."
-        )
+        rigid = comparison.bench.mechanics.parameter_set is not None
+        yield _picture("modes", plots.mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))
+
+
+def _contact_pictures(comparison: Comparison) -> Iterable[Picture]:
+    """One for each of a few contacts, one for all of many."""
+    contacts = comparison.reference.contact_intervals
+    if len(contacts) > LISTED:
+        yield _picture("contact", contact_plots.many_contacts_figure(comparison), MANY)
+        return
+    for contact in contacts:
+        yield _picture("contact", contact_plots.contact_figure(comparison, contact), "A bar is a time span in contact.")
 
 
 def _picture(section: str, figure: Figure, caption: str) -> Picture:

@@ -6,7 +6,7 @@ Histories are values at the times of one common grid, (k,); windows start at 0 a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +18,15 @@ __all__ = [
     "closed_time",
     "first_contact",
     "first_phase",
+    "held_levels",
     "inner_losses",
     "max_difference",
     "nrmse",
     "running_nrmse",
+    "union",
 ]
 
+STILL = 0.01  # of ||ref|| of the whole run: a point that has moved less is at rest, what it does there is round-off
 LEAVING = 0.25  # of the open level's longest period: an opening longer than this ends a contact phase
 
 
@@ -60,7 +63,8 @@ METRICS = {
         "agreement horizon",
         "s",
         "the first time to which the NRMSE, taken from 0 to that time, of any judged point exceeds the "
-        "tolerance; the end of the run where that never happens.",
+        "tolerance; the end of the run where that never happens. ||ref|| counts as a hundredth of that of the whole "
+        "run while it is less: a point that is still at rest says nothing.",
     ),
     "pointwise_until": Metric(
         "pointwise until",
@@ -121,8 +125,8 @@ def max_difference(values: np.ndarray, reference: np.ndarray, time: np.ndarray, 
 
 
 def running_nrmse(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """The NRMSE from the first sample to each sample, (k,); 0 while the reference is zero."""
-    size = np.cumsum(reference**2)
+    """The NRMSE from the first sample to each sample, (k,); see STILL; 0 where the reference is zero throughout."""
+    size = np.maximum(np.cumsum(reference**2), STILL**2 * np.sum(reference**2))
     difference = np.cumsum((values - reference) ** 2)
     return np.sqrt(np.divide(difference, size, out=np.zeros_like(size), where=size > 0))
 
@@ -156,3 +160,28 @@ def inner_losses(intervals: np.ndarray, longest_period: float) -> int:
 def closed_time(intervals: np.ndarray) -> float:
     """Sum [s] of the lengths of the contact intervals (k, 2)."""
     return float(np.sum(intervals[:, 1] - intervals[:, 0])) if len(intervals) else 0.0
+
+
+def union(intervals: Iterable[np.ndarray]) -> np.ndarray:
+    """Intervals (m, 2) in which any of several contacts, (k, 2) each, is closed; ascending, apart from each other."""
+    joined: list[list[float]] = []
+    for start, end in sorted(pair for each in intervals for pair in each.tolist()):
+        if joined and start <= joined[-1][1]:
+            joined[-1][1] = max(joined[-1][1], end)
+        else:
+            joined.append([start, end])
+    return np.reshape(joined, (-1, 2))
+
+
+def held_levels(intervals: Mapping[str, np.ndarray], t_end: float) -> dict[tuple[str, ...], float]:
+    """How long [s] each set of contacts is the closed one, from 0 to t_end; intervals: of each contact, (k, 2)."""
+    edges = np.unique(
+        np.clip(np.concatenate([[0.0, t_end], *(np.ravel(each) for each in intervals.values())]), 0, t_end)
+    )
+    middle = (edges[:-1] + edges[1:]) / 2
+    inside = {name: np.any((each[:, :1] < middle) & (middle < each[:, 1:]), axis=0) for name, each in intervals.items()}
+    held: dict[tuple[str, ...], float] = {}
+    for i, length in enumerate(np.diff(edges)):
+        closed = tuple(name for name, during in inside.items() if during[i])
+        held[closed] = held.get(closed, 0.0) + float(length)
+    return held

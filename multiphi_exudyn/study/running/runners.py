@@ -55,7 +55,9 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
     """How tables and figures call a model."""
     if isinstance(spec, FullModel):
         kind = "ANCF" if spec.beam == "ancf" else "geometrically exact"
-        return f"full Exudyn beam, {kind}, {spec.elements} elements, step {spec.step * 1e6:g} µs"
+        several = bench.mechanics.beam is None
+        beam, each = ("beams", " each") if several else ("beam", "")
+        return f"full Exudyn {beam}, {kind}, {spec.elements} elements{each}, step {spec.step * 1e6:g} µs"
     if isinstance(spec, CraigBamptonModel):
         given = bench.scene.file.start
         start = "" if given is None or given.load_at in bench.interface else ", start projected"

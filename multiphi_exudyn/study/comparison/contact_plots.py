@@ -1,0 +1,47 @@
+"""Pictures of contact: of one contact in all models, and of many contacts in two models."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.plots import first_contact_span, panels, pictured, styles
+
+__all__ = ["contact_figure", "many_contacts_figure"]
+
+
+def contact_figure(comparison: Comparison, contact: str) -> Figure:
+    """Contact intervals of all models under each other, whole and in the first contact phase."""
+    runs = [run for run in comparison.runs.values() if run.ok]
+    figure, both = panels(1.6 + 0.46 * len(runs), 2, heights=(1, 1))
+    style = styles(comparison)
+    for axes in both:
+        for row, run in enumerate(runs):
+            bars = [(a, b - a) for a, b in run.contact_intervals[contact]]
+            axes.broken_barh(bars, (row - 0.36, 0.72), color=style[run.name].colour, linewidth=0)
+        axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
+        axes.set_ylim(len(runs) - 0.5, -0.5)
+        axes.grid(axis="x", color="#E8E8E8")
+        axes.set_axisbelow(True)
+        axes.set_xlabel("time [s]")
+    both[0].set_xlim(0, comparison.bench.t_end)
+    both[0].set_title(f"Contact {contact}: the whole run, and its first contact phase", fontsize=10)
+    both[1].set_xlim(*first_contact_span(comparison, [contact]))
+    return figure
+
+
+def many_contacts_figure(comparison: Comparison) -> Figure:
+    """Every contact a row, in the scene's order: when it is closed, in the reference and in a reduced model."""
+    runs = [comparison.reference, *pictured(comparison)[:1]]
+    figure, rows = panels(2.6 * len(runs) + 0.4, len(runs), heights=[1.0] * len(runs))
+    style = styles(comparison)
+    for axes, run in zip(rows, runs, strict=True):
+        for number, intervals in enumerate(run.contact_intervals.values(), start=1):
+            bars = [(a, b - a) for a, b in intervals]
+            axes.broken_barh(bars, (number - 0.5, 1.0), color=style[run.name].colour, linewidth=0)
+        axes.set_title(run.label, fontsize=10, loc="left")
+        axes.set_xlim(0, comparison.bench.t_end)
+        axes.set_ylim(0.5, len(run.contact_intervals) + 0.5)
+        axes.set_ylabel("number of the contact")
+    rows[-1].set_xlabel("time [s]")
+    return figure
