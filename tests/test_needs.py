@@ -7,9 +7,9 @@ from multiphi_exudyn import cli
 from multiphi_exudyn.study.running.needs import needs_of
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 
-LEVELS = {"beam-chain": 8, "bed-of-stops": 108, "two-sided-stop": 3}  # built by the run of a scene; two for all others
+LEVELS = {"beam-chain": 8, "bed-of-stops": 189, "two-sided-stop": 3}  # built by the run of a scene; two for all others
 POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4}
-MEMORY = {"beam-chain": 5e6, "bed-of-stops": 60e6}  # bytes at most; 2 MB for all others
+MEMORY = {"beam-chain": 5e6, "bed-of-stops": 70e6}  # bytes at most; 2 MB for all others
 MOST_MODULES = 60  # of this package, whose core has no more files; nothing of the study, the plugin or the command line
 
 

@@ -110,7 +110,7 @@ class _Drawn:
             name: replace(beam, points=dict(beam.points) | {f"{i}": float(place) for i, place in enumerate(x[name])})
             for name, beam in beams.parts.items()
         }
-        structure = linear_beams(replace(beams, parts=parts), ELEMENTS)
+        structure = LinearBeams(replace(beams, parts=parts), ELEMENTS).structure
         stations = {name: (along, _rows(structure, name)) for name, along in x.items()}
         model = MultiPhiModel(structure, contacts, modes=SHOWN)
         return cls(beams, contacts, model, stations, placements(beams, contacts))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,7 +45,8 @@ MARKERS = {"reduced": "o", "user-object": "D", "full": "s", "craig-bampton": "^"
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
 APART = 2.3  # between beams drawn over each other, of the largest value of a mode
-SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture
+SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture, unless there are no larger ones
+SPAN = 0.01  # of the largest difference: smaller ones may lie below the picture
 LOSSES = {
     "final": ("still in motion", "#0072B2"),
     "damping": ("damping", "#56B4E9"),
@@ -229,14 +231,15 @@ def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point
 
 def _differences(axes: Axes, comparison: Comparison, point: str) -> None:
     style, reference = styles(comparison), comparison.reference.points[point]
-    lowest = SMALLEST * 1e3 * float(np.max(np.abs(reference), initial=1e-12))
+    shown = [_largest_so_far(run, point, reference) for run in reduced(comparison)]
+    peak, largest = np.max(np.abs(reference), initial=1e-12), max((values[-1] for values in shown), default=math.inf)
+    lowest = max(min(SMALLEST * 1e3 * float(peak), SPAN * float(largest)), np.finfo(float).tiny)
     if comparison.coarser is not None:
         band = _largest_so_far(comparison.coarser, point, reference)
         axes.fill_between(comparison.bench.time, lowest / 10, np.maximum(band, lowest / 10), color=CONTACT, lw=0)
-    for run in reduced(comparison):
+    for run, values in zip(reduced(comparison), shown, strict=True):
         drawn = style[run.name]
-        values = np.maximum(_largest_so_far(run, point, reference), lowest / 10)
-        axes.plot(run.time, values, drawn.line, color=drawn.colour, lw=drawn.width)
+        axes.plot(run.time, np.maximum(values, lowest / 10), drawn.line, color=drawn.colour, lw=drawn.width)
     axes.set_yscale("log")
     axes.set_ylim(lowest, None)
     axes.set_xlim(0, comparison.bench.t_end)
