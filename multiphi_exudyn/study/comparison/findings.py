@@ -90,7 +90,7 @@ def _compared(comparison: Comparison) -> str:
     return (
         f"{len(comparison.runs)} models answer one question over {comparison.bench.t_end:g} s: {_start(comparison)}"
         f"{_driven(comparison)}{', and meets ' + stops if stops else ''}{_on_it(comparison)}. "
-        f"The reference is the {comparison.reference.label}."
+        f"Reference: {comparison.reference.label}."
     )
 
 

@@ -13,7 +13,8 @@ from multiphi_exudyn.structure import LinearStructure
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.placement import Placement, meeting, placements
 from multiphi_exudyn.study.measures.metrics import held_levels
-from multiphi_exudyn.study.scene.workbench import ELEMENTS, linear_beams
+from multiphi_exudyn.study.scene.discretised import LinearBeams
+from multiphi_exudyn.study.scene.workbench import ELEMENTS
 from reference_models.beams import NAMELESS, Beams
 from reference_models.rig import PublishedLevel, published_frequencies
 
