@@ -60,7 +60,7 @@ class TestFewModesOfALevel:
             columns.append(matrix.shape[1])
             return right_singular_vectors(matrix)
 
-        monkeypatch.setattr("multiphi_exudyn.level.right_singular_vectors", counted)
+        monkeypatch.setattr("multiphi_exudyn.level_modes.right_singular_vectors", counted)
         for modes in (12, 48):
             assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
         assert columns == [12, 48]
