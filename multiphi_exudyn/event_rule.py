@@ -135,10 +135,11 @@ class EventRule(Passage):
         if value > 0:
             return Phase.ARMED
         rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
-        if rate == 0:
+        if value == 0 or rate == 0:
             table = SignalTable(state.basis, state.shapes, Rows.of([own], len(state.shapes)), [False])
-            (rate,) = state.finder.signs(table.signals(state.coefficients()), since=2)
-        value = value or rate
+            signals = table.signals(state.coefficients())
+            orders = (2, 2) if value == rate else (0, 1)  # from which on a derivative is more than round-off
+            value, rate = (state.finder.signs(signals, since)[0] for since in orders)
         if value >= 0:
             return Phase.ARMED
         stays = contact in self._viscous or (self._rigid[contact] and contact in state.closed)

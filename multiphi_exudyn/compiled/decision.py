@@ -136,7 +136,7 @@ def potential(k: Levels, a: int, x: np.ndarray) -> float:
 
 @inlined
 def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, since: int) -> int:
-    """Sign of the first derivative of s that is not round-off, from the one of order ``since`` >= 1 on."""
+    """Sign of the first derivative of s that is not round-off, from the one of order ``since`` on."""
     p = k.sizes[a, 1]
     for order in range(since, DERIVATIVES):
         value = size = 0.0
@@ -150,7 +150,8 @@ def first_sign(k: Levels, a: int, contact: int, c: np.ndarray, since: int) -> in
                 )
             value += re
             size += math.sqrt(re * re + im * im)
-        sign = sign_of(value, size)
+        constant = k.own_constant[a, contact] if order == 0 else 0.0
+        sign = sign_of(value + constant, size + abs(constant))
         if sign != 0:
             return sign
     return 0
@@ -166,10 +167,11 @@ def standing(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, c: n
     if k.rated[a]:
         accelerate(k, a, x, v, work)
     rate = rate_sign(k, a, row, x, v, work)
-    if rate == 0:
-        rate = first_sign(k, a, contact, c, 2)
-    if value == 0:
-        value = rate
+    if value == 0 and rate == 0:
+        value = rate = first_sign(k, a, contact, c, 2)
+    elif value == 0 or rate == 0:
+        value = first_sign(k, a, contact, c, 0)
+        rate = first_sign(k, a, contact, c, 1)
     if value >= 0:
         return ARMED
     pulls = k.rigid[contact] and k.closed[a, contact]
