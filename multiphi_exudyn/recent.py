@@ -45,6 +45,11 @@ class Recent(Generic[K, V]):
         if gone is not None and self._dropped is not None:
             self._dropped(key, gone)
 
+    def clear(self) -> None:
+        """Let every entry go."""
+        for key in list(self._entries):
+            self.drop(key)
+
     def items(self) -> ItemsView[K, V]:
         """All entries, the one used last at the end; looking does not use them."""
         return self._entries.items()

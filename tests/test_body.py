@@ -18,6 +18,7 @@ from exudyn.itemInterface import (
 from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
+from multiphi_exudyn import model as model_module
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
@@ -182,6 +183,25 @@ def test_without_contacts_nothing_is_switched():
     del container
     assert "nGenericData" not in items
     assert not mbs.GetPostStepUserFunction()
+
+
+@pytest.mark.parametrize("loads", [(), (mp.HarmonicLoad("m0", 40.0, 9.0),)], ids=["free", "driven"])
+def test_a_tiny_bound_on_what_is_kept_of_levels_changes_nothing(monkeypatch, loads):
+    """Between steps and after events everything is made again, to the bit."""
+    contacts = [mp.UnilateralContact(f"c{i}", f"m{i}", 2e-3 * (i + 1), 1e5) for i in range(3)]
+    given = {"velocity": [0.0, -1.0, 0.7], "loads": loads}
+    histories = []
+    for most in (None, 1):
+        if most is not None:
+            monkeypatch.setattr(model_module, "CACHE_BYTES", 0)
+            monkeypatch.setattr(model_module, "FEWEST_LEVELS", most)
+        model = chain(contacts)
+        histories.append(run(model, 1e-3, 0.4, **given))
+        assert (model.levels_kept == 1) is (most == 1)
+    usual, tight = histories
+    assert len({event.contact for event in usual.events}) == 3
+    assert usual.events == tight.events
+    assert all(np.array_equal(usual.points[p], tight.points[p]) for p in ("m0", "m1", "m2"))
 
 
 @pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])

@@ -31,6 +31,7 @@ from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
 from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import Event, Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
@@ -61,8 +62,9 @@ class MultiPhiBody:
         self._rule = self._plain_rule()
         self._size = self._rule.level(()).level.modes
         self._state = self._plain(motion.state)
-        self._stepped_levels: dict[tuple[int, ...], SteppedLevel] = {}
-        self._tests: dict[tuple[int, ...], tuple[StepTest, Lookahead]] = {}
+        most = self.model.most_levels
+        self._stepped_levels: Recent[tuple[int, ...], SteppedLevel] = Recent(most)
+        self._tests: Recent[tuple[int, ...], tuple[StepTest, Lookahead]] = Recent(most)
         self._step = self._rounding = self._ahead = self._speed = math.nan
         self._alone, self._clear, self._wait = False, 0, 0
         self._x = np.zeros(0)
@@ -402,16 +404,19 @@ class MultiPhiBody:
 
     def _choose_test(self) -> None:
         closed = self._state.closed
-        if closed not in self._tests:
+        tests = self._tests.find(closed)
+        if tests is None:
             rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
             given = self._stepped(closed), rows, self._step
-            self._tests[closed] = StepTest(*given), Lookahead(*given)
-        self._test, self._lookahead = self._tests[closed]
+            tests = self._tests.keep(closed, (StepTest(*given), Lookahead(*given)))
+        self._test, self._lookahead = tests
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
-        if closed not in self._stepped_levels:
-            self._stepped_levels[closed] = SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
-        return self._stepped_levels[closed]
+        found = self._stepped_levels.find(closed)
+        if found is None:
+            stepped = SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
+            found = self._stepped_levels.keep(closed, stepped)
+        return found
 
     def _stored_level(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
         """Closed contacts and phases from the data node."""

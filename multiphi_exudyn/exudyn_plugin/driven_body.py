@@ -25,6 +25,7 @@ from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.driven_step_test import DrivenStepTest, jump_times
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.loads import Load
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
@@ -42,7 +43,7 @@ class DrivenBody(MultiPhiBody):
         self._loads = tuple(loads)
         self._driven: DrivenRule = motion.rule
         self._channels = _Channels(motion.rule.excitation)
-        self._driven_tests: dict[tuple[int, ...], DrivenStepTest] = {}
+        self._driven_tests: Recent[tuple[int, ...], DrivenStepTest] = Recent(motion.model.most_levels)
         self._w = np.zeros((2, motion.rule.excitation.channels))
         self._told = 0.0
         super().__init__(name, motion, matched_step)
@@ -117,11 +118,12 @@ class DrivenBody(MultiPhiBody):
 
     def _driven_test(self) -> DrivenStepTest:
         closed = self._in_solver.closed
-        if closed not in self._driven_tests:
+        found = self._driven_tests.find(closed)
+        if found is None:
             level = self._driven.level(closed)
             rows = [self._driven.function(level, contact) for contact in self._driven.ends(closed)]
-            self._driven_tests[closed] = DrivenStepTest(self._in_solver, level, rows, self._step)
-        return self._driven_tests[closed]
+            found = self._driven_tests.keep(closed, DrivenStepTest(self._in_solver, level, rows, self._step))
+        return found
 
     def _plain_rule(self) -> EventRule:
         return self._driven.plain
