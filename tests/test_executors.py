@@ -185,14 +185,14 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path, locked):
         pytest.skip("a worker inside compiled code is told by a signal that Linux has")
     with sweeping(tmp_path / "runs.db", grid({"locked": [locked], "x": range(4)})) as parent:
         parent.kill()
-        output, _ = parent.communicate(timeout=LONG / 4)  # to the end of the pipe: nobody holds it any more
+        output, _ = parent.communicate(timeout=LONG)  # to the end of the pipe: nobody holds it any more
     assert output == ""
 
 
 def test_ctrl_c_keeps_what_has_finished_and_ends_the_workers(tmp_path):
     with sweeping(tmp_path / "runs.db", grid({"locked": [True], "short": [10], "x": range(14)})) as parent:
         os.killpg(parent.pid, signal.SIGINT)
-        _, errors = parent.communicate(timeout=LONG / 4)
+        _, errors = parent.communicate(timeout=LONG)
     assert parent.returncode != 0
     assert errors.count("KeyboardInterrupt") == 1
     with Store(tmp_path / "runs.db") as store:
