@@ -65,6 +65,10 @@ class DrivenLevel(LoadedLevel):
         directions, sizes = own.base.directions.T, own.base.magnitudes[0].T
         gap_columns = directions @ parts.shapes - excitation.stops
         speeds = directions @ parts.carried - excitation.stops
+        held = ~np.any(own.gap_rows, axis=1)[:, None]  # what no mode moves, the channels move by round-off only
+        moved = np.abs(excitation.stops)
+        gap_columns = np.where(held, cleared(gap_columns, sizes @ parts.terms + moved), gap_columns)
+        speeds = np.where(held, cleared(speeds, sizes @ np.abs(parts.carried) + moved), speeds)
         none = np.zeros(excitation.channels)
         level = ExtendedLevel(
             closed=own.closed,
@@ -73,11 +77,11 @@ class DrivenLevel(LoadedLevel):
             squares=np.concatenate([own.squares, none]),
             vectors=np.hstack([own.vectors, parts.shapes]),
             damping=np.pad(own.damping, (0, excitation.channels)),
-            gap_rows=np.hstack([own.gap_rows, cleared(gap_columns, sizes @ parts.terms + np.abs(excitation.stops))]),
+            gap_rows=np.hstack([own.gap_rows, gap_columns]),
             force_rows=np.hstack([own.force_rows, parts.contact_force]),
             force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
             neutral=own.neutral,
-            speeds=np.hstack([own.gap_rows, cleared(speeds, sizes @ np.abs(parts.carried) + np.abs(excitation.stops))]),
+            speeds=np.hstack([own.gap_rows, speeds]),
         )
         return cls(
             level=level,
