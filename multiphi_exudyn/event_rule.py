@@ -51,6 +51,7 @@ from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
 
 __all__ = ["EventRule"]
 
+ONE_BY_ONE = 4  # contacts up to which each is judged on its own: one product for all costs more
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
 
 
@@ -115,8 +116,10 @@ class EventRule(Passage):
     def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
         """The state with the phase in which every contact stands; ``refused``: those that asked in vain."""
         ends = self.ends(state.closed)
-        clear = self._rows(state.level).clear(state.displacement, state.velocity, state.reach)
-        doubtful = [ends[k] for k in np.flatnonzero(~clear)]
+        doubtful: Sequence[int] = ends
+        if len(ends) > ONE_BY_ONE:
+            clear = self._rows(state.level).clear(state.displacement, state.velocity, state.reach)
+            doubtful = [ends[k] for k in np.flatnonzero(~clear)]
         phases = list(self._armed)
         for contact in doubtful:
             phases[contact] = self._standing(state, contact)
