@@ -36,7 +36,8 @@ TABLES = 8  # sample tables kept for a basis: their steps are powers of two, mos
 TABLE_NUMBERS = 2 * (4 * INTERVALS + 2)  # floats in a sample table for an exponential
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold no longer than twice this
-SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal this near to zero at another's root has its root there too
+SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal farther from zero at another's root has its own later,
+INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes longer, unless it is round-off
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,10 @@ class DescentFinder:
         coefficients, values = signals.coefficients, self.basis.at(found.time)
         reached = (coefficients @ values).real + signals.constants
         slopes = (self.basis.derivative(coefficients) @ values).real
-        noise = SIMULTANEOUS * (np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants))
-        down = (reached <= noise) & (slopes <= 0)
+        terms = np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants)
+        fastest = float(np.max(np.abs(self.basis.rates), initial=0.0))
+        soon = -slopes * (INSTANT / fastest if fastest else 0.0)
+        down = (reached <= np.minimum(SIMULTANEOUS * terms, np.maximum(ZERO * terms, soon))) & (slopes <= 0)
         down[found.signal] = True
         result: list[int] = down.nonzero()[0].tolist()
         return result
