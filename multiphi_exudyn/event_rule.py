@@ -168,6 +168,8 @@ class EventRule(Passage):
 
         Between two stops without clearance the one on which nothing presses would keep the other out.
         """
+        if independent(self.model.base, sorted(held | asking)):
+            return set(asking)
         joined = set(held)
         for i in sorted(asking, key=lambda i: (state.phases[i] is not Phase.REFUSED, i)):
             if independent(self.model.base, sorted(joined | {i})):
@@ -294,6 +296,5 @@ class EventRule(Passage):
         _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
-        return pressing or self._joining(
-            state, set(), {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
-        )
+        pressing = pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
+        return self._joining(state, set(), pressing)
