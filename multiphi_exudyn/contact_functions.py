@@ -68,7 +68,7 @@ class ContactFunctions:
         self._known.drop(closed)
 
     def _of(self, closed: tuple[int, ...]) -> _Known:
-        return self._known.find(closed) or self._known.keep(closed, _Known(self._loaded(closed)))
+        return self._known.made(closed, lambda: _Known(self._loaded(closed)))
 
     def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
         return LoadedLevel.of(self.model.level_at(closed), self.load)

@@ -168,7 +168,7 @@ class EventRule(Passage):
 
         Between two stops without clearance the one on which nothing presses would keep the other out.
         """
-        if independent(self.model.base, sorted(held | asking)):
+        if len(held | asking) == 1 or independent(self.model.base, sorted(held | asking)):
             return set(asking)
         joined = set(held)
         for i in sorted(asking, key=lambda i: (state.phases[i] is not Phase.REFUSED, i)):

@@ -72,6 +72,8 @@ class DescentFinder:
         self._eternal = basis.pure and not np.any(self._growth)
         self._window = WINDOW / float(np.max(self._growth)) if np.any(self._growth) else math.inf
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
+        fastest = float(np.max(np.abs(basis.rates), initial=0.0))
+        self._instant = INSTANT / fastest if fastest else 0.0
         self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
         self._tables: dict[float, _Table] = {}
 
@@ -105,9 +107,8 @@ class DescentFinder:
         reached = (coefficients @ values).real + signals.constants
         slopes = (self.basis.derivative(coefficients) @ values).real
         terms = np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants)
-        fastest = float(np.max(np.abs(self.basis.rates), initial=0.0))
-        soon = -slopes * (INSTANT / fastest if fastest else 0.0)
-        down = (reached <= np.minimum(SIMULTANEOUS * terms, np.maximum(ZERO * terms, soon))) & (slopes <= 0)
+        soon = np.maximum(ZERO * terms, -slopes * self._instant)
+        down = (reached <= np.minimum(SIMULTANEOUS * terms, soon)) & (slopes <= 0)
         down[found.signal] = True
         result: list[int] = down.nonzero()[0].tolist()
         return result

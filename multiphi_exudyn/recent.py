@@ -39,6 +39,11 @@ class Recent(Generic[K, V]):
             self.drop(next(iter(self._entries)))
         return value
 
+    def made(self, key: K, make: Callable[[], V]) -> V:
+        """The entry, made and put in where there is none."""
+        found = self.find(key)
+        return self.keep(key, make()) if found is None else found
+
     def drop(self, key: K) -> None:
         """Let an entry go, if there is one."""
         gone = self._entries.pop(key, None)

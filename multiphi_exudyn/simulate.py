@@ -123,7 +123,7 @@ def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
 def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
     """The model's event rule under this load, kept by the model: its maps between levels serve every run."""
     key = load.tobytes()
-    rule: EventRule = model.rules.find(key) or model.rules.keep(key, EventRule(model, load))
+    rule: EventRule = model.rules.made(key, lambda: EventRule(model, load))
     return rule
 
 

@@ -61,7 +61,7 @@ class DrivenState(State):
     def finder(self) -> DescentFinder:
         """Event location on these exponentials."""
         key = self.closed, self.flow.key
-        return self.finders.find(key) or self.finders.keep(key, DescentFinder(self.flow.basis))
+        return self.finders.made(key, lambda: DescentFinder(self.flow.basis))
 
     def coefficients(self) -> np.ndarray:
         """Coefficients (p,) of the exponentials for the motion that starts here."""

@@ -403,20 +403,18 @@ class MultiPhiBody:
             self._data[:] = flags(state)
 
     def _choose_test(self) -> None:
+        self._test, self._lookahead = self._tests.made(self._state.closed, self._new_tests)
+
+    def _new_tests(self) -> tuple[StepTest, Lookahead]:
         closed = self._state.closed
-        tests = self._tests.find(closed)
-        if tests is None:
-            rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
-            given = self._stepped(closed), rows, self._step
-            tests = self._tests.keep(closed, (StepTest(*given), Lookahead(*given)))
-        self._test, self._lookahead = tests
+        rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
+        given = self._stepped(closed), rows, self._step
+        return StepTest(*given), Lookahead(*given)
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
-        found = self._stepped_levels.find(closed)
-        if found is None:
-            stepped = SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
-            found = self._stepped_levels.keep(closed, stepped)
-        return found
+        return self._stepped_levels.made(
+            closed, lambda: SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
+        )
 
     def _stored_level(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
         """Closed contacts and phases from the data node."""

@@ -117,13 +117,13 @@ class DrivenBody(MultiPhiBody):
         self._x = self._read()
 
     def _driven_test(self) -> DrivenStepTest:
+        return self._driven_tests.made(self._in_solver.closed, self._new_test)
+
+    def _new_test(self) -> DrivenStepTest:
         closed = self._in_solver.closed
-        found = self._driven_tests.find(closed)
-        if found is None:
-            level = self._driven.level(closed)
-            rows = [self._driven.function(level, contact) for contact in self._driven.ends(closed)]
-            found = self._driven_tests.keep(closed, DrivenStepTest(self._in_solver, level, rows, self._step))
-        return found
+        level = self._driven.level(closed)
+        rows = [self._driven.function(level, contact) for contact in self._driven.ends(closed)]
+        return DrivenStepTest(self._in_solver, level, rows, self._step)
 
     def _plain_rule(self) -> EventRule:
         return self._driven.plain
