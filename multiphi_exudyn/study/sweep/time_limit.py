@@ -6,12 +6,16 @@ two bytecodes, so a call that never returns to it cannot be stopped: a long slee
 calls no Python function. Such a call ends when it ends, and its caller sees by the clock that it was too long.
 
 After the call nothing late can arrive: ``over`` is set before any other bytecode, the timer looks at it under the lock,
-and what was raised but has not arrived is taken back under the same lock.
+and what was raised but may not have arrived is made to arrive where it is expected. Taken back with NULL it would leave
+the interpreter believing that an exception is under way: slower from then on, and version 3.11 never gets past a
+function that is traced (ceval.c, DO_TRACING).
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import queue
 import threading
 import time
 from collections.abc import Callable
@@ -49,25 +53,34 @@ class _Watch:
     """Timer of the thread that makes it; ``over``: nothing is raised any more."""
 
     def __init__(self, seconds: float) -> None:
-        self.over = False
+        self.over = self._raised = False
         self._deadline = time.perf_counter() + seconds
         self._thread = ctypes.c_ulong(threading.get_ident())
-        self._left = threading.Event()
+        self._left: queue.SimpleQueue[None] = queue.SimpleQueue()  # an Event cut short in ``set`` stays locked
         self._lock = threading.Lock()
 
     def start(self) -> None:
         threading.Thread(target=self._watch, name="time limit", daemon=True).start()
 
     def call_off(self) -> None:
-        """Wait for an attempt that is under way, and take back what has not arrived."""
-        self._left.set()
+        """Wait for an attempt that is under way, and let arrive here what has not arrived."""
+        self._left.put(None)
         with self._lock:
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(self._thread, None)
+            raised, self._raised = self._raised, False
+        if not raised:
+            return
+        try:
+            self._interrupt()  # in place of the one that has not arrived, or alone
+            while True:
+                pass
+        except TimeLimitExceeded:
+            pass
 
     def _watch(self) -> None:
         while not self.over:
             while (rest := self._deadline - time.perf_counter()) > 0:
-                if self._left.wait(rest):
+                with contextlib.suppress(queue.Empty):
+                    self._left.get(timeout=rest)
                     return
             self._raise()
             self._deadline += AGAIN_S
@@ -75,4 +88,8 @@ class _Watch:
     def _raise(self) -> None:
         with self._lock:
             if not self.over:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(self._thread, ctypes.py_object(TimeLimitExceeded))
+                self._raised = True
+                self._interrupt()
+
+    def _interrupt(self) -> None:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(self._thread, ctypes.py_object(TimeLimitExceeded))
