@@ -33,7 +33,8 @@ class LevelOverride:
     """Frequencies [Hz] and damping ratios that replace the computed ones of a level's lowest modes.
 
     The paper's own way of giving measured modal data per level. What is overridden is no longer one physical
-    (M, C, K): such a level does not interlace, and a transition into it need not lower the energy.
+    (M, C, K): such a level does not interlace, and a transition into it need not lower the energy. Static deflections
+    stay the computed ones; to a load that varies the kept modes answer with the given frequencies.
     """
 
     frequencies: Sequence[float] | None = None

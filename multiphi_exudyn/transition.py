@@ -27,7 +27,9 @@ from multiphi_exudyn.base import cleared
 from multiphi_exudyn.level import Asymptotic, Level
 from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
-__all__ = ["LoadedLevel", "Transition", "nearest_admissible"]
+__all__ = ["LoadedLevel", "Transition", "mixed", "nearest_admissible"]
+
+UNMIXED = 1e-15  # product of two modes, each of unit length, that is round-off of zero
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class Transition:
     @functools.cached_property
     def matrix(self) -> np.ndarray:
         """T (r_m, r_l)."""
-        return self.target.level.vectors.T @ self.source.level.vectors
+        return mixed(self.target.level, self.source.level)
 
     @property
     def velocity_matrix(self) -> np.ndarray:
@@ -116,6 +118,15 @@ class Transition:
     def velocity(self, eta_t: np.ndarray) -> np.ndarray:
         """eta'_m from eta'_l."""
         return self.velocity_matrix @ eta_t
+
+
+def mixed(target: Level, source: Level) -> np.ndarray:
+    """T = Phi_m^T M Phi_l (r_m, r_l), zero between modes that have no part in each other.
+
+    Round-off in its place would give a contact at rest, which no other mode moves, a speed.
+    """
+    products = target.vectors.T @ source.vectors
+    return np.where(np.abs(products) <= UNMIXED, 0.0, products)
 
 
 def nearest_admissible(rows: np.ndarray, vector: np.ndarray, free: int | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from random_campaign import verdicts
 from small_structures import chain, oscillator, random_model, stop
 from test_many_contacts import bed
 
@@ -83,6 +84,16 @@ class TestRandomModels:
                 assert_same(expected, found, 1e-8)
         assert left < segments
         assert compared > 15
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        30592,  # at rest on a rigid stop when a level begins in which no other mode moves it
+    ],
+)
+def test_random_cases_in_which_the_loops_once_differed(number):
+    assert verdicts(number) == [("ok", "")]
 
 
 class TestRig:

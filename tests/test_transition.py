@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
-from multiphi_exudyn import MultiPhiModel
+from multiphi_exudyn import LinearStructure, MultiPhiModel
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 
 
@@ -34,6 +34,18 @@ class TestTransition:
         assert_allclose(opened.configuration(released.displacement(eta)), closed.configuration(eta), atol=1e-13)
         assert_allclose(m.level(()).shapes @ released.velocity(eta), m.level(("stop",)).shapes @ eta, atol=1e-13)
         assert_allclose(opened.potential(released.displacement(eta)), closed.potential(eta), rtol=1e-12)
+
+    def test_modes_without_a_part_in_each_other_do_not_mix(self):
+        """A stop in the middle of a symmetric chain: its antisymmetric modes stay what they are."""
+        between = 2 * np.eye(7) - np.eye(7, k=1) - np.eye(7, k=-1)
+        structure = LinearStructure(np.eye(7), 30 * between, points={"middle": 3})
+        m = MultiPhiModel(structure, [stop("middle", 0.3, 50.0)], modes="all")
+        matrix = Transition(loaded(m, ()), loaded(m, ("stop",))).matrix
+        symmetric = [[vector @ vector[::-1] > 0 for vector in m.level(c).shapes.T] for c in (("stop",), ())]
+        other = np.logical_xor.outer(*symmetric)
+        assert np.sum(other) == 24
+        assert np.all(matrix[other] == 0)
+        assert_allclose(matrix @ matrix.T, np.eye(7), atol=1e-13)
 
     @settings(max_examples=80)
     @given(st.integers(0, 2**31), st.booleans(), st.booleans())

@@ -1,6 +1,6 @@
 """Levels under an excitation: what varies as prescribed coordinates, xi = (eta, w) (eqs. 38.4 to 38.6).
 
-    x = Psi eta + y_inf + R w,   R w = (K_l^-1 - Psi omega^-2 Psi^T) (b w + k h s w)  +  Y w
+    x = Psi eta + y_inf + R w,   R w = K_l^-1 (1 - Psi Psi^T) (b w + k h s w)  +  Y w
 
 w (q,) the channels, b and s their patterns and stops (driven/excitation.py). The first part is the quasi-static
 deflection of the modes left out (its inertia is neglected, its strain and the work of the load on it are not). Y holds
@@ -23,7 +23,7 @@ import numpy as np
 from multiphi_exudyn.base import cleared
 from multiphi_exudyn.driven.excitation import Excitation, columns
 from multiphi_exudyn.level import Level
-from multiphi_exudyn.transition import LoadedLevel, Transition
+from multiphi_exudyn.transition import LoadedLevel, Transition, mixed
 
 __all__ = ["DrivenLevel", "DrivenTransition", "ExtendedLevel"]
 
@@ -165,10 +165,9 @@ class DrivenTransition(Transition):
         return self.target.plain.level.modes
 
     def _map(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-        project = self.target.plain.level.vectors.T
-        modal, prescribed = project @ self.source.plain.level.vectors, project @ (source - target)
-        q = self.source.excitation.channels
-        return np.block([[modal, prescribed], [np.zeros((q, self._modes)), np.eye(q)]])
+        own, q = self.target.plain.level, self.source.excitation.channels
+        prescribed = own.vectors.T @ (source - target)
+        return np.block([[mixed(own, self.source.plain.level), prescribed], [np.zeros((q, self._modes)), np.eye(q)]])
 
 
 @dataclass(frozen=True)
@@ -189,25 +188,30 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     rigid = np.isinf(base.stiffnesses[index])
     stops, directions = excitation.stops[index], base.directions[:, index]
     springs = np.where(rigid, 0.0, base.stiffnesses[index])
-    force = level.vectors.T @ excitation.patterns + level.vectors.T @ (directions @ (springs[:, None] * stops))
-    squares = level.squares[:, None]
-    centre = np.divide(force, squares, out=np.zeros_like(force), where=squares != 0)
-    at_rest = [level.rest(excitation.patterns[:, k], -stops[:, k]) for k in range(excitation.channels)]
-    held = [level.rest(np.zeros(base.modes.count), np.where(rigid, -stops[:, k], 0.0)) for k in range(len(at_rest))]
+    pressed = excitation.patterns + directions @ (springs[:, None] * stops)
+    force, beyond = level.vectors.T @ pressed, _outside(level, pressed)
+    lifted = np.where(rigid[:, None], -stops, 0.0)
+    at_rest = [level.rest(beyond[:, k], lifted[:, k]) for k in range(excitation.channels)]
+    held = [level.rest(np.zeros(base.modes.count), lifted[:, k]) for k in range(excitation.channels)]
     carried = columns([y for _, y in held], base.modes.count)
     total = columns([y for _, y in at_rest], base.modes.count)
-    contact_force = columns([forces for forces, _ in at_rest], len(index)) - level.force_rows @ centre
-    shapes = total - level.vectors @ centre
+    contact_force = columns([forces for forces, _ in at_rest], len(index)) + springs[:, None] * stops
+    shapes = carried + _outside(level, total - carried)  # whatever a soft kept mode made of round-off goes
     rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
     pinned = directions[:, rigid]
     for k, derivative in enumerate(excitation.rate_of):
         if derivative >= 0:
-            pressed = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # of dampers, at w' = 1
-            damped = base.damping @ carried[:, k] - directions @ pressed
+            dashed = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # of dampers, at w' = 1
+            damped = base.damping @ carried[:, k] - directions @ dashed
             force[:, derivative] -= level.vectors.T @ damped
             rate[:, derivative] -= level.vectors.T @ carried[:, k]
-            contact_force[~rigid, derivative] += pressed[~rigid]
+            contact_force[~rigid, derivative] += dashed[~rigid]
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
-    terms = np.abs(total) + np.abs(level.vectors) @ np.abs(centre)
+    terms = np.abs(total) + np.abs(carried)
     return _Prescribed(shapes, terms, carried, force, rate, contact_force, contact_rate)
+
+
+def _outside(level: Level, given: np.ndarray) -> np.ndarray:
+    """(1 - Psi Psi^T) given (m, q): what the level's modes have no part in."""
+    return np.asarray(given - level.vectors @ (level.vectors.T @ given))
