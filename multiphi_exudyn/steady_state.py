@@ -223,14 +223,20 @@ def _half_range(trajectory: Trajectory, point: At, start: float, end: float) -> 
     return sum(_largest(trajectory, point, sign, start, end) for sign in (1.0, -1.0)) / 2
 
 
-def _largest(trajectory: Trajectory, point: At, sign: float, left: float, right: float) -> float:
-    count = SAMPLES * HIGHEST_ORDER
-    for _ in range(ZOOMS + 1):
-        times = np.linspace(left, right, count + 1)
+def _largest(trajectory: Trajectory, point: At, sign: float, start: float, end: float) -> float:
+    """The largest value, times ``sign``: of a periodic motion it may lie just inside either end as well."""
+    times = np.linspace(start, end, SAMPLES * HIGHEST_ORDER + 1)
+    highest = int(np.argmax(sign * np.asarray(trajectory.at(point, times))))
+    return max(_peak(trajectory, point, sign, times, k) for k in {0, highest, len(times) - 1})
+
+
+def _peak(trajectory: Trajectory, point: At, sign: float, times: np.ndarray, k: int) -> float:
+    """The largest value between the neighbours of the k-th of these times."""
+    for _ in range(ZOOMS):
+        times = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], ZOOM + 1)
         values = sign * np.asarray(trajectory.at(point, times))
-        best = int(np.argmax(values))
-        left, right, count = times[max(best - 1, 0)], times[min(best + 1, count)], ZOOM
-    return float(values[best])
+        k = int(np.argmax(values))
+    return float(values[k])
 
 
 def frequency(load: PeriodicLoad) -> float:

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from small_structures import chain, oscillator, random_structure
@@ -41,6 +41,7 @@ def integrated(model, load, x, v, periods):
 
 @settings(max_examples=12)
 @given(seed=st.integers(0, 10**6))
+@example(seed=290)  # a largest displacement just before the end of the period
 def test_without_contact_the_frequency_response_is_that_of_the_matrices(seed):
     n, mass, stiffness, _, random = random_structure(seed)
     root = random.normal(size=(n, n)) * 0.3
