@@ -25,7 +25,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.exudyn_plugin.interface import Interface
+from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
@@ -35,12 +35,11 @@ from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import Event, Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["MultiPhiBody", "flags", "matrices"]
+__all__ = ["MultiPhiBody"]
 
 NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
-PHASES = tuple(Phase)
 
 ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # a modal force (s,) by the closed contacts of a level
 
@@ -57,7 +56,6 @@ class MultiPhiBody:
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
         self.time = math.nan
-        self.interface: Interface | None = None
         self._motion = motion
         self._rule = self._plain_rule()
         self._size = self._rule.level(()).level.modes
@@ -68,9 +66,9 @@ class MultiPhiBody:
         self._step = self._rounding = self._ahead = self._speed = math.nan
         self._alone, self._clear, self._wait = False, 0, 0
         self._x = np.zeros(0)
-        self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
-        self._in_solver = self._stepped(self._state.closed)
-        self._given = self._in_solver.state(self._state.displacement, self._state.velocity, np.zeros(self._size))
+        stepped, state = self._stepped(self._state.closed), self._state
+        self.coordinates = Coordinates(self.items, stepped)
+        self._given = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
         self._given_events = tuple(motion.events)
 
     @property
@@ -129,7 +127,7 @@ class MultiPhiBody:
             if not self._clear:
                 self._sample()
             return
-        x = self._read()
+        x = self.coordinates.read()
         least, ahead, speed = self._test.at(x)
         limit = speed if speed > self._speed else self._speed
         if not (least > limit and self._ahead > limit):
@@ -140,13 +138,6 @@ class MultiPhiBody:
         self._wait -= 1
         if not self._wait:
             self._look_ahead()
-
-    def _read(self) -> np.ndarray:
-        """A copy x = (q, q', q'', 1) of the present state, good until the next but one."""
-        self._copies = self._copies[::-1]
-        x, q, q_t, q_tt = self._copies[0]
-        q[:], q_t[:], q_tt[:] = self._views
-        return x
 
     def _is_step(self, mbs: Any, t: float) -> bool:
         """Whether t ends a step, and not the start of a run or a static solution; takes the step size."""
@@ -180,7 +171,7 @@ class MultiPhiBody:
 
     def _sample(self) -> None:
         """Take the present state as the start of the next step."""
-        self._x = self._read()
+        self._x = self.coordinates.read()
         _, self._ahead, self._speed = self._test.at(self._x)
         if any(phase is not Phase.ARMED for phase in self._state.phases):
             self._ahead = -math.inf  # what ends such a phase is looked for exactly
@@ -199,7 +190,8 @@ class MultiPhiBody:
         After the event the force of the mean acts, and what the event changed in loads and connectors. Forces of
         constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the mean.
         """
-        own, start, known = self._in_solver, self._state, len(self.events)
+        here, start, known = self.coordinates, self._state, len(self.events)
+        own = here.stepped
         given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
         force = self._significant((own.force(before) + own.force(after) - given) / 2, after)
         state = self._travel(before, begun, force, force, own)
@@ -209,20 +201,15 @@ class MultiPhiBody:
         if self._alone:
             self._write(mbs, state, force)
             return
-        rest = force + self._own_force(start.closed, self.time) - self._applied(mbs)
+        rest = force + self._own_force(start.closed, self.time) - here.applied(mbs)
         entered = self._stepped(state.closed)
-        self._write(mbs, state, self._carried(force, own, entered))
-        outside = self._applied(mbs) + self._carried(rest, own, entered) - self._own_force(state.closed, self.time)
+        self._write(mbs, state, here.carried(force, own, entered))
+        outside = here.applied(mbs) + here.carried(rest, own, entered) - self._own_force(state.closed, self.time)
         present = self._significant(outside, after)
         if np.any(present != force):
             del self.events[known:]
             self._state = start
             self._write(mbs, self._travel(before, begun, force, present, entered), present)
-
-    def _split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q, q', q'' of x = (q, q', q'', 1)."""
-        s = self._size
-        return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
     def _travel(
         self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray, given: SteppedLevel
@@ -234,12 +221,12 @@ class MultiPhiBody:
         closed = self._state.closed
 
         def after(level: tuple[int, ...]) -> np.ndarray:
-            return self._carried(entered, given, self._stepped(level))
+            return self.coordinates.carried(entered, given, self._stepped(level))
 
         def until(level: tuple[int, ...]) -> np.ndarray:
             return force if level == closed else after(level)
 
-        q, q_t, _ = self._split(before)
+        q, q_t, _ = self.coordinates.split(before)
         eta_t = self._stepped(closed).velocity(q, q_t, force + self._own_force(closed, begun))
         loaded = self._rule.level(closed)
         r = loaded.level.modes
@@ -278,67 +265,41 @@ class MultiPhiBody:
         acts = not self._alone and force.dot(force) > NEGLIGIBLE**2 * q_tt.dot(q_tt)
         return force if acts else np.zeros(self._size)
 
-    def _applied(self, mbs: Any) -> np.ndarray:
-        """Modal force (s,) of loads and connectors in the present state of the system, those on the interface too."""
-        solver = mbs.sys["dynamicSolver"]
-        solver.ComputeODE2RHS(mbs)
-        unbalanced = np.array(solver.GetSystemResidual())
-        force = unbalanced[self._first : self._first + self._size] + self._in_solver.resisting(*self._views[:2])
-        return force if self.interface is None else force + self.interface.modal(self._in_solver, unbalanced)
-
-    def _carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
-        """A modal force (s,) of one level in another."""
-        return force if self.interface is None else self.interface.carried(force, given, wanted)
-
     # ------------------------------------------------------------------ start of a run
 
     def _begin_static(self, mbs: Any) -> None:
         """Give a static solution the level that the system has at its start, whatever the last run ended in."""
-        self._attach(mbs)
-        closed, _ = self._stored_level()
-        if closed != self._in_solver.closed:
-            self._load_matrices(mbs, closed)
+        self.coordinates.attach(mbs)
+        closed, _ = self.coordinates.stored()
+        if closed != self.coordinates.stepped.closed:
+            self._load(mbs, closed)
 
     def _begin(self, mbs: Any, t: float) -> None:
         """Take state and level from the system as it stands at the start of a run."""
         self._check_settings(mbs)
-        self._attach(mbs)
+        own = self.coordinates
+        own.attach(mbs)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
         self._clear = self._wait = 0
         self._motion.segments.clear()
-        own, (q, q_t, q_tt) = self._in_solver, self._views
-        closed, phases = self._stored_level()
-        if closed != own.closed:  # the accelerations have been computed with stale matrices
-            own = self._enter(mbs, closed)
-            force = self._applied(mbs)
-            q_tt[:] = own.acceleration(q, q_t, force)
-        force = own.force(self._read())
+        stepped, (q, q_t, q_tt) = own.stepped, own.views
+        closed, phases = own.stored()
+        if closed != stepped.closed:  # the accelerations have been computed with stale matrices
+            stepped = self._enter(mbs, closed)
+            q_tt[:] = stepped.acceleration(q, q_t, own.applied(mbs))
+        force = stepped.force(own.read())
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
         self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
         if fresh:  # only now the force is known, which the velocity of matched modes contains
-            q_t += own.from_force @ force
-            q_tt[:] = own.acceleration(q, q_t, force)
-        if self.interface is not None:
-            self.interface.write(own, self._views)
-        r, eta_t = own.loaded.level.modes, own.velocity(q, q_t, force)
+            q_t += stepped.from_force @ force
+            q_tt[:] = stepped.acceleration(q, q_t, force)
+        own.write(own.views)
+        r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
-        self._x = self._read()
+        self._x = own.read()
         self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
         self._sample()
         self.time = t
-
-    def _attach(self, mbs: Any) -> None:
-        """Views of the body's part of the system's current state; they hold for one run."""
-        state = mbs.systemData.GetSystemStateDict(reference=True)
-        self._first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
-        own = slice(self._first, self._first + self._size)
-        self._views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
-        self._copies = tuple((x, *self._split(x)) for x in np.ones((2, 3 * self._size + 1)))
-        if self.interface is not None:
-            self.interface.attach(state)
-        if "nGenericData" in self.items:
-            places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
-            self._data = state["dataCoords"][places[0] : places[0] + len(places)]
 
     def _check_settings(self, mbs: Any) -> None:
         integration = mbs.sys["simulationSettings"].timeIntegration.generalizedAlpha
@@ -347,12 +308,12 @@ class MultiPhiBody:
                 f"spectralRadius: got {integration.spectralRadius:g}, need 1 (or TrapezoidalIndex2) "
                 f"with the Multi-Phi body {self.name!r}"
             )
-        if self.interface is not None and not integration.useIndex2Constraints:
+        if self.coordinates.interface is not None and not integration.useIndex2Constraints:
             raise MultiPhiValueError(
                 f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )
-        if self.interface is not None and any(contact.rigid for contact in self.model.contacts):
-            self.interface.check_impacts()
+        if self.coordinates.interface is not None and any(contact.rigid for contact in self.model.contacts):
+            self.coordinates.interface.check_impacts()
 
     def check_called(self, mbs: Any, t: float) -> None:
         """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""
@@ -368,39 +329,32 @@ class MultiPhiBody:
 
     def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
         """Put a state at the end of a step into the system, with the acceleration under a modal force."""
-        stepped = self._in_solver
-        if state.closed != self._in_solver.closed:
+        stepped = self.coordinates.stepped
+        if state.closed != stepped.closed:
             stepped = self._enter(mbs, state.closed)
         force = force + self._own_force(state.closed, self.time)
-        for view, values in zip(self._views, stepped.state(state.displacement, state.velocity, force), strict=True):
-            view[:] = values
-        if self.interface is not None:
-            self.interface.write(stepped, self._views)
+        self.coordinates.write(stepped.state(state.displacement, state.velocity, force))
         self._keep(state)
 
     def _enter(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
         """Make a level that of the dynamic solver at work."""
-        stepped = self._load_matrices(mbs, closed)
+        stepped = self._load(mbs, closed)
         if self.matched_step is not None:  # a solver may take the mass matrix for constant and keep it
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
         mbs.solverSignalJacobianUpdate = True
         return stepped
 
-    def _load_matrices(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
+    def _load(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
         """Give the system the matrices of a level."""
-        stepped = self._in_solver = self._stepped(closed)
-        for parameter, value in matrices(stepped, self.force_vector(stepped)).items():
-            mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
-        if self.interface is not None:
-            self.interface.load(stepped)
+        stepped = self._stepped(closed)
+        self.coordinates.load(mbs, stepped, self.force_vector(stepped))
         return stepped
 
     def _keep(self, state: State) -> None:
         """Remember a state, choose its test, and write its level into the data node."""
         self._state = state
         self._choose_test()
-        if "nGenericData" in self.items:
-            self._data[:] = flags(state)
+        self.coordinates.store(state)
 
     def _choose_test(self) -> None:
         self._test, self._lookahead = self._tests.made(self._state.closed, self._new_tests)
@@ -415,26 +369,3 @@ class MultiPhiBody:
         return self._stepped_levels.made(
             closed, lambda: SteppedLevel.of(self._rule.level(closed), self._size, self.matched_step)
         )
-
-    def _stored_level(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
-        """Closed contacts and phases from the data node."""
-        if "nGenericData" not in self.items:
-            return (), ()
-        closed, phases = np.split(self._data, 2)
-        return tuple(np.flatnonzero(closed > 0.5).tolist()), tuple(PHASES[round(p)] for p in phases.tolist())
-
-
-def flags(state: State) -> list[float]:
-    """Coordinates of the data node."""
-    closed = [float(contact in state.closed) for contact in range(len(state.phases))]
-    return closed + [float(PHASES.index(phase)) for phase in state.phases]
-
-
-def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
-    """Parameters of the ObjectGenericODE2."""
-    return {
-        "massMatrix": stepped.mass,
-        "dampingMatrix": stepped.damping,
-        "stiffnessMatrix": stepped.stiffness,
-        "forceVector": force,
-    }

@@ -13,7 +13,8 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 
 from multiphi_exudyn.driven.motion import DrivenMotion
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody, flags, matrices
+from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.coordinates import flags, matrices
 from multiphi_exudyn.exudyn_plugin.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.interface import Interface, interface_rows
@@ -155,6 +156,6 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
 
 
 def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
-    body.interface = Interface(mbs, body.name, rows)
-    body.interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
-    body.items["nInterface"] = body.interface.nodes
+    interface = body.coordinates.interface = Interface(mbs, body.name, rows, body.model.most_levels)
+    interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
+    body.items["nInterface"] = interface.nodes

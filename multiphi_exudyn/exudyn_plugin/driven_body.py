@@ -67,7 +67,7 @@ class DrivenBody(MultiPhiBody):
     def before_step(self, mbs: Any, t: float) -> None:
         """Called by Exudyn before a step that ends at t: the force that will then act."""
         self._told = t
-        force = self._in_solver.drive + self._own_force(self._in_solver.closed, t)
+        force = self.coordinates.stepped.drive + self._own_force(self.coordinates.stepped.closed, t)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
 
     def after_step(self, mbs: Any, t: float) -> None:
@@ -80,12 +80,12 @@ class DrivenBody(MultiPhiBody):
                 "CreateMultiPhiBody (it is then called after them)"
             )
         self.time, begun = t, self.time
-        x, w = self._read(), self._channels.at(t)
+        x, w = self.coordinates.read(), self._channels.at(t)
         test = self._driven_test()
         armed = all(phase is Phase.ARMED for phase in self._state.phases)
         if not (armed and test.clear(self._x, self._w, x, w) and not self._jumps(begun, t)):
             self._repeat(mbs, begun, self._x, x)
-            x = self._read()
+            x = self.coordinates.read()
         self._x, self._w = x, w
 
     @property
@@ -114,16 +114,16 @@ class DrivenBody(MultiPhiBody):
 
     def _sample(self) -> None:
         """Take the present state as the start of the next step."""
-        self._x = self._read()
+        self._x = self.coordinates.read()
 
     def _driven_test(self) -> DrivenStepTest:
-        return self._driven_tests.made(self._in_solver.closed, self._new_test)
+        return self._driven_tests.made(self.coordinates.stepped.closed, self._new_test)
 
     def _new_test(self) -> DrivenStepTest:
-        closed = self._in_solver.closed
+        closed = self.coordinates.stepped.closed
         level = self._driven.level(closed)
         rows = [self._driven.function(level, contact) for contact in self._driven.ends(closed)]
-        return DrivenStepTest(self._in_solver, level, rows, self._step)
+        return DrivenStepTest(self.coordinates.stepped, level, rows, self._step)
 
     def _plain_rule(self) -> EventRule:
         return self._driven.plain

@@ -23,6 +23,7 @@ mass on y or a constraint would be, and is refused beside rigid contacts. Compli
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -33,6 +34,7 @@ from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.items import is_constraint
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import At, LinearStructure
 
 __all__ = ["Interface", "interface_rows"]
@@ -82,17 +84,28 @@ def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
     return int(np.linalg.matrix_rank(rows / np.where(lengths > 0, lengths, 1), rtol=INDEPENDENT))
 
 
-class Interface:
-    """The interface coordinates of one body in one system. nodes: NodeIndex by name."""
+@dataclass(frozen=True)
+class _Map:
+    """y = R q + c in one level. rows: R (m, s). offset: c (m,). inverse: the pseudo-inverse of R^T (m, s)."""
 
-    def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray]) -> None:
+    rows: np.ndarray
+    offset: np.ndarray
+    inverse: np.ndarray
+
+
+class Interface:
+    """The interface coordinates of one body in one system.
+
+    nodes: NodeIndex by name. most: levels of which R and c are kept.
+    """
+
+    def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray], most: int) -> None:
         self.nodes: dict[str, Any] = {}
         self._name = name
         self._rows = np.array(list(rows.values()))
         self._names = tuple(rows)
         self._ties: list[Any] = []
-        self._known: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
-        self._inverses: dict[tuple[int, ...], np.ndarray] = {}  # of R^T, by closed contacts as above
+        self._known: Recent[tuple[int, ...], _Map] = Recent(most)
         self._mbs = mbs
 
     def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
@@ -122,19 +135,23 @@ class Interface:
 
     def of(self, stepped: SteppedLevel) -> tuple[np.ndarray, np.ndarray]:
         """R (m, s) and c (m,) of a level."""
-        if stepped.closed not in self._known:
-            level = stepped.loaded.level
-            rows = np.zeros((len(self._rows), stepped.size))
-            rows[:, : level.modes] = self._rows @ level.shapes
-            if _rank(rows) < len(rows):
-                raise MultiPhiValueError(
-                    f"interface of {self._name!r}: got {len(rows)} points that {level.modes} modes do not tell "
-                    f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
-                )
-            offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
-            self._known[stepped.closed] = rows, offset
-            self._inverses[stepped.closed] = np.linalg.pinv(rows.T)
-        return self._known[stepped.closed]
+        found = self._map(stepped)
+        return found.rows, found.offset
+
+    def _map(self, stepped: SteppedLevel) -> _Map:
+        return self._known.made(stepped.closed, lambda: self._new_map(stepped))
+
+    def _new_map(self, stepped: SteppedLevel) -> _Map:
+        level = stepped.loaded.level
+        rows = np.zeros((len(self._rows), stepped.size))
+        rows[:, : level.modes] = self._rows @ level.shapes
+        if _rank(rows) < len(rows):
+            raise MultiPhiValueError(
+                f"interface of {self._name!r}: got {len(rows)} points that {level.modes} modes do not tell "
+                f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
+            )
+        offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
+        return _Map(rows, offset, np.linalg.pinv(rows.T))
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
@@ -179,6 +196,5 @@ class Interface:
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
-        (old, _), (new, _) = self.of(given), self.of(wanted)
-        acting = self._inverses[given.closed] @ force
-        return np.asarray(force + acting @ (new - old))
+        old, new = self._map(given), self._map(wanted)
+        return np.asarray(force + (old.inverse @ force) @ (new.rows - old.rows))
