@@ -12,10 +12,11 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.study.comparison import plots
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
 from multiphi_exudyn.study.comparison.contact_totals import contact_totals
-from multiphi_exudyn.study.comparison.findings import engineering, findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene

@@ -6,10 +6,11 @@ from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError
 from multiphi_exudyn.study.comparison.compare import compare, summary
-from multiphi_exudyn.study.comparison.findings import findings, percent
+from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scene_laws import described_laws

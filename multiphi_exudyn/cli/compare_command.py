@@ -12,10 +12,11 @@ import numpy as np
 from tqdm import tqdm
 
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.files import results_folder, write_whole
 from multiphi_exudyn.study.scene.mechanics import mechanics_of

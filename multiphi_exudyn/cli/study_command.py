@@ -11,7 +11,7 @@ from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.accuracy.study_csv import csv_text
 from multiphi_exudyn.study.accuracy.study_report import render_study
-from multiphi_exudyn.study.comparison.findings import percent, seconds, times
+from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.files import results_folder, write_whole
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store

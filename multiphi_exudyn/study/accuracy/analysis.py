@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
-from multiphi_exudyn.study.comparison.findings import seconds
+from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.measures.spectra import Map
 from multiphi_exudyn.study.sweep.store import Row, key_of
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.analysis import StudyResult, words
-from multiphi_exudyn.study.comparison.findings import percent
+from multiphi_exudyn.study.comparison.wording import percent
 
 __all__ = ["budget_asked", "budget_outcome"]
 

@@ -20,8 +20,8 @@ from matplotlib.transforms import Transform
 
 from multiphi_exudyn.study.accuracy.along_axis import FINEST
 from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, StudyResult, full_methods, names_of, settings
-from multiphi_exudyn.study.comparison.findings import seconds
 from multiphi_exudyn.study.comparison.plots import CONTACT, RESOLUTION, WIDTH
+from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = [
     "COLOURS",

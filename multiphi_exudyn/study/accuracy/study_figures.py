@@ -44,7 +44,7 @@ from multiphi_exudyn.study.accuracy.figure_style import (
     value_axis,
 )
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
-from multiphi_exudyn.study.comparison.findings import seconds
+from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_figure"]
 

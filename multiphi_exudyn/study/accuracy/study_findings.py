@@ -25,7 +25,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
 )
 from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
 from multiphi_exudyn.study.accuracy.frequency_findings import frequency_asked, frequency_outcome
-from multiphi_exudyn.study.comparison.findings import percent, seconds, times
+from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 
 __all__ = [
     "Choice",

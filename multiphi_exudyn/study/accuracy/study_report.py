@@ -40,8 +40,8 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     shown_points,
     timing_words,
 )
-from multiphi_exudyn.study.comparison.findings import percent, seconds, times
 from multiphi_exudyn.study.comparison.plots import png
+from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.measures import metrics
 
 __all__ = ["render_study"]

@@ -22,8 +22,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 from multiphi_exudyn.study.comparison.film import FRAME_RATE, Film, Line, Stop, Take
-from multiphi_exudyn.study.comparison.findings import seconds
 from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, FULL, REFERENCE, panels
+from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["frame_count", "frames", "gif"]
 

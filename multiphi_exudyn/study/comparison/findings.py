@@ -13,13 +13,14 @@ from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting
+from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.scene_laws import described_laws
 from multiphi_exudyn.study.scene.scene_loads import described_loads
 
-__all__ = ["Findings", "findings", "percent", "seconds", "times"]
+__all__ = ["Findings", "findings"]
 
 GONE = 0.05  # NRMSE above which a pointwise comparison says little
 MUCH = 0.02  # of the initial energy lost to truncation: worth a word
@@ -43,41 +44,6 @@ def findings(comparison: Comparison) -> Findings:
         distrust=tuple(_distrust(comparison)),
         key_figures=tuple(_key_figures(comparison)),
     )
-
-
-def percent(value: float | None) -> str:
-    """A share: "12.6 %", "2.32 %", below 0.1 % one figure."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    share = 100 * value
-    if abs(share) < 0.1:
-        return f"{share:.1g} %"
-    return f"{share:.1f} %" if abs(share) >= 10 else f"{share:.2f} %"
-
-
-def seconds(value: float | None) -> str:
-    """A time with the unit that reads best."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    for scale, unit in ((1.0, "s"), (1e-3, "ms")):
-        if abs(value) >= scale:
-            return f"{value / scale:.3g} {unit}"
-    return f"{value * 1e6:.3g} µs"
-
-
-def times(value: float | None) -> str:
-    """A ratio: "812 times"."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{value:.0f} times" if value >= 10 else f"{value:.2g} times"
-
-
-def engineering(value: float) -> str:
-    """1e6 -> "1 M", with a prefix from kilo to giga."""
-    for scale, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if value >= scale:
-            return f"{value / scale:g} {prefix}"
-    return f"{value:g} "
 
 
 def first_of(comparison: Comparison, kind: str) -> ModelRun | None:

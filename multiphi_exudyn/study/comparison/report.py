@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from multiphi_exudyn.study.comparison import contact_plots, plots
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotals, contact_totals
-from multiphi_exudyn.study.comparison.findings import findings, percent, seconds, times
+from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
+from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.measures import metrics
 from reference_models.rig import rig
 

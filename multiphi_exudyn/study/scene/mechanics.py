@@ -26,28 +26,30 @@ from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, Ray
 from multiphi_exudyn.study.scene.fields import numbered
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
-    BeamSpec,
-    BeamsStructure,
     CraigBamptonModel,
     DampingSpec,
     DisplacedStart,
     FullModel,
     GlobalBasisModel,
-    MatrixFiles,
-    MatrixStructure,
     ModalDampingSpec,
-    PointRow,
-    RectangleSection,
     ReducedModel,
-    RigStructure,
-    SectionSpec,
     StepwiseModel,
-    StructureSpec,
     UserObjectModel,
 )
 from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+from multiphi_exudyn.study.scene.structure_tables import (
+    BeamSpec,
+    BeamsStructure,
+    MatrixFiles,
+    MatrixStructure,
+    PointRow,
+    RectangleSection,
+    RigStructure,
+    SectionSpec,
+    StructureSpec,
+)
 from reference_models.beams import Beams, as_beams
 from reference_models.rig import assumptions, published_override, rig_beam, rig_contact, rig_damping
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from multiphi_exudyn.study.comparison.findings import percent, seconds
+from multiphi_exudyn.study.comparison.wording import percent, seconds
 from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
 from multiphi_exudyn.study.stability.outcome import CaseResult
 from multiphi_exudyn.study.stability.summary import failures, headline, summaries

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from multiphi_exudyn.study.comparison.findings import seconds
+from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.summary import headline
 

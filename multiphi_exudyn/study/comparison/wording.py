@@ -1,0 +1,42 @@
+"""Numbers in words: shares, times and ratios as a reader takes them in."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["engineering", "percent", "seconds", "times"]
+
+
+def percent(value: float | None) -> str:
+    """A share: "12.6 %", "2.32 %", below 0.1 % one figure."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    share = 100 * value
+    if abs(share) < 0.1:
+        return f"{share:.1g} %"
+    return f"{share:.1f} %" if abs(share) >= 10 else f"{share:.2f} %"
+
+
+def seconds(value: float | None) -> str:
+    """A time with the unit that reads best."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    for scale, unit in ((1.0, "s"), (1e-3, "ms")):
+        if abs(value) >= scale:
+            return f"{value / scale:.3g} {unit}"
+    return f"{value * 1e6:.3g} µs"
+
+
+def times(value: float | None) -> str:
+    """A ratio: "812 times"."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.0f} times" if value >= 10 else f"{value:.2g} times"
+
+
+def engineering(value: float) -> str:
+    """1e6 -> "1 M", with a prefix from kilo to giga."""
+    for scale, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if value >= scale:
+            return f"{value / scale:g} {prefix}"
+    return f"{value:g} "
