@@ -14,8 +14,8 @@ CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
-DIFFERENCE = 1e-3  # of a level's potential at rest: energies are differences of it, with 1e-3 of CLOSES for round-off
-PASSED = 1e-5  # the same of the open level, which a start passes through: a few round-offs of its potential
+DIFFERENCE = 1e-3  # of a level's potential: energies are differences of it, with 1e-3 of CLOSES for round-off
+PASSED = 1e-5  # the same of what a start or an instant passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
@@ -51,9 +51,16 @@ def largest_energy(run, segments):
     times = np.unique([time for segment in segments for time in (segment.start, segment.end)])
     stored = np.max(np.abs(run.energy(times)))
     work = np.max(np.abs(_work(run, times)))
-    rests = DIFFERENCE * max(abs(segment.level.asymptotic.potential) for segment in segments)
+    rests = DIFFERENCE * max(map(_potential, segments))
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
+    passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST, rests, passed)
+
+
+def _potential(segment):
+    """The larger one [J] of a level at rest, and where a segment starts: there a varying load has its present value."""
+    start = segment.modal(np.array([segment.start]))[:, 0]
+    return max(abs(segment.level.asymptotic.potential), abs(segment.level.potential(start)))
 
 
 def ledger(run, scale):
