@@ -39,6 +39,7 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     _check(base, squares, vectors, supports, accuracy)
     damping = base.resistance(closed)
     gap_rows = cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
+    gap_rows[np.isin(base.rays, [base.rays[i] for i in held])] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
         closed=tuple(base.contacts[i].name for i in closed),
@@ -51,6 +52,7 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
+        computed=squares,
     )
 
 

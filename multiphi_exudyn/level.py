@@ -34,7 +34,7 @@ class LevelOverride:
 
     The paper's own way of giving measured modal data per level. What is overridden is no longer one physical
     (M, C, K): such a level does not interlace, and a transition into it need not lower the energy. Static deflections
-    stay the computed ones; to a load that varies the kept modes answer with the given frequencies.
+    stay the computed ones, also those that a slowly varying load goes through.
     """
 
     frequencies: Sequence[float] | None = None
@@ -76,6 +76,7 @@ class Level:
     gap_rows: (c, r), gap_i = gap_rows[i].eta + ... for every contact of the model.
     force_rows, force_rate_rows: (k, r), contact force of the closed contacts from eta and eta'.
     neutral: (m, z), the zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
+    computed: omega^2 (r,) of M and K themselves; ``squares`` differ where they are overridden.
     """
 
     closed: tuple[str, ...]
@@ -88,6 +89,7 @@ class Level:
     force_rows: np.ndarray
     force_rate_rows: np.ndarray
     neutral: np.ndarray
+    computed: np.ndarray
 
     @property
     def modes(self) -> int:
@@ -155,6 +157,7 @@ class Level:
             gap_rows=self.gap_rows[:, :modes],
             force_rows=self.force_rows[:, :modes],
             force_rate_rows=self.force_rate_rows[:, :modes],
+            computed=self.computed[:modes],
         )
 
     def overridden(self, override: LevelOverride) -> Level:

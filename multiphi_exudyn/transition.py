@@ -29,7 +29,7 @@ from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
 __all__ = ["LoadedLevel", "Transition", "mixed", "nearest_admissible"]
 
-UNMIXED = 1e-15  # product of two modes, each of unit length, that is round-off of zero
+UNMIXED = 1e-15  # product of two modes of unit length, below which they have no part in each other
 
 
 @dataclass(frozen=True)
@@ -121,9 +121,10 @@ class Transition:
 
 
 def mixed(target: Level, source: Level) -> np.ndarray:
-    """T = Phi_m^T M Phi_l (r_m, r_l), zero between modes that have no part in each other.
+    """T = Phi_m^T M Phi_l (r_m, r_l), zero where the product of two modes is one round-off of their length.
 
-    Round-off in its place would give a contact at rest, which no other mode moves, a speed.
+    In its place it would give a contact at rest, which no other mode moves, a speed. The modes' own round-off, larger
+    where there are many, is not seen here.
     """
     products = target.vectors.T @ source.vectors
     return np.where(np.abs(products) <= UNMIXED, 0.0, products)

@@ -11,6 +11,9 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.driven.excitation import Excitation
+from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.transition import LoadedLevel
 
 TIMES = np.linspace(0.0, 20.0, 101)
 PLACE = np.eye(3)[1]
@@ -196,6 +199,49 @@ class TestQuasiStaticCorrection:
         ]
         assert errors[0] < 0.15
         assert errors[2] < errors[1] < errors[0]
+
+
+def driven(model, closed, load):
+    """A level under a load that varies, and what of xi = (eta, w) it is at rest in while w = 1."""
+    static = LoadedLevel.of(model.level(closed), np.zeros(model.base.modes.count))
+    level = DrivenLevel.under(static, Excitation.of(model, [load], 1.0))
+    return level, np.concatenate([level.force[:, 0] / static.level.squares, np.eye(level.excitation.channels)[0]])
+
+
+class TestAtRestUnderWhatVaries:
+    @pytest.mark.parametrize("stiffness", [1.0, 1e6, 1e9, 1e12])
+    @pytest.mark.parametrize("modes", [2, "all"])
+    def test_a_stop_that_has_moved_pushes_as_hard_as_its_spring_says(self, stiffness, modes):
+        structure = chain(6, stiffness=100.0)
+        model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m2", 0.0, stiffness)], modes)
+        level, xi = driven(model, ("stop",), mp.StopMotion("stop", mp.Harmonic(1.0, 1.0)))
+        bent = np.linalg.solve(structure.stiffness, np.eye(6)[2])
+        force = 1 / (1 / stiffness + bent[2])
+        assert_allclose(model.base.modes.shapes @ level.configuration(xi), force * bent, rtol=1e-13)
+        assert_allclose(level.level.force_rows @ xi, [force], rtol=max(1e-13, 1e-16 * stiffness))
+
+    @pytest.mark.parametrize("stiffness", [0.1, 1e-3, 1e-6, 1e-10])
+    def test_a_closed_rigid_contact_does_not_move_however_soft_the_level_is(self, stiffness):
+        """Nor does its twin: three masses hang on the one that is held by a soft spring."""
+        strain = np.diff(np.eye(5), axis=0)
+        springs = strain.T @ np.diag([7.0, stiffness, 7.0, 7.0]) @ strain + 7.0 * np.diag([1, 0, 0, 0, 0])
+        structure = mp.LinearStructure(np.eye(5), springs, points={f"m{i}": i for i in range(5)})
+        stops = [mp.UnilateralContact("one", "m1", 0.0), mp.UnilateralContact("twin", {"m1": -1.0}, 0.0)]
+        model = mp.MultiPhiModel(structure, stops, "all")
+        for at, force in (("m0", -0.5), ("m2", -1.0), ("m4", -1.0)):
+            level, xi = driven(model, ("one",), mp.HarmonicLoad(at, 1.0, 0.0))
+            assert not np.any(level.level.gap_rows)
+            assert_allclose(level.level.force_rows @ xi, [force], rtol=max(1e-12, 1e-14 / stiffness))
+
+    def test_overridden_frequencies_leave_the_static_deflection_as_it_is(self):
+        """A load that is constant is one load, static or varying."""
+        override = {(): mp.LevelOverride([0.05, 0.1])}
+        model = mp.MultiPhiModel(chain(3, stiffness=10.0), [], "all", override)
+        constant, varying = (
+            mp.simulate(model, 20.0, loads=[load])
+            for load in (mp.ConstantLoad("m1", 2.0), mp.HarmonicLoad("m1", 2.0, 0.0))
+        )
+        assert_allclose(varying.displacement(TIMES), constant.displacement(TIMES), atol=1e-12)
 
 
 class TestSmoothLoadsHoldTheirToleranceInTheResponse:

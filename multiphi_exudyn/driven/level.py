@@ -1,6 +1,6 @@
 """Levels under an excitation: what varies as prescribed coordinates, xi = (eta, w) (eqs. 38.4 to 38.6).
 
-    x = Psi eta + y_inf + R w,   R w = K_l^-1 (1 - Psi Psi^T) (b w + k h s w)  +  Y w
+    x = Psi eta + y_inf + R w,   R w = (K_l^-1 - Psi omega^-2 Psi^T) (b w + k h s w)  +  Y w
 
 w (q,) the channels, b and s their patterns and stops (driven/excitation.py). The first part is the quasi-static
 deflection of the modes left out (its inertia is neglected, its strain and the work of the load on it are not). Y holds
@@ -81,6 +81,7 @@ class DrivenLevel(LoadedLevel):
             force_rows=np.hstack([own.force_rows, parts.contact_force]),
             force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
             neutral=own.neutral,
+            computed=np.concatenate([own.computed, none]),
             speeds=np.hstack([own.gap_rows, speeds]),
         )
         return cls(
@@ -188,30 +189,52 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     rigid = np.isinf(base.stiffnesses[index])
     stops, directions = excitation.stops[index], base.directions[:, index]
     springs = np.where(rigid, 0.0, base.stiffnesses[index])
-    pressed = excitation.patterns + directions @ (springs[:, None] * stops)
-    force, beyond = level.vectors.T @ pressed, _outside(level, pressed)
-    lifted = np.where(rigid[:, None], -stops, 0.0)
-    at_rest = [level.rest(beyond[:, k], lifted[:, k]) for k in range(excitation.channels)]
-    held = [level.rest(np.zeros(base.modes.count), lifted[:, k]) for k in range(excitation.channels)]
-    carried = columns([y for _, y in held], base.modes.count)
-    total = columns([y for _, y in at_rest], base.modes.count)
-    contact_force = columns([forces for forces, _ in at_rest], len(index)) + springs[:, None] * stops
-    shapes = carried + _outside(level, total - carried)  # whatever a soft kept mode made of round-off goes
+    pushed = directions @ (springs[:, None] * stops)
+    force = level.vectors.T @ (excitation.patterns + pushed)
+    loaded, forces_loaded = _beyond(level, excitation.patterns)
+    moved, forces_moved = _at_rest(level, -stops)
+    carried, _ = _at_rest(level, np.where(rigid[:, None], -stops, 0.0))
+    centre = _centre(force, level.computed)
+    modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
+    shapes = loaded + moved + level.vectors @ modal
+    contact_force = forces_loaded + forces_moved + level.force_rows @ modal
     rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
     pinned = directions[:, rigid]
     for k, derivative in enumerate(excitation.rate_of):
         if derivative >= 0:
-            dashed = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # of dampers, at w' = 1
-            damped = base.damping @ carried[:, k] - directions @ dashed
+            dampers = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # their forces at w' = 1
+            damped = base.damping @ carried[:, k] - directions @ dampers
             force[:, derivative] -= level.vectors.T @ damped
             rate[:, derivative] -= level.vectors.T @ carried[:, k]
-            contact_force[~rigid, derivative] += dashed[~rigid]
+            contact_force[~rigid, derivative] += dampers[~rigid]
             contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
             contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
-    terms = np.abs(total) + np.abs(carried)
+    terms = np.abs(moved) + np.abs(level.vectors) @ np.abs(centre)
     return _Prescribed(shapes, terms, carried, force, rate, contact_force, contact_rate)
 
 
-def _outside(level: Level, given: np.ndarray) -> np.ndarray:
-    """(1 - Psi Psi^T) given (m, q): what the level's modes have no part in."""
-    return np.asarray(given - level.vectors @ (level.vectors.T @ given))
+def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """omega^-2 P (r, q), zero on zero-frequency modes."""
+    return np.divide(force, squares[:, None], out=np.zeros_like(force), where=squares[:, None] != 0)
+
+
+def _at_rest(level: Level, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (m, q) and contact forces (k, q) from the gaps (k, q) of closed contacts alone."""
+    nothing = np.zeros(level.base.modes.count)
+    found = [level.rest(nothing, column) if np.any(column) else (np.zeros(len(gaps)), nothing) for column in gaps.T]
+    return columns([y for _, y in found], len(nothing)), columns([forces for forces, _ in found], len(gaps))
+
+
+def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (m, q) and contact forces (k, q) of loads at rest, without the part of the level's modes.
+
+    (K_l^-1 - Psi omega^-2 Psi^T) b as K_l^-1 (1 - Psi Psi^T) b: where a kept mode is soft, both terms of the former
+    are large. What is left of its part is round-off.
+    """
+    psi = level.vectors
+    left = patterns - psi @ (psi.T @ patterns)
+    found = [level.rest(column, np.zeros(len(level.indices))) for column in left.T]
+    y = columns([y for _, y in found], len(patterns))
+    part = psi.T @ y
+    forces = columns([forces for forces, _ in found], len(level.indices))
+    return y - psi @ part, forces - level.force_rows @ part
