@@ -32,8 +32,7 @@ bases of two levels need not agree, so the rule says what happens then:
    meet at the law's centre have the same gap with opposite sign and exchange at one instant.
 
 A sign is that of the first derivative that is not round-off. All instants are roots of analytic signals, so nothing
-depends on sampling. Negative gaps that truncation leaves are measured and reported. An endless exchange at one
-instant is a failure, with its cause.
+depends on sampling. Negative gaps that truncation leaves are reported; an endless exchange is a failure, with a cause.
 """
 
 from __future__ import annotations
@@ -238,17 +237,21 @@ class EventRule(Passage):
     ) -> tuple[State, Loss, list[Change]]:
         """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level.
 
-        One of ``freed`` stays closed only with a reaction that is more than round-off of zero.
+        One of ``freed`` stays closed only with a reaction that is more than round-off of zero, and not in the level and
+        at the speed at which it fell to zero.
         """
         held = self._held(state, state.closed)
         touching = sorted(held | striking)
         released, loss = self._moved(state, self.level(compliant))
         struck, impulses, plastic = self._collided(released, touching)
+        same = np.linalg.norm(struck.velocity - released.velocity) <= RESTING * np.linalg.norm(released.velocity)
         closed = self._pressing(released, struck, touching)
         after, dropped = struck, loss + plastic
         while closed:
             after = self._at_rest_on(state, struck, compliant | closed)
             pulling = {i for i in closed if self._reaction_sign(state, struck, after.level, i) < (i in freed)}
+            if same and after.closed == state.closed:
+                pulling.update(closed.intersection(freed))
             if not pulling:
                 dropped = self._loss(state, after, released.kinetic - struck.kinetic, plastic)
                 break

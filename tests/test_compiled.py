@@ -90,6 +90,7 @@ class TestRandomModels:
     "number",
     [
         30592,  # at rest on a rigid stop when a level begins in which no other mode moves it
+        60230,  # two stops let go at nearly one instant, one of which has a twin
     ],
 )
 def test_random_cases_in_which_the_loops_once_differed(number):
