@@ -38,7 +38,7 @@ DIFFERENCE = 1e-6  # of the size of the motion: step of the finite differences, 
 TIGHTEST = 1e-12  # tolerance: below it lies the round-off of a period
 SAMPLES = 64  # of a period of the load, for the size of the motion; HIGHEST_ORDER times as many to look for extremes
 ZOOM = 32  # samples between the neighbours of an extreme,
-ZOOMS = 3  # so often: the extreme is then known to the square of 1 / (SAMPLES ZOOM^3)
+ZOOMS = 3  # so often: the extreme is then known to the square of (2 / ZOOM)^ZOOMS / SAMPLES
 
 PeriodicLoad: TypeAlias = "HarmonicLoad | BaseMotion"
 

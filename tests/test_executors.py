@@ -105,6 +105,7 @@ def test_nothing_arrives_after_a_call_that_could_not_be_stopped():
 
 TRACED = """
 import sys
+import time
 from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
 
 def work():
@@ -114,7 +115,7 @@ def forever():
     while True:
         pass
 
-for limit, call in ((60.0, work), (0.05, forever)):
+for limit, call in ((60.0, work), (0.05, forever), (0.05, lambda: time.sleep(0.2))):
     try:
         call_within(limit, call)
     except TimeLimitExceeded:
@@ -128,6 +129,17 @@ for limit, call in ((60.0, work), (0.05, forever)):
 def test_a_debugger_can_follow_what_comes_after_a_call():
     """An interpreter of version 3.11 that believes an exception to be under way never gets past a traced function."""
     subprocess.run([sys.executable, "-c", TRACED], timeout=LONG, check=True)
+
+
+def test_ctrl_c_is_not_taken_for_a_time_limit_that_arrives_at_the_same_time():
+    program = """
+import os, signal, threading, time
+from multiphi_exudyn.study.sweep.time_limit import call_within
+threading.Timer(0.3, os.kill, [os.getpid(), signal.SIGINT]).start()
+call_within(0.1, lambda: time.sleep(0.6))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], timeout=LONG, capture_output=True, text=True, check=False)
+    assert ended.stderr.rstrip().endswith("KeyboardInterrupt")
 
 
 def test_the_timer_ends_with_the_call():

@@ -47,7 +47,8 @@ ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # a modal force (s,) by the c
 class MultiPhiBody:
     """One body: its items, its present state, and what happened to it.
 
-    name, model; items: typed indices; matched_step: h [s] or None; events: of the last run, in order.
+    name, model; items: typed indices; matched_step: h [s] or None; events: of the last run, in order; coordinates: its
+    part of the system.
     """
 
     def __init__(self, name: str, motion: Motion, matched_step: float | None) -> None:
@@ -277,26 +278,26 @@ class MultiPhiBody:
     def _begin(self, mbs: Any, t: float) -> None:
         """Take state and level from the system as it stands at the start of a run."""
         self._check_settings(mbs)
-        own = self.coordinates
-        own.attach(mbs)
+        here = self.coordinates
+        here.attach(mbs)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
         self._clear = self._wait = 0
         self._motion.segments.clear()
-        stepped, (q, q_t, q_tt) = own.stepped, own.views
-        closed, phases = own.stored()
+        stepped, (q, q_t, q_tt) = here.stepped, here.views
+        closed, phases = here.stored()
         if closed != stepped.closed:  # the accelerations have been computed with stale matrices
             stepped = self._enter(mbs, closed)
-            q_tt[:] = stepped.acceleration(q, q_t, own.applied(mbs))
-        force = stepped.force(own.read())
+            q_tt[:] = stepped.acceleration(q, q_t, here.applied(mbs))
+        force = stepped.force(here.read())
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
         self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
         if fresh:  # only now the force is known, which the velocity of matched modes contains
             q_t += stepped.from_force @ force
             q_tt[:] = stepped.acceleration(q, q_t, force)
-        own.write(own.views)
+        here.write(here.views)
         r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
-        self._x = own.read()
+        self._x = here.read()
         self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
         self._sample()
         self.time = t

@@ -2,8 +2,8 @@
 
     M q'' + D q' + K q = drive + p
 
-The level whose matrices the system has is ``stepped``; p (s,) is what loads and connectors add, on the body's own node
-and on its interface.
+The level whose matrices the system has is ``stepped``; p (s,) is what the body's own varying loads add, and loads and
+connectors of the system on the body's node and on its interface.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Coordinates:
             self.interface.write(self.stepped, self.views)
 
     def load(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
-        """Give the system the matrices of a level, and the body's constant force (s,) in it."""
+        """Give the system the matrices of a level, and the force (s,) of the body's own that now acts in it."""
         self.stepped = stepped
         for parameter, value in matrices(stepped, force).items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)

@@ -85,7 +85,7 @@ def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
 
 
 @dataclass(frozen=True)
-class _Map:
+class _Reading:
     """y = R q + c in one level. rows: R (m, s). offset: c (m,). inverse: the pseudo-inverse of R^T (m, s)."""
 
     rows: np.ndarray
@@ -105,14 +105,14 @@ class Interface:
         self._rows = np.array(list(rows.values()))
         self._names = tuple(rows)
         self._ties: list[Any] = []
-        self._known: Recent[tuple[int, ...], _Map] = Recent(most)
+        self._known: Recent[tuple[int, ...], _Reading] = Recent(most)
         self._mbs = mbs
 
     def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
         """Add nodes and ties for a body whose node holds q, q' (s,) in a level."""
-        (rows, offset), mbs = self.of(stepped), self._mbs
+        found, mbs = self.of(stepped), self._mbs
         own = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node))
-        for name, row, constant in zip(self._names, rows, offset, strict=True):
+        for name, row, constant in zip(self._names, found.rows, found.offset, strict=True):
             point = mbs.AddNode(
                 NodeGenericODE2(
                     name=f"Node:{self._name}.{name}",
@@ -133,15 +133,11 @@ class Interface:
             self.nodes[name] = point
             self._ties.append(mbs.AddObject(tie))
 
-    def of(self, stepped: SteppedLevel) -> tuple[np.ndarray, np.ndarray]:
-        """R (m, s) and c (m,) of a level."""
-        found = self._map(stepped)
-        return found.rows, found.offset
+    def of(self, stepped: SteppedLevel) -> _Reading:
+        """R and c of a level."""
+        return self._known.made(stepped.closed, lambda: self._read(stepped))
 
-    def _map(self, stepped: SteppedLevel) -> _Map:
-        return self._known.made(stepped.closed, lambda: self._new_map(stepped))
-
-    def _new_map(self, stepped: SteppedLevel) -> _Map:
+    def _read(self, stepped: SteppedLevel) -> _Reading:
         level = stepped.loaded.level
         rows = np.zeros((len(self._rows), stepped.size))
         rows[:, : level.modes] = self._rows @ level.shapes
@@ -151,7 +147,7 @@ class Interface:
                 f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
             )
         offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
-        return _Map(rows, offset, np.linalg.pinv(rows.T))
+        return _Reading(rows, offset, np.linalg.pinv(rows.T))
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
@@ -180,21 +176,22 @@ class Interface:
 
     def load(self, stepped: SteppedLevel) -> None:
         """Give the ties R and c of a level."""
-        for tie, row, constant in zip(self._ties, *self.of(stepped), strict=True):
+        found = self.of(stepped)
+        for tie, row, constant in zip(self._ties, found.rows, found.offset, strict=True):
             self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
             self._mbs.SetObjectParameter(tie, "offset", [constant])
 
     def write(self, stepped: SteppedLevel, coordinates: Iterable[np.ndarray]) -> None:
         """Write y, y', y'' of q, q', q'' (s,)."""
-        rows, offset = self.of(stepped)
-        for view, values, constant in zip(self._views, coordinates, (offset, 0.0, 0.0), strict=True):
-            view[self.places] = rows @ values + constant
+        found = self.of(stepped)
+        for view, values, constant in zip(self._views, coordinates, (found.offset, 0.0, 0.0), strict=True):
+            view[self.places] = found.rows @ values + constant
 
     def modal(self, stepped: SteppedLevel, residual: np.ndarray) -> np.ndarray:
         """Modal force (s,) of what acts on y, from the forces on all coordinates of the system."""
-        return np.asarray(residual[self.places] @ self.of(stepped)[0])
+        return np.asarray(residual[self.places] @ self.of(stepped).rows)
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
-        old, new = self._map(given), self._map(wanted)
+        old, new = self.of(given), self.of(wanted)
         return np.asarray(force + (old.inverse @ force) @ (new.rows - old.rows))

@@ -13,7 +13,6 @@ function that is traced (ceval.c, DO_TRACING).
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import queue
 import threading
@@ -44,8 +43,10 @@ def call_within(seconds: float | None, call: Callable[[], T]) -> T:
         finally:
             watch.over = True
             watch.call_off()
-    except TimeLimitExceeded:
+    except TimeLimitExceeded as late:
         watch.call_off()  # the exception may have cut the first one short
+        if isinstance(late.__context__, KeyboardInterrupt):  # which it met on its way out
+            raise late.__context__ from None
         raise
 
 
@@ -66,24 +67,25 @@ class _Watch:
         """Wait for an attempt that is under way, and let arrive here what has not arrived."""
         self._left.put(None)
         with self._lock:
+            self.over = True
             raised, self._raised = self._raised, False
         if not raised:
             return
         try:
-            self._interrupt()  # in place of the one that has not arrived, or alone
             while True:
-                pass
+                self._interrupt()  # in place of the one that has not arrived, or alone
         except TimeLimitExceeded:
             pass
 
     def _watch(self) -> None:
         while not self.over:
             while (rest := self._deadline - time.perf_counter()) > 0:
-                with contextlib.suppress(queue.Empty):
-                    self._left.get(timeout=rest)
-                    return
+                try:
+                    return self._left.get(timeout=rest)
+                except queue.Empty:
+                    pass
             self._raise()
-            self._deadline += AGAIN_S
+            self._deadline = time.perf_counter() + AGAIN_S
 
     def _raise(self) -> None:
         with self._lock:
