@@ -9,7 +9,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
@@ -44,7 +44,12 @@ def solve_body_alone(
         mbs.Assemble()
         settings = _simulation_settings(t_end, steps)
         started = time.perf_counter()
-        mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+        try:
+            mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+        except Exception as error:  # Exudyn's own, around what a user function of the body has raised
+            if isinstance(error.__cause__, MultiPhiError):
+                raise error.__cause__ from None
+            raise
         elapsed = time.perf_counter() - started
         if mbs.sys["dynamicSolver"].output.simulationTimeout:
             raise NumericalFailure(f"CPU limit of {cpu_limit_s:g} s reached")

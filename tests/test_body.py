@@ -23,6 +23,7 @@ from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.transition import LoadedLevel
+from reference_models.body_alone import solve_body_alone
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 from reference_models.solver_settings import fixed_steps
 
@@ -498,3 +499,10 @@ class TestForceLawsAndViscousContacts:
             found = run(model, step, 0.06, **given)
             errors.append(np.max(np.abs(found.points["m2"] - native.at("m2", np.minimum(found.time, 0.06)))))
         assert 3.3 < errors[0] / errors[1] < 4.7
+
+
+def test_what_the_body_raises_inside_a_step_comes_out_as_it_is(refused):
+    """Its matched modes allow the step in the open level, and not in the closed one, which the run enters."""
+    model = chain([mp.UnilateralContact("stop", "m0", 0.01, 5e4)])
+    start = np.array([0.5, 0.4, 0.2])
+    refused(ValueError, "matchedStepSize: got 0.016 s", solve_body_alone, model, start, 0.32, 20, ())
