@@ -42,7 +42,11 @@ def store(tmp_path):
 @contextlib.contextmanager
 def sweeping(path, cases):
     """A program that sweeps two held cases, with the processes it starts in a group of its own."""
-    program = "import sys, json, sweep_functions; sweep_functions.sweep_held(*json.loads(sys.argv[1]))"
+    program = (
+        "import sys, json, signal, sweep_functions\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background has it ignored
+        "sweep_functions.sweep_held(*json.loads(sys.argv[1]))"
+    )
     command = [sys.executable, "-c", program, json.dumps([str(path), cases])]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as parent:
@@ -134,6 +138,7 @@ def test_a_debugger_can_follow_what_comes_after_a_call():
 def test_ctrl_c_is_not_taken_for_a_time_limit_that_arrives_at_the_same_time():
     program = """
 import os, signal, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell has put into the background
 from multiphi_exudyn.study.sweep.time_limit import call_within
 threading.Timer(0.3, os.kill, [os.getpid(), signal.SIGINT]).start()
 call_within(0.1, lambda: time.sleep(0.6))
