@@ -192,8 +192,9 @@ def _prescribed(level: Level, excitation: Excitation) -> _Prescribed:
     pushed = directions @ (springs[:, None] * stops)
     force = level.vectors.T @ (excitation.patterns + pushed)
     loaded, forces_loaded = _beyond(level, excitation.patterns)
-    moved, forces_moved = _at_rest(level, -stops)
-    carried, _ = _at_rest(level, np.where(rigid[:, None], -stops, 0.0))
+    unloaded = np.zeros_like(excitation.patterns)
+    moved, forces_moved = _at_rest(level, unloaded, -stops)
+    carried, _ = _at_rest(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
     centre = _centre(force, level.computed)
     modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
     shapes = loaded + moved + level.vectors @ modal
@@ -218,11 +219,10 @@ def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
     return np.divide(force, squares[:, None], out=np.zeros_like(force), where=squares[:, None] != 0)
 
 
-def _at_rest(level: Level, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Configurations (m, q) and contact forces (k, q) from the gaps (k, q) of closed contacts alone."""
-    nothing = np.zeros(level.base.modes.count)
-    found = [level.rest(nothing, column) if np.any(column) else (np.zeros(len(gaps)), nothing) for column in gaps.T]
-    return columns([y for _, y in found], len(nothing)), columns([forces for forces, _ in found], len(gaps))
+def _at_rest(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (m, q) and contact forces (k, q) under loads (m, q), the closed contacts with gaps (k, q)."""
+    found = [level.rest(load, gap) for load, gap in zip(loads.T, gaps.T, strict=True)]
+    return columns([y for _, y in found], len(loads)), columns([forces for forces, _ in found], len(gaps))
 
 
 def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -233,8 +233,6 @@ def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """
     psi = level.vectors
     left = patterns - psi @ (psi.T @ patterns)
-    found = [level.rest(column, np.zeros(len(level.indices))) for column in left.T]
-    y = columns([y for _, y in found], len(patterns))
+    y, forces = _at_rest(level, left, np.zeros((len(level.indices), left.shape[1])))
     part = psi.T @ y
-    forces = columns([forces for forces, _ in found], len(level.indices))
     return y - psi @ part, forces - level.force_rows @ part
