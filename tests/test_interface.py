@@ -1,5 +1,6 @@
 """Interface coordinates: what acts on points of a body acts as on the structure itself, across level changes."""
 
+import itertools
 import math
 
 import exudyn as exu
@@ -21,7 +22,7 @@ from exudyn.itemInterface import (
 from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -144,6 +145,25 @@ def test_a_constant_load_on_an_interface_coordinate_is_the_native_load(stiffness
     expected = native.at(at, np.minimum(np.arange(len(y)) * STEP, END))
     assert len(events) == len(native.events) >= 4
     assert np.linalg.norm(y[:, 0] - expected) < 1e-7 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("load", [-20.0, -10.0])
+def test_a_load_on_a_point_that_shares_mass_with_a_rigid_stop_is_the_native_load_and_in_its_reaction(load):
+    model, container = chain(math.inf, coupling=0.25), exu.SystemContainer()
+    native = mp.simulate(model, END, displacement=START, loads=[mp.ConstantLoad("m2", load)])
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, "b", displacement=START, interface=("m2",), matchedStepSize=STEP)
+    mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["m2"]), load=load))
+    mbs.Assemble()
+    mbs.SolveDynamic(settings(STEP), solverType=TRAPEZOIDAL)
+    found = body_histories(mbs, items)
+    assert [event.kind for event in found.events] == [event.kind for event in native.events]
+    held = [b.time - a.time for a, b in itertools.pairwise(native.events) if a.kind == "close"]
+    assert sum(time > STEP for time in held) >= 3
+    assert np.allclose([e.time for e in found.events], [e.time for e in native.events], rtol=0, atol=1e-12)
+    expected = native.contact_force("stop", np.minimum(found.time, END))
+    assert np.max(expected) > 1.0
+    assert np.max(np.abs(found.contact_force["stop"] - expected)) < 1e-8 * np.max(expected)
 
 
 def test_a_user_load_on_an_interface_coordinate_agrees_with_the_harmonic_load_to_1e_5():

@@ -131,6 +131,8 @@ class MultiPhiBody:
         x = self.coordinates.read()
         least, ahead, speed = self._test.at(x)
         limit = speed if speed > self._speed else self._speed
+        if self._test.directly:
+            limit += self._test.half_change(self._x, x)
         if not (least > limit and self._ahead > limit):
             self._repeat(mbs, begun, self._x, x)
             self._sample()
@@ -240,7 +242,7 @@ class MultiPhiBody:
     def _advanced(self, state: State, begun: float, force_in: ForceIn | None, to_change: bool = False) -> State:
         """The state now, or at the first event before, of the exact motion under modal forces by levels."""
         motion = self._motion
-        rule = self._rule if force_in is None else ForcedRule(self._rule, force_in)
+        rule = self._rule if force_in is None else ForcedRule(self._rule, force_in, self._direct)
 
         def centre(level: tuple[int, ...]) -> np.ndarray | float:
             return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
@@ -255,6 +257,10 @@ class MultiPhiBody:
         del motion.segments[: -motion.window - 1]
         end = self._plain(motion.state)
         return State(self._rule.level(end.closed), end.displacement + centre(end.closed), end.velocity, end.phases)
+
+    def _direct(self, closed: tuple[int, ...]) -> np.ndarray:
+        """L (k, s) in a level, see Coordinates."""
+        return self.coordinates.direct(self._stepped(closed))
 
     def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
         """Rule and state of an exact motion from a time on."""
@@ -363,8 +369,11 @@ class MultiPhiBody:
     def _new_tests(self) -> tuple[StepTest, Lookahead]:
         closed = self._state.closed
         rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
-        given = self._stepped(closed), rows, self._step
-        return StepTest(*given), Lookahead(*given)
+        given, direct = (self._stepped(closed), rows, self._step), np.zeros((len(rows), self._size))
+        for k, contact in enumerate(self._rule.ends(closed)):
+            if contact in closed:
+                direct[k] = self._direct(closed)[closed.index(contact)]
+        return StepTest(*given, direct), Lookahead(*given)
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
         return self._stepped_levels.made(

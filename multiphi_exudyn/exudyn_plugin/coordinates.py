@@ -87,6 +87,12 @@ class Coordinates:
         """A modal force (s,) of one level in another: what acts on points stays there."""
         return force if self.interface is None else self.interface.carried(force, given, wanted)
 
+    def direct(self, stepped: SteppedLevel) -> np.ndarray:
+        """L (k, s) in a level: L p is what the closed contacts carry of p beside its modes' share."""
+        if self.interface is None:
+            return np.zeros((len(stepped.closed), stepped.size))
+        return self.interface.direct(stepped)
+
     def store(self, state: State) -> None:
         """Write closed contacts and phases into the data node."""
         if "nGenericData" in self.items:

@@ -33,7 +33,9 @@ from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectC
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.items import is_constraint
+from multiphi_exudyn.exudyn_plugin.modal_force import shift
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.level import Level
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import At, LinearStructure
 
@@ -86,11 +88,15 @@ def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
 
 @dataclass(frozen=True)
 class _Reading:
-    """y = R q + c in one level. rows: R (m, s). offset: c (m,). inverse: the pseudo-inverse of R^T (m, s)."""
+    """y = R q + c in one level. rows: R (m, s). offset: c (m,). inverse: the pseudo-inverse of R^T (m, s).
+
+    direct: L (k, s), what p adds to the forces of the closed contacts beside its modes' share.
+    """
 
     rows: np.ndarray
     offset: np.ndarray
     inverse: np.ndarray
+    direct: np.ndarray
 
 
 class Interface:
@@ -146,8 +152,10 @@ class Interface:
                 f"interface of {self._name!r}: got {len(rows)} points that {level.modes} modes do not tell "
                 f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
             )
-        offset = self._rows @ level.base.modes.shapes @ stepped.loaded.asymptotic.configuration
-        return _Reading(rows, offset, np.linalg.pinv(rows.T))
+        in_base = self._rows @ level.base.modes.shapes
+        inverse = np.linalg.pinv(rows.T)
+        direct = _reactions(level, in_base, rows[:, : level.modes]) @ inverse
+        return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, inverse, direct)
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
@@ -191,7 +199,25 @@ class Interface:
         """Modal force (s,) of what acts on y, from the forces on all coordinates of the system."""
         return np.asarray(residual[self.places] @ self.of(stepped).rows)
 
+    def direct(self, stepped: SteppedLevel) -> np.ndarray:
+        """L (k, s) of a level, see ``_Reading``."""
+        return self.of(stepped).direct
+
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
         old, new = self.of(given), self.of(wanted)
         return np.asarray(force + (old.inverse @ force) @ (new.rows - old.rows))
+
+
+def _reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Reactions (k, m) of closed rigid contacts to unit forces on points, less those to the forces on the modes.
+
+    in_base, rows: the points in base coordinates (m, b) and in the level's modes (m, r).
+    """
+    gaps, found = np.zeros(len(level.indices)), np.zeros((len(level.indices), len(rows)))
+    rigid = np.isinf(level.base.stiffnesses[list(level.indices)])
+    if np.any(rigid):
+        whole = np.array([level.rest(load, gaps)[0] for load in in_base]).T
+        modal = level.force_rows @ np.array([shift(level, row) for row in rows]).T
+        found[rigid] = (whole - modal)[rigid]
+    return found

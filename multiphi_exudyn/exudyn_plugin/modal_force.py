@@ -5,7 +5,8 @@ A force p on the coordinates eta of a level only moves the centre of their motio
     eta'' + D eta' + diag(omega^2) (eta - d) = drive + p_0,   d = omega^-2 p,   p_0 the part on zero-frequency modes
 
 so a level under p is the same level with another asymptotic configuration, and the event rule holds unchanged.
-Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level holds.
+Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level holds. Where p comes
+from forces on points, a closed rigid contact also takes what no mode of its level sees of them: L p, ``direct_in``.
 """
 
 from __future__ import annotations
@@ -29,15 +30,24 @@ def shift(level: Level, force: np.ndarray) -> np.ndarray:
 
 
 class ForcedRule(EventRule):
-    """The rule ``plain`` under modal forces (s,): ``force_in`` gives them by a level's closed contacts."""
+    """The rule ``plain`` under modal forces p (s,): ``force_in`` gives them by a level's closed contacts.
 
-    def __init__(self, plain: EventRule, force_in: Callable[[tuple[int, ...]], np.ndarray]) -> None:
+    direct_in: L (k, s) in the same way.
+    """
+
+    def __init__(
+        self,
+        plain: EventRule,
+        force_in: Callable[[tuple[int, ...]], np.ndarray],
+        direct_in: Callable[[tuple[int, ...]], np.ndarray],
+    ) -> None:
         super().__init__(plain.model, plain.load)
         self._plain = plain
         self._force_in = force_in
+        self._direct_in = direct_in
 
     def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
-        return _forced(self._plain.level(closed), self._force_in(closed))
+        return _forced(self._plain.level(closed), self._force_in(closed), self._direct_in(closed))
 
 
 @dataclass(frozen=True)
@@ -52,12 +62,12 @@ class _ForcedLevel(LoadedLevel):
         return self.plain.potential(displacement + self.centre)
 
 
-def _forced(plain: LoadedLevel, force: np.ndarray) -> LoadedLevel:
+def _forced(plain: LoadedLevel, force: np.ndarray, direct: np.ndarray) -> LoadedLevel:
     level, rest, d = plain.level, plain.asymptotic, shift(plain.level, force)
     asymptotic = replace(
         rest,
         configuration=rest.configuration + level.vectors @ d,
-        forces=rest.forces + level.force_rows @ d,
+        forces=rest.forces + level.force_rows @ d + direct @ force,
         drive=rest.drive + np.where(level.squares != 0, 0.0, force[: level.modes]),
     )
     return _ForcedLevel(level, asymptotic, plain.gap_constants + level.gap_rows @ d, plain, d)

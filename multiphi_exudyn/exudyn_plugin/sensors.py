@@ -1,6 +1,6 @@
 """Sensors of a Multi-Phi body, and histories rebuilt from them after a run (eq. 38.4).
 
-    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (event_rule.py)
+    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (event_rule.py), and L p
 
 Exudyn's own node sensors record eta and its derivatives and cost next to nothing during a run. The level sensor is a
 user function: it also finds out whether the switching of levels has been replaced by another PostStep function.
@@ -138,6 +138,8 @@ def rebuilt(
         rates[:, here] = in_base @ own.vectors @ xi_t
         gaps[:, here] = own.gap_rows @ xi + loaded.gap_constants[:, None]
         pushed = own.force_rows @ xi + own.force_rate_rows @ xi_t + rest.forces[:, None]
+        outside = stepped.outside @ np.vstack([stored[here].T, np.ones(len(here))])
+        pushed += body.coordinates.direct(stepped) @ outside
         forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
     return moved, rates, gaps, forces
 

@@ -8,7 +8,8 @@ h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
 velocities: under a constant force it grows no faster than with the largest rate sigma of a growing mode (omega^2 < 0),
 mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
-looked at exactly (body.py): the test may not decide, but it does not err.
+looked at exactly (body.py): the test may not decide, but it does not err. Of a force on points s also holds L p
+(modal_force.py), of the step's mean: what stands at each end, less half its change.
 
 The states ahead of a body on which nothing acts are powers of the trapezoidal rule's matrix times the present one,
 so that one product answers for many steps at once (Lookahead).
@@ -31,12 +32,17 @@ SPACING = 0.5  # rad, the phase of the highest mode in one of them
 
 
 class StepTest:
-    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s]."""
+    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s].
 
-    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
+    direct: L (c, s) for them. directly: whether any of it counts.
+    """
+
+    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> None:
         size, count = stepped.size, len(rows)
         norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1))])
-        self._matrix = np.vstack([_conditions(stepped, rows, step, step), norm])
+        self.directly = bool(np.any(direct))
+        self._added = np.tile(direct @ stepped.outside, (3, 1)) / _scales(stepped, rows, step, step)[:, None]
+        self._matrix = np.vstack([_conditions(stepped, rows, step, step) + self._added, norm])
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
     def at(self, x: np.ndarray) -> tuple[float, float, float]:
@@ -52,6 +58,10 @@ class StepTest:
             behind, here, ahead = conditions
             return (behind if behind < here else here), (ahead if ahead < here else here), speed
         return min(conditions[: self._two], default=math.inf), min(conditions[self._one :], default=math.inf), speed
+
+    def half_change(self, before: np.ndarray, after: np.ndarray) -> float:
+        """How far L p of the mean can be from that of either end of a step, in units of the conditions."""
+        return float(np.max(np.abs(self._added @ (after - before)), initial=0.0)) / 2
 
 
 class Lookahead:
@@ -85,16 +95,27 @@ def _conditions(stepped: SteppedLevel, rows: list[Row], step: float, lasting: fl
     Each is divided by its factor of max |S z'|, which is known at the start of a time ``lasting`` [s], so that all have
     the same right-hand side.
     """
-    modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
-    along, rate, none = np.zeros((3, count, size))
-    along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
-    rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
+    along, rate = _padded(stepped, rows)
+    none = np.zeros_like(along)
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3)
-    scale = scale * swell(stepped, lasting) + np.finfo(float).tiny
     functions = np.vstack([value - third, value, value + third]) @ stepped.physical
     constants = np.tile([row.constant for row in rows], 3)
-    return np.hstack([functions, constants[:, None]]) / np.tile(scale, 3)[:, None]
+    return np.hstack([functions, constants[:, None]]) / _scales(stepped, rows, step, lasting)[:, None]
+
+
+def _scales(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float) -> np.ndarray:
+    """The factors (3 c,) of max |S z'| at the start, by which the conditions are divided."""
+    scale = HERMITE * step**4 * gains(stepped, np.hstack(_padded(stepped, rows)), 3)
+    return np.tile(scale * swell(stepped, lasting) + np.finfo(float).tiny, 3)
+
+
+def _padded(stepped: SteppedLevel, rows: list[Row]) -> tuple[np.ndarray, np.ndarray]:
+    """P and R (c, s) of functions."""
+    modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
+    along, rate = np.zeros((2, count, size))
+    along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
+    rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
+    return along, rate
 
 
 def _step_matrix(stepped: SteppedLevel, step: float) -> np.ndarray:

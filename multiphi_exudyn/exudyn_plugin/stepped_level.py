@@ -72,8 +72,8 @@ class SteppedLevel:
         return len(self.drive)
 
     def force(self, x: np.ndarray) -> np.ndarray:
-        """Modal force (s,) that acts from outside, by the equation of motion, from x = (q, q', q'', ...)."""
-        return self._total.dot(x[: 3 * self.size]) - self.drive
+        """Modal force (s,) that acts from outside, by the equation of motion, from x = (q, q', q'', 1)."""
+        return self.outside.dot(x)
 
     def acceleration(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """q'' (s,) under a modal force."""
@@ -94,6 +94,11 @@ class SteppedLevel:
         q[: len(eta)], v[: len(eta)] = eta, eta_t
         q_t = self.from_displacement @ q + self.from_velocity @ v + self.from_force @ (force + self.drive)
         return q, q_t, self.acceleration(q, q_t, force)
+
+    @functools.cached_property
+    def outside(self) -> np.ndarray:
+        """The matrix (s, 3 s + 1) of ``force``."""
+        return np.hstack([self._total, -self.drive[:, None]])
 
     @functools.cached_property
     def physical(self) -> np.ndarray:
