@@ -296,7 +296,7 @@ class EventRule(Passage):
         )
         if not np.any(resting):
             return set()
-        _, multipliers = nearest_admissible(rows[resting], state.acceleration, self._free(state.level))
+        _, multipliers = self._nearest(state.level, rows[resting], state.acceleration)
         at_rest = np.array(touching)[resting].tolist()
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         pressing = pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}

@@ -61,7 +61,7 @@ class Passage(ContactFunctions):
         """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
         rows = state.level.level.speed_rows[touching]
         free = self._free(state.level)
-        velocity, impulses = nearest_admissible(rows, state.velocity, free)
+        velocity, impulses = self._nearest(state.level, rows, state.velocity)
         before, left = np.abs(state.velocity[:free]), np.abs(velocity[:free])
         stopped = left <= RESTING * before  # round-off of rest, which would bounce and rock on until it underflows
         velocity[:free][stopped | (np.linalg.norm(left) <= RESTING * np.linalg.norm(before))] = 0.0
@@ -69,6 +69,10 @@ class Passage(ContactFunctions):
         lost = state.kinetic - after.kinetic
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
         return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
+
+    def _nearest(self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``nearest_admissible`` among the motions of a level."""
+        return nearest_admissible(rows, vector, self._free(level))
 
     @staticmethod
     def _free(level: LoadedLevel) -> int:

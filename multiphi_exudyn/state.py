@@ -99,8 +99,8 @@ class State:
 class Loss:
     """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
 
-    stop_work: what moving stops put into it by their impulses, no loss. damping: the strain of viscous contacts that
-    change inside their stop (contact.py).
+    stop_work: what moving stops, or what hangs on its points in Exudyn, put into it by impulses, no loss. damping: the
+    strain of viscous contacts that change inside their stop (contact.py).
     """
 
     impact: float = 0.0

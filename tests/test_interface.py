@@ -280,14 +280,6 @@ def mass_tied(mbs, items):
     mbs.AddObject(ObjectConnectorCoordinate(name="tie", markerNumbers=ends))
 
 
-@pytest.mark.parametrize(
-    ("attach", "told"), [(mass_on, "GenericODE2 'mass'"), (mass_tied, "ConnectorCoordinate 'tie'")]
-)
-def test_a_mass_that_would_take_part_in_impacts_is_refused(attach, told):
-    with pytest.raises(ValueError, match=f"interface of 'b': got Object{told} on it beside rigid contacts, need"):
-        run(chain(math.inf), STEP, attach)
-
-
 @pytest.mark.parametrize("stiffness", [STIFFNESS, math.inf], ids=["compliant", "rigid"])
 @pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
 def test_rates_of_interface_coordinates_are_those_of_the_body_at_every_step(stiffness, matched):
@@ -460,22 +452,9 @@ def test_what_an_interface_cannot_hold_is_refused():
         (("m7",), mp.errors.MultiPhiValueError, "point: got 'm7'"),
         ({"none": np.zeros(3)}, mp.errors.MultiPhiValueError, "a row of zeros"),
         ({3: "m2"}, mp.errors.MultiPhiTypeError, "interface: got 3"),
-        ({"a": "m2", "b": {"m2": 2.0}}, mp.errors.MultiPhiValueError, "got 'b', which moves with 'a', need"),
     ]:
         with pytest.raises(error, match=told):
             CreateMultiPhiBody(mbs, model, interface=interface)
-    for interface, told in [
-        (("m0", "m1"), r"got 'm1', which rigid contacts hold \('stop'\), need a point"),
-        ({"m0": "m0", "mean": {"m0": 1.0, "m1": 1.0}}, "got 'mean', which moves with 'm0', 'stop', need a point"),
-    ]:
-        with pytest.raises(mp.errors.MultiPhiValueError, match=told):
-            CreateMultiPhiBody(mbs, chain(math.inf), interface=interface)
-    stops = [mp.UnilateralContact(name, {"m1": way}, GAP) for name, way in (("up", -1.0), ("down", 1.0))]
-    between = mp.MultiPhiModel(model.structure, stops, modes="all")
-    assert list(CreateMultiPhiBody(mbs, between, "between", interface=("m2",))["nInterface"]) == ["m2"]
-    few = mp.MultiPhiModel(model.structure, model.contacts, modes=1)
-    with pytest.raises(mp.errors.MultiPhiValueError, match="2 points that 1 modes do not tell apart"):
-        CreateMultiPhiBody(mbs, few, interface=("m0", "m2"))
     with pytest.raises(mp.errors.MultiPhiValueError, match="got HarmonicLoad with an interface, need constant"):
         CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
     with pytest.raises(ValueError, match="need TrapezoidalIndex2"):

@@ -17,34 +17,32 @@ A load or connector at coordinate k of the node acts on mode k of whichever leve
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
-from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
+from multiphi_exudyn.exudyn_plugin.exact_step import ExactStep
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.switching import nothing_acts_on, running_solver
+from multiphi_exudyn.exudyn_plugin.surroundings import Surroundings
+from multiphi_exudyn.exudyn_plugin.switching import bodies_of, nothing_acts_on, running_solver
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.recent import Recent
-from multiphi_exudyn.state import Event, Phase, State
+from multiphi_exudyn.state import Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["MultiPhiBody"]
 
-NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
 
-ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # a modal force (s,) by the closed contacts of a level
 
-
-class MultiPhiBody:
+class MultiPhiBody(ExactStep):
     """One body: its items, its present state, and what happened to it.
 
     name, model; items: typed indices; matched_step: h [s] or None; events: of the last run, in order; coordinates: its
@@ -58,7 +56,7 @@ class MultiPhiBody:
         self.matched_step = matched_step
         self.time = math.nan
         self._motion = motion
-        self._rule = self._plain_rule()
+        self._rule: EventRule = self._plain_rule()
         self._size = self._rule.level(()).level.modes
         self._state = self._plain(motion.state)
         most = self.model.most_levels
@@ -71,11 +69,6 @@ class MultiPhiBody:
         self.coordinates = Coordinates(self.items, stepped)
         self._given = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
         self._given_events = tuple(motion.events)
-
-    @property
-    def events(self) -> list[Event]:
-        """Closings and openings with their exact times."""
-        return self._motion.events
 
     @property
     def state(self) -> State:
@@ -101,19 +94,11 @@ class MultiPhiBody:
         """Level and coordinates (.., k), with their rates, in which configurations and forces are read."""
         return stepped.loaded, eta, eta_t
 
+    # ------------------------------------------------------------------ a step
+
     def _plain_rule(self) -> EventRule:
         """The event rule under static loads."""
         return self._motion.rule
-
-    def _plain(self, state: State) -> State:
-        """A state of the motion as one of the level under static loads."""
-        return state
-
-    def _own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
-        """Modal force (s,) of the body's own varying loads at a time, in a level."""
-        return np.zeros(self._size)
-
-    # ------------------------------------------------------------------ a step
 
     def before_step(self, mbs: Any, t: float) -> None:
         """Called by Exudyn before a step that ends at t."""
@@ -187,90 +172,10 @@ class MultiPhiBody:
         self._clear = self._lookahead.steps if clear else 0
         self._wait = LOOK_AGAIN
 
-    def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
-        """Do the step from ``before`` again, exactly, and write what came out if anything happened in it.
-
-        After the event the force of the mean acts, and what the event changed in loads and connectors. Forces of
-        constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the mean.
-        """
-        here, start, known = self.coordinates, self._state, len(self.events)
-        own = here.stepped
-        given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
-        force = self._significant((own.force(before) + own.force(after) - given) / 2, after)
-        state = self._travel(before, begun, force, force, own)
-        if len(self.events) == known and state.closed == start.closed:
-            self._keep(replace(start, phases=state.phases))
-            return
-        if self._alone:
-            self._write(mbs, state, force)
-            return
-        rest = force + self._own_force(start.closed, self.time) - here.applied(mbs)
-        entered = self._stepped(state.closed)
-        self._write(mbs, state, here.carried(force, own, entered))
-        outside = here.applied(mbs) + here.carried(rest, own, entered) - self._own_force(state.closed, self.time)
-        present = self._significant(outside, after)
-        if np.any(present != force):
-            del self.events[known:]
-            self._state = start
-            self._write(mbs, self._travel(before, begun, force, present, entered), present)
-
-    def _travel(
-        self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray, given: SteppedLevel
-    ) -> State:
-        """State now, of the exact motion from ``before`` under ``force`` until a contact changes, then ``entered``.
-
-        given: the level in whose modes ``entered`` is told.
-        """
-        closed = self._state.closed
-
-        def after(level: tuple[int, ...]) -> np.ndarray:
-            return self.coordinates.carried(entered, given, self._stepped(level))
-
-        def until(level: tuple[int, ...]) -> np.ndarray:
-            return force if level == closed else after(level)
-
-        q, q_t, _ = self.coordinates.split(before)
-        eta_t = self._stepped(closed).velocity(q, q_t, force + self._own_force(closed, begun))
-        loaded = self._rule.level(closed)
-        r = loaded.level.modes
-        state = State(loaded, q[:r], eta_t[:r], self._state.phases)
-        if not (np.any(force) or np.any(entered)):
-            return self._advanced(state, begun, None)
-        changed = self._advanced(state, begun, until, to_change=entered is not force)
-        return changed if self._motion.time == self.time else self._advanced(changed, self._motion.time, after)
-
-    def _advanced(self, state: State, begun: float, force_in: ForceIn | None, to_change: bool = False) -> State:
-        """The state now, or at the first event before, of the exact motion under modal forces by levels."""
-        motion = self._motion
-        rule = self._rule if force_in is None else ForcedRule(self._rule, force_in, self._direct)
-
-        def centre(level: tuple[int, ...]) -> np.ndarray | float:
-            return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
-
-        shifted = replace(state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed))
-        motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
-        motion.advance(self.time, to_change)
-        if motion.message:
-            raise NumericalFailure(f"body {self.name!r}: {motion.message}")
-        if motion.time == self.time:
-            motion.segments.pop()  # those that remain end with events: the chatter check counts them
-        del motion.segments[: -motion.window - 1]
-        end = self._plain(motion.state)
-        return State(self._rule.level(end.closed), end.displacement + centre(end.closed), end.velocity, end.phases)
-
-    def _direct(self, closed: tuple[int, ...]) -> np.ndarray:
-        """L (k, s) in a level, see Coordinates."""
-        return self.coordinates.direct(self._stepped(closed))
-
-    def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
-        """Rule and state of an exact motion from a time on."""
-        return rule, state
-
-    def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """The modal force; zeros where it is what an iterative solver leaves of the accelerations in x, and alone."""
-        q_tt = x[2 * self._size : -1]
-        acts = not self._alone and force.dot(force) > NEGLIGIBLE**2 * q_tt.dot(q_tt)
-        return force if acts else np.zeros(self._size)
+    def look_again(self) -> None:
+        """Take the present state as the start of the next step: another body's event may have moved this one."""
+        if not self._clear:
+            self._sample()
 
     # ------------------------------------------------------------------ start of a run
 
@@ -286,6 +191,8 @@ class MultiPhiBody:
         self._check_settings(mbs)
         here = self.coordinates
         here.attach(mbs)
+        if here.surroundings is not None and any(contact.rigid for contact in self.model.contacts):
+            self._check_impacts(mbs, here.surroundings)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
         self._clear = self._wait = 0
         self._motion.segments.clear()
@@ -294,7 +201,7 @@ class MultiPhiBody:
         if closed != stepped.closed:  # the accelerations have been computed with stale matrices
             stepped = self._enter(mbs, closed)
             q_tt[:] = stepped.acceleration(q, q_t, here.applied(mbs))
-        force = stepped.force(here.read())
+        force = here.force(here.read())[: self._size]
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
         self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
         if fresh:  # only now the force is known, which the velocity of matched modes contains
@@ -319,8 +226,24 @@ class MultiPhiBody:
             raise MultiPhiValueError(
                 f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )
-        if self.coordinates.interface is not None and any(contact.rigid for contact in self.model.contacts):
-            self.coordinates.interface.check_impacts()
+
+    def _check_impacts(self, mbs: Any, surroundings: Surroundings) -> None:
+        """Raises for what cannot be struck together with the body."""
+        attached = surroundings.mark()
+        fresh = np.array_equal(self.coordinates.views[:2], self._given[:2])
+        struck = fresh and any(event.impulse > 0 for event in self._given_events)
+        if struck and np.any(attached.resistance(np.eye(len(attached.mass)))):
+            raise MultiPhiValueError(
+                f"start of {self.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
+                "interface, need one that does not strike at the start"
+            )
+        for other in bodies_of(mbs).values():
+            rigid = any(contact.rigid for contact in other.model.contacts)
+            if other is not self and rigid and mbs.GetNodeODE2Index(other.items["nGenericODE2"]) in surroundings.struck:
+                raise MultiPhiValueError(
+                    f"interface of {self.name!r}: got a constraint to body {other.name!r}, both with rigid contacts, "
+                    "need compliant ones, a spring between, or both structures in one model (assemble)"
+                )
 
     def check_called(self, mbs: Any, t: float) -> None:
         """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""
@@ -335,12 +258,11 @@ class MultiPhiBody:
     # ------------------------------------------------------------------ levels in Exudyn
 
     def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
-        """Put a state at the end of a step into the system, with the acceleration under a modal force."""
         stepped = self.coordinates.stepped
         if state.closed != stepped.closed:
             stepped = self._enter(mbs, state.closed)
         force = force + self._own_force(state.closed, self.time)
-        self.coordinates.write(stepped.state(state.displacement, state.velocity, force))
+        self.coordinates.write(stepped.state(state.displacement, state.velocity, force[: self._size]))
         self._keep(state)
 
     def _enter(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
@@ -358,7 +280,6 @@ class MultiPhiBody:
         return stepped
 
     def _keep(self, state: State) -> None:
-        """Remember a state, choose its test, and write its level into the data node."""
         self._state = state
         self._choose_test()
         self.coordinates.store(state)
@@ -369,10 +290,11 @@ class MultiPhiBody:
     def _new_tests(self) -> tuple[StepTest, Lookahead]:
         closed = self._state.closed
         rows = [self._rule.function(self._state.level, contact) for contact in self._rule.ends(closed)]
-        given, direct = (self._stepped(closed), rows, self._step), np.zeros((len(rows), self._size))
+        given, known = (self._stepped(closed), rows, self._step), self._direct(closed)
+        direct = np.zeros((len(rows), known.shape[1]))
         for k, contact in enumerate(self._rule.ends(closed)):
             if contact in closed:
-                direct[k] = self._direct(closed)[closed.index(contact)]
+                direct[k] = known[closed.index(contact)]
         return StepTest(*given, direct), Lookahead(*given)
 
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:

@@ -56,10 +56,10 @@ def CreateMultiPhiBody(
     with matchedStepSize an error. show: as in other Create functions. drawing: None, or
     how the renderer shows the body.
 
-    Returns typed indices: nInterface ({name: NodeIndex}, one coordinate each, only if asked for), nGenericODE2,
-    oGenericODE2, nGenericData (not without contacts), sCoordinates,
-    sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
-    and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
+    Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, one coordinate each, and
+    {name: SensorIndex}, the force on it), nGenericODE2, oGenericODE2, nGenericData (not without contacts),
+    sCoordinates, sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into
+    displacements and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
     """
     if not isinstance(mbs, exu.MainSystem):
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an Exudyn MainSystem")
@@ -75,7 +75,7 @@ def CreateMultiPhiBody(
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
-    rows = interface_rows(model.structure, model.contacts, interface)
+    rows = interface_rows(model.structure, interface)
     body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
     if rows and isinstance(body, DrivenBody):
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
@@ -158,4 +158,4 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
 def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, rows, body.model.most_levels)
     interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
-    body.items["nInterface"] = interface.nodes
+    body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors

@@ -136,7 +136,8 @@ def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.nda
         values = mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, shown)
         closed = values[: len(body.model.contacts)] > 0.5
     time = np.array([mbs.systemData.GetTime(shown)])
-    moved, *_ = rebuilt(body, rows, closed[None, :], time, np.concatenate(stored)[None, :])
+    none = np.zeros((body.coordinates.points, 1))  # forces on points are not drawn
+    moved, *_ = rebuilt(body, rows, closed[None, :], time, np.concatenate(stored)[None, :], none)
     return moved[:, 0], closed
 
 

@@ -9,30 +9,28 @@ ObjectConnectorCoordinateVector per point holds the equation. At a transition R 
 written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
 velocity (stepped_level.py).
 
-Within the step of an event the f of its mean acts before the event, and after it with what the event changed in loads
-and connectors: exact for a force that is constant, of second order for one that varies (single halvings of the step
-scatter about it, as the place of an event in its step changes too), of first order where a contact damper makes the
-force of a constraint or of a mass on y jump. f comes from p, so the rows must be independent in
-every level; a point that rigid contacts hold has no p there and is refused, while its neighbours and compliant contacts
-are not. The modes are those of free points: one whose motion is prescribed takes more of them.
+f comes from the multipliers of the ties, so points may depend on each other, and a rigid contact may hold one. Within
+the step of an event the f of its mean acts before the event, and after it with what the event changes in reactions,
+loads, connectors and inertia (exact_step.py): exact for a force that is constant, of second order for one that varies
+(single halvings of the step scatter about it, as the place of an event in its step changes too). The modes are those of
+free points: one whose motion is prescribed takes more of them.
 
-An impact on a rigid contact is one of the body alone: springs and dampers on y are no part of it, being finite, but a
-mass on y or a constraint would be, and is refused beside rigid contacts. Compliant ones have no impacts.
+An impact on a rigid contact is one of the body with all that masses and constraints tie to its points (attached.py);
+springs and dampers are no part of it, being finite.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
 import numpy as np
-from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector
+from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector, SensorObject
 
-from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.base import Base
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.items import is_constraint
 from multiphi_exudyn.exudyn_plugin.modal_force import shift
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.level import Level
@@ -41,12 +39,8 @@ from multiphi_exudyn.structure import At, LinearStructure
 
 __all__ = ["Interface", "interface_rows"]
 
-INDEPENDENT = 1e-9  # of the largest singular value of rows of unit length: less is rounding of their coefficients
 
-
-def interface_rows(
-    structure: LinearStructure, contacts: Iterable[UnilateralContact], given: Iterable[str] | Mapping[str, At]
-) -> dict[str, np.ndarray]:
+def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[str, At]) -> dict[str, np.ndarray]:
     """Rows (n,) by the names of interface coordinates, from names of points or {name: point or row}."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
@@ -58,59 +52,35 @@ def interface_rows(
     for name, row in rows.items():
         if not np.any(row):
             raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
-    rigid = {c.name: structure.row(c.direction) for c in contacts if c.rigid}
-    known = list(rigid.values())
-    for name, row in rows.items():
-        if _rank([*known, row]) == _rank(known):
-            raise MultiPhiValueError(_dependent(name, row, {n: r for n, r in rows.items() if n != name}, rigid))
-        known.append(row)
     return rows
-
-
-def _dependent(name: str, row: np.ndarray, others: Mapping[str, np.ndarray], rigid: Mapping[str, np.ndarray]) -> str:
-    """What to say of a point that depends on others and rigid contacts."""
-    held = _rank([*rigid.values(), row]) == _rank(list(rigid.values()))
-    by = f"which rigid contacts hold ({_listed(rigid)})" if held else f"which moves with {_listed([*others, *rigid])}"
-    return f"interface: got {name!r}, {by}, need a point that depends on no other and on no rigid contact"
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(map(repr, names))
-
-
-def _rank(rows: Sequence[np.ndarray] | np.ndarray) -> int:
-    """How many rows (n,) are independent."""
-    if len(rows) == 0:
-        return 0
-    lengths = np.linalg.norm(rows, axis=1, keepdims=True)
-    return int(np.linalg.matrix_rank(rows / np.where(lengths > 0, lengths, 1), rtol=INDEPENDENT))
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """y = R q + c in one level. rows: R (m, s). offset: c (m,). inverse: the pseudo-inverse of R^T (m, s).
+    """y = R q + c in one level. rows: R (m, s). offset: c (m,).
 
-    direct: L (k, s), what p adds to the forces of the closed contacts beside its modes' share.
+    direct: L (k, m), what f adds to the forces of the closed contacts beside its modes' share.
     """
 
     rows: np.ndarray
     offset: np.ndarray
-    inverse: np.ndarray
     direct: np.ndarray
 
 
 class Interface:
     """The interface coordinates of one body in one system.
 
-    nodes: NodeIndex by name. most: levels of which R and c are kept.
+    nodes: NodeIndex by name. sensors: of f, by name. ties: the objects that hold the equation. most: levels of which R
+    and c are kept.
     """
 
     def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray], most: int) -> None:
         self.nodes: dict[str, Any] = {}
+        self.sensors: dict[str, Any] = {}
         self._name = name
         self._rows = np.array(list(rows.values()))
         self._names = tuple(rows)
-        self._ties: list[Any] = []
+        self.ties: list[Any] = []
         self._known: Recent[tuple[int, ...], _Reading] = Recent(most)
         self._mbs = mbs
 
@@ -137,7 +107,16 @@ class Interface:
                 offset=[constant],
             )
             self.nodes[name] = point
-            self._ties.append(mbs.AddObject(tie))
+            self.ties.append(mbs.AddObject(tie))
+            self.sensors[name] = mbs.AddSensor(
+                SensorObject(
+                    name=f"Sensor:{self._name}.{name}",
+                    objectNumber=self.ties[-1],
+                    outputVariableType=exu.OutputVariableType.Force,
+                    storeInternal=True,
+                    writeToFile=False,
+                )
+            )
 
     def of(self, stepped: SteppedLevel) -> _Reading:
         """R and c of a level."""
@@ -147,45 +126,30 @@ class Interface:
         level = stepped.loaded.level
         rows = np.zeros((len(self._rows), stepped.size))
         rows[:, : level.modes] = self._rows @ level.shapes
-        if _rank(rows) < len(rows):
-            raise MultiPhiValueError(
-                f"interface of {self._name!r}: got {len(rows)} points that {level.modes} modes do not tell "
-                f"apart, need fewer points or more modes with {', '.join(level.closed) or 'no contact'} closed"
-            )
-        in_base = self._rows @ level.base.modes.shapes
-        inverse = np.linalg.pinv(rows.T)
-        direct = _reactions(level, in_base, rows[:, : level.modes]) @ inverse
-        return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, inverse, direct)
+        in_base = self.in_base(level.base)
+        direct = _reactions(level, in_base, rows[:, : level.modes])
+        return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, direct)
+
+    def in_base(self, base: Base) -> np.ndarray:
+        """The points (m, b) in base coordinates."""
+        return np.asarray(self._rows @ base.modes.shapes)
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
         self.places = np.array([self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()])
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        self.multipliers = [row for tie in self.ties for row in self._mbs.systemData.GetObjectLTGAE(tie)]
+        self._forces = state["AECoords"]
 
-    def check_impacts(self) -> None:
-        """Raises for a mass or a constraint on y, which would take part in impacts."""
-        data, own = self._mbs.systemData, {int(tie) for tie in self._ties}
-        markers = (self._mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
-        on_y = {i for i, marker in enumerate(markers) if self._acted_on([marker.get("nodeNumber")])}
-        for i in set(range(data.NumberOfObjects())) - own:
-            item = self._mbs.GetObject(exu.ObjectIndex(i))
-            tied = (
-                is_constraint(item) and item["activeConnector"] and on_y.intersection(map(int, item["markerNumbers"]))
-            )
-            if tied or (self._acted_on(item.get("nodeNumbers", ())) and np.any(item.get("massMatrix", 0.0))):
-                raise MultiPhiValueError(
-                    f"interface of {self._name!r}: got Object{item['objectType']} {item['name']!r} on it beside rigid "
-                    "contacts, need compliant contacts, the mass as part of the structure, or a spring between"
-                )
-
-    def _acted_on(self, nodes: Iterable[Any]) -> bool:
-        """Whether one of some nodes is an interface coordinate."""
-        return any(node is not None and int(node) in map(int, self.nodes.values()) for node in nodes)
+    @property
+    def forces(self) -> np.ndarray:
+        """f (m,) in the system's current state."""
+        return np.asarray(self._forces[self.multipliers])
 
     def load(self, stepped: SteppedLevel) -> None:
         """Give the ties R and c of a level."""
         found = self.of(stepped)
-        for tie, row, constant in zip(self._ties, found.rows, found.offset, strict=True):
+        for tie, row, constant in zip(self.ties, found.rows, found.offset, strict=True):
             self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
             self._mbs.SetObjectParameter(tie, "offset", [constant])
 
@@ -195,18 +159,15 @@ class Interface:
         for view, values, constant in zip(self._views, coordinates, (found.offset, 0.0, 0.0), strict=True):
             view[self.places] = found.rows @ values + constant
 
-    def modal(self, stepped: SteppedLevel, residual: np.ndarray) -> np.ndarray:
-        """Modal force (s,) of what acts on y, from the forces on all coordinates of the system."""
-        return np.asarray(residual[self.places] @ self.of(stepped).rows)
-
-    def direct(self, stepped: SteppedLevel) -> np.ndarray:
-        """L (k, s) of a level, see ``_Reading``."""
-        return self.of(stepped).direct
-
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
-        """A modal force (s,) of one level in another: f by least squares, its rest mode by mode."""
-        old, new = self.of(given), self.of(wanted)
-        return np.asarray(force + (old.inverse @ force) @ (new.rows - old.rows))
+        """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""
+        change = self.of(wanted).rows - self.of(given).rows
+        return self.added(force, force[given.size :] @ change)
+
+    @staticmethod
+    def added(force: np.ndarray, modal: np.ndarray) -> np.ndarray:
+        """(p, f) with more of p (s,)."""
+        return np.concatenate([force[: len(modal)] + modal, force[len(modal) :]])
 
 
 def _reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ A force p on the coordinates eta of a level only moves the centre of their motio
 
 so a level under p is the same level with another asymptotic configuration, and the event rule holds unchanged.
 Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level holds. Where p comes
-from forces on points, a closed rigid contact also takes what no mode of its level sees of them: L p, ``direct_in``.
+from forces f on points, a closed rigid contact also takes what no mode of its level sees of them: L f.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def shift(level: Level, force: np.ndarray) -> np.ndarray:
 
 
 class ForcedRule(EventRule):
-    """The rule ``plain`` under modal forces p (s,): ``force_in`` gives them by a level's closed contacts.
+    """The rule ``plain`` under forces (p, f) (s + m,): ``force_in`` gives them by a level's closed contacts.
 
-    direct_in: L (k, s) in the same way.
+    direct_in: L (k, m) in the same way.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ def _forced(plain: LoadedLevel, force: np.ndarray, direct: np.ndarray) -> Loaded
     asymptotic = replace(
         rest,
         configuration=rest.configuration + level.vectors @ d,
-        forces=rest.forces + level.force_rows @ d + direct @ force,
+        forces=rest.forces + level.force_rows @ d + direct @ force[len(force) - direct.shape[1] :],
         drive=rest.drive + np.where(level.squares != 0, 0.0, force[: level.modes]),
     )
     return _ForcedLevel(level, asymptotic, plain.gap_constants + level.gap_rows @ d, plain, d)

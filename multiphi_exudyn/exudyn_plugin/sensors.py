@@ -1,6 +1,6 @@
 """Sensors of a Multi-Phi body, and histories rebuilt from them after a run (eq. 38.4).
 
-    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (event_rule.py), and L p
+    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (event_rule.py), and L f
 
 Exudyn's own node sensors record eta and its derivatives and cost next to nothing during a run. The level sensor is a
 user function: it also finds out whether the switching of levels has been replaced by another PostStep function.
@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 
 __all__ = ["BodyHistories", "add_sensors", "body_histories", "rebuilt"]
 
+RECORDED = {
+    "sCoordinates": exu.OutputVariableType.Coordinates,
+    "sCoordinates_t": exu.OutputVariableType.Coordinates_t,
+    "sCoordinates_tt": exu.OutputVariableType.Coordinates_tt,
+}
+
 
 @dataclass(frozen=True)
 class BodyHistories:
@@ -47,12 +53,6 @@ class BodyHistories:
 
 def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:
     """Sensors of the node's coordinates and of the level; all are kept in memory, none is written to a file."""
-    outputs = exu.OutputVariableType
-    recorded = {
-        "sCoordinates": outputs.Coordinates,
-        "sCoordinates_t": outputs.Coordinates_t,
-        "sCoordinates_tt": outputs.Coordinates_tt,
-    }
     items = {
         key: mbs.AddSensor(
             SensorNode(
@@ -63,7 +63,7 @@ def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:
                 writeToFile=False,
             )
         )
-        for key, variable in recorded.items()
+        for key, variable in RECORDED.items()
     }
     if "nGenericData" in body.items:
         items["sLevel"] = mbs.AddSensor(_level_sensor(body))
@@ -88,7 +88,8 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     points: names to rebuild, None for all of the structure.
     """
     body = _body_of(mbs, items)
-    table = {key: mbs.GetSensorStoredData(items[key]) for key in items if key.startswith("s")}
+    on_points = [mbs.GetSensorStoredData(sensor)[:, 1] for sensor in items.get("sInterface", {}).values()]
+    table = {key: mbs.GetSensorStoredData(items[key]) for key in (*RECORDED, "sLevel") if key in items}
     time = table["sCoordinates"][:, 0]
     if len(time) == 0:
         raise MultiPhiValueError("sensors: got no stored data, need a run of SolveDynamic before")
@@ -96,8 +97,8 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     flags = table["sLevel"][:, 1 : 1 + len(contacts)] > 0.5 if contacts else np.zeros((len(time), 0), bool)
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
-    stored = np.hstack([table[key][:, 1:] for key in ("sCoordinates", "sCoordinates_t", "sCoordinates_tt")])
-    values = rebuilt(body, rows, flags, time, stored)
+    stored = np.hstack([table[key][:, 1:] for key in RECORDED])
+    values = rebuilt(body, rows, flags, time, stored, np.reshape(on_points, (len(on_points), len(time))))
     return BodyHistories(
         time=time,
         points=dict(zip(names, values[0], strict=True)),
@@ -120,9 +121,17 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
 
 
 def rebuilt(
-    body: MultiPhiBody, rows: np.ndarray, flags: np.ndarray, time: np.ndarray, stored: np.ndarray
+    body: MultiPhiBody,
+    rows: np.ndarray,
+    flags: np.ndarray,
+    time: np.ndarray,
+    stored: np.ndarray,
+    on_points: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Displacements and velocities of points, gaps and contact forces, each (.., k), level by level."""
+    """Displacements and velocities of points, gaps and contact forces, each (.., k), level by level.
+
+    on_points: f (m, k).
+    """
     k, contacts = len(stored), flags.shape[1]
     moved, rates = np.zeros((2, len(rows), k))
     gaps, forces = np.zeros((2, contacts, k))
@@ -138,8 +147,7 @@ def rebuilt(
         rates[:, here] = in_base @ own.vectors @ xi_t
         gaps[:, here] = own.gap_rows @ xi + loaded.gap_constants[:, None]
         pushed = own.force_rows @ xi + own.force_rate_rows @ xi_t + rest.forces[:, None]
-        outside = stepped.outside @ np.vstack([stored[here].T, np.ones(len(here))])
-        pushed += body.coordinates.direct(stepped) @ outside
+        pushed += body.coordinates.direct(stepped) @ on_points[:, here]
         forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
     return moved, rates, gaps, forces
 

@@ -8,7 +8,7 @@ h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
 velocities: under a constant force it grows no faster than with the largest rate sigma of a growing mode (omega^2 < 0),
 mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
-looked at exactly (body.py): the test may not decide, but it does not err. Of a force on points s also holds L p
+looked at exactly (body.py): the test may not decide, but it does not err. Of forces f on points s also holds L f
 (modal_force.py), of the step's mean: what stands at each end, less half its change.
 
 The states ahead of a body on which nothing acts are powers of the trapezoidal rule's matrix times the present one,
@@ -34,19 +34,20 @@ SPACING = 0.5  # rad, the phase of the highest mode in one of them
 class StepTest:
     """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s].
 
-    direct: L (c, s) for them. directly: whether any of it counts.
+    direct: L (c, m) for them. directly: whether any of it counts.
     """
 
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> None:
         size, count = stepped.size, len(rows)
-        norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1))])
+        norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1 + direct.shape[1]))])
         self.directly = bool(np.any(direct))
-        self._added = np.tile(direct @ stepped.outside, (3, 1)) / _scales(stepped, rows, step, step)[:, None]
-        self._matrix = np.vstack([_conditions(stepped, rows, step, step) + self._added, norm])
+        self._added = np.tile(direct, (3, 1)) / _scales(stepped, rows, step, step)[:, None]
+        self._matrix = np.vstack([np.hstack([_conditions(stepped, rows, step, step), self._added]), norm])
+        self._forces = 3 * size + 1
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
     def at(self, x: np.ndarray) -> tuple[float, float, float]:
-        """Of a state x = (q, q', q'', 1): least condition for the step before it and after it, and |S z'|.
+        """Of a state x = (q, q', q'', 1, f): least condition for the step before it and after it, and |S z'|.
 
         A step is clear if the former of its end and the latter of its start exceed the larger |S z'| of the two.
         """
@@ -60,8 +61,8 @@ class StepTest:
         return min(conditions[: self._two], default=math.inf), min(conditions[self._one :], default=math.inf), speed
 
     def half_change(self, before: np.ndarray, after: np.ndarray) -> float:
-        """How far L p of the mean can be from that of either end of a step, in units of the conditions."""
-        return float(np.max(np.abs(self._added @ (after - before)), initial=0.0)) / 2
+        """How far L f of the mean can be from that of either end of a step, in units of the conditions."""
+        return float(np.max(np.abs(self._added @ (after - before)[self._forces :]), initial=0.0)) / 2
 
 
 class Lookahead:

@@ -71,10 +71,6 @@ class SteppedLevel:
         """Number of coordinates s."""
         return len(self.drive)
 
-    def force(self, x: np.ndarray) -> np.ndarray:
-        """Modal force (s,) that acts from outside, by the equation of motion, from x = (q, q', q'', 1)."""
-        return self.outside.dot(x)
-
     def acceleration(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """q'' (s,) under a modal force."""
         return self._mass_inverse @ (force - self.resisting(q, q_t))
@@ -97,7 +93,7 @@ class SteppedLevel:
 
     @functools.cached_property
     def outside(self) -> np.ndarray:
-        """The matrix (s, 3 s + 1) of ``force``."""
+        """The matrix (s, 3 s + 1) from (q, q', q'', 1) to the modal force p, by the equation of motion."""
         return np.hstack([self._total, -self.drive[:, None]])
 
     @functools.cached_property

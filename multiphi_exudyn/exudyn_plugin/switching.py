@@ -28,11 +28,13 @@ StepFunction = Callable[[Any, float], bool]
 class Switching(dict[str, "MultiPhiBody"]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
-    preceding, following: the user's own PreStep and PostStep functions, or None.
+    preceding, following: the user's own PreStep and PostStep functions, or None. disturbed: whether an event of one
+    body has just moved what hangs on it, maybe another.
     """
 
     preceding: StepFunction | None = None
     following: StepFunction | None = None
+    disturbed: bool = False
 
     def before_step(self, mbs: Any, t: float) -> bool:
         """Called by Exudyn; whether the run goes on."""
@@ -44,6 +46,10 @@ class Switching(dict[str, "MultiPhiBody"]):
         """Called by Exudyn; whether the run goes on."""
         for body in self.values():
             body.after_step(mbs, t)
+        if self.disturbed:
+            self.disturbed = False
+            for body in self.values():
+                body.look_again()
         return self.following is None or self.following(mbs, t)
 
     def install(self, mbs: Any) -> None:

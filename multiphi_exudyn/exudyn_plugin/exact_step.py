@@ -1,0 +1,202 @@
+"""Exact step: a step of the solver done again by the machinery of ``simulate``, from event to event.
+
+    force of the step's mean, told in the modes of every level          until a contact changes,
+    with what changes at that instant in reactions, loads, connectors and inertia     from then on
+
+The states right before and right after the event are put into the system to see what it changes there. An impact is one
+of the body and of all that hangs on its interface (attached.py, surroundings.py), which then follows the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.event_rule import EventRule
+from multiphi_exudyn.exudyn_plugin.attached import AttachedRule
+from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
+from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
+from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.switching import bodies_of
+from multiphi_exudyn.motion import Motion
+from multiphi_exudyn.segment import Segment
+from multiphi_exudyn.state import Event, State
+
+__all__ = ["ExactStep"]
+
+NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
+
+ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # (p, f), modal and on points, by the closed contacts of a level
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """Of the first event in a step: its time [s], eta and eta' (r,) right before, the state right after."""
+
+    time: float
+    before: tuple[np.ndarray, np.ndarray]
+    after: State
+
+
+class ExactStep:
+    """What a body does within a step; ``MultiPhiBody`` says when, and holds what is used here."""
+
+    name: str
+    coordinates: Coordinates
+    time: float
+    _motion: Motion
+    _rule: EventRule
+    _state: State
+    _size: int
+    _step: float
+    _alone: bool
+
+    @property
+    def events(self) -> list[Event]:
+        """Closings and openings with their exact times."""
+        return self._motion.events
+
+    def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
+        """Put a state at the end of a step into the system, with the acceleration under a modal force."""
+        raise NotImplementedError
+
+    def _keep(self, state: State) -> None:
+        """Remember a state, choose its test, and write its level into the data node."""
+        raise NotImplementedError
+
+    def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
+        raise NotImplementedError
+
+    def _plain(self, state: State) -> State:
+        """A state of the motion as one of the level under static loads."""
+        return state
+
+    def _own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+        """(p, f) of the body's own varying loads at a time, in a level."""
+        return self.coordinates.no_force
+
+    def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
+        """Do the step from ``before`` again, exactly, and write what came out if anything happened in it.
+
+        Forces of constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the
+        mean.
+        """
+        here, start, known = self.coordinates, self._state, len(self.events)
+        own = here.stepped
+        given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
+        force = self._significant((here.force(before) + here.force(after) - given) / 2, after)
+        here.mark(after)
+        state, instant = self._travel(before, begun, force, force, own)
+        if instant is None:
+            self._keep(replace(start, phases=state.phases))
+            return
+        if self._alone:
+            self._write(mbs, state, force)
+            return
+        present, entered = self._present(mbs, instant, force, own), self._stepped(instant.after.closed)
+        present = self._significant(present, after)
+        del self.events[known:]
+        self._state = start
+        here.look_back(self.time - instant.time)
+        state, _ = self._travel(before, begun, force, present, entered)
+        self._write(mbs, state, here.told(present, entered, self._stepped(state.closed)))
+        if here.interface is not None:
+            self._write(mbs, state, here.settled(self.time - instant.time, self._step))
+            bodies_of(mbs).disturbed = True
+
+    def _present(self, mbs: Any, instant: _Instant, force: np.ndarray, own: SteppedLevel) -> np.ndarray:
+        """(p, f) right after an event, from those before it, ``force`` in the level ``own``."""
+        here, after, now = self.coordinates, instant.after, self.time
+        here.write(own.state(*instant.before, (force + self._own_force(own.closed, now))[: own.size]))
+        acting = here.acting(mbs, self._step) - self._own_force(own.closed, now)
+        self._write(mbs, after, here.told(force, own, self._stepped(after.closed)))
+        changed = here.changed(mbs, self._step) - self._own_force(after.closed, now)
+        return changed + here.carried(force - acting, own, here.stepped)
+
+    def _travel(
+        self, before: np.ndarray, begun: float, force: np.ndarray, entered: np.ndarray, given: SteppedLevel
+    ) -> tuple[State, _Instant | None]:
+        """State now, of the exact motion from ``before`` under ``force`` until a contact changes, then ``entered``.
+
+        given: the level in whose modes ``entered`` is told.
+        """
+        closed, known = self._state.closed, len(self.events)
+
+        def after(level: tuple[int, ...]) -> np.ndarray:
+            return self.coordinates.told(entered, given, self._stepped(level))
+
+        def until(level: tuple[int, ...]) -> np.ndarray:
+            return force if level == closed else after(level)
+
+        q, q_t, _ = self.coordinates.split(before)
+        acting = (force + self._own_force(closed, begun))[: self._size]
+        eta_t = self._stepped(closed).velocity(q, q_t, acting)
+        loaded = self._rule.level(closed)
+        r = loaded.level.modes
+        state, instant = State(loaded, q[:r], eta_t[:r], self._state.phases), None
+        state, segment = self._advanced(state, begun, None if self._alone else until, to_change=True)
+        if len(self.events) > known:
+            times, centre = np.array([segment.end]), shift(loaded.level, force)
+            moved = segment.modal(times)[:r, 0] + centre, segment.modal(times, 1)[:r, 0]
+            instant = _Instant(segment.end, moved, state)
+        if self._motion.time < self.time:
+            state, _ = self._advanced(state, self._motion.time, None if self._alone else after)
+        return state, instant
+
+    def _advanced(
+        self, state: State, begun: float, force_in: ForceIn | None, to_change: bool = False
+    ) -> tuple[State, Segment]:
+        """The state now, or at the first event before, of the exact motion under modal forces by levels.
+
+        And the last part of the way there.
+        """
+        motion = self._motion
+        rule = self._rule if force_in is None else self._forced(force_in)
+
+        def centre(level: tuple[int, ...]) -> np.ndarray | float:
+            return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
+
+        shifted = replace(state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed))
+        motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
+        motion.advance(self.time, to_change)
+        if motion.message:
+            raise NumericalFailure(f"body {self.name!r}: {motion.message}")
+        last = motion.segments[-1]
+        if motion.time == self.time:
+            motion.segments.pop()  # those that remain end with events: the chatter check counts them
+        del motion.segments[: -motion.window - 1]
+        end = self._plain(motion.state)
+        level = self._rule.level(end.closed)
+        return State(level, end.displacement + centre(end.closed), end.velocity, end.phases), last
+
+    def _forced(self, force_in: ForceIn) -> EventRule:
+        """The event rule under modal forces by levels, and with what hangs on the interface."""
+        attached = self.coordinates.attached
+        if attached is None:
+            return ForcedRule(self._rule, force_in, self._direct)
+        return AttachedRule(self._rule, force_in, self._direct, attached, self._interface_rows)
+
+    def _interface_rows(self, closed: tuple[int, ...]) -> np.ndarray:
+        """R (m, r) in a level."""
+        stepped, interface = self._stepped(closed), self.coordinates.interface
+        assert interface is not None
+        return interface.of(stepped).rows[:, : stepped.loaded.level.modes]
+
+    def _direct(self, closed: tuple[int, ...]) -> np.ndarray:
+        """L (k, m) in a level, see Coordinates."""
+        return self.coordinates.direct(self._stepped(closed))
+
+    def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
+        """Rule and state of an exact motion from a time on."""
+        return rule, state
+
+    def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """(p, f), with p = 0 where it is what an iterative solver leaves of the accelerations in x, and alone."""
+        modal, q_tt = force[: self._size], x[2 * self._size : 3 * self._size]
+        if self._alone or modal.dot(modal) <= NEGLIGIBLE**2 * q_tt.dot(q_tt):
+            modal[:] = 0.0
+        return force
