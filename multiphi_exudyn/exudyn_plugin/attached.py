@@ -13,6 +13,7 @@ accelerations of contacts at rest obey the same law. Where nothing is attached X
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -38,11 +39,15 @@ class Attached:
 
     def resistance(self, rows: np.ndarray) -> np.ndarray:
         """X (m, m) beside a body whose points have the rows R (m, r)."""
+        (carried, moved), own = self._ways, rows @ rows.T
+        return np.asarray(carried @ np.linalg.inv(moved + own @ carried))
+
+    @functools.cached_property
+    def _ways(self) -> tuple[np.ndarray, np.ndarray]:
+        """[M_a U, V] and [U, 0], V (m, m - k) what constraints hold."""
         m, k = self.free.shape
-        own = rows @ rows.T
         held = np.linalg.svd(self.free)[0][:, k:] if k else np.eye(m)
-        inertia = self.mass @ self.free
-        return np.hstack([inertia, held]) @ np.linalg.inv(np.hstack([self.free + own @ inertia, own @ held]))
+        return np.hstack([self.mass @ self.free, held]), np.hstack([self.free, np.zeros((m, m - k))])
 
     def reactions(self, rows: np.ndarray, impulses: np.ndarray) -> np.ndarray:
         """Impulses (m, k) on the body's points that follow impulses (r, k) on it."""

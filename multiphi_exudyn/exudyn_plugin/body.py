@@ -191,7 +191,7 @@ class MultiPhiBody(ExactStep):
         self._check_settings(mbs)
         here = self.coordinates
         here.attach(mbs)
-        if here.surroundings is not None and any(contact.rigid for contact in self.model.contacts):
+        if here.surroundings is not None and here.rigid:
             self._check_impacts(mbs, here.surroundings)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
         self._clear = self._wait = 0
@@ -238,8 +238,11 @@ class MultiPhiBody(ExactStep):
                 "interface, need one that does not strike at the start"
             )
         for other in bodies_of(mbs).values():
-            rigid = any(contact.rigid for contact in other.model.contacts)
-            if other is not self and rigid and mbs.GetNodeODE2Index(other.items["nGenericODE2"]) in surroundings.struck:
+            if (
+                other is not self
+                and other.coordinates.rigid
+                and mbs.GetNodeODE2Index(other.items["nGenericODE2"]) in surroundings.struck
+            ):
                 raise MultiPhiValueError(
                     f"interface of {self.name!r}: got a constraint to body {other.name!r}, both with rigid contacts, "
                     "need compliant ones, a spring between, or both structures in one model (assemble)"

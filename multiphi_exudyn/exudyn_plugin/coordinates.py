@@ -42,6 +42,11 @@ class Coordinates:
         self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
 
     @property
+    def rigid(self) -> bool:
+        """Whether the body has contacts that strike."""
+        return bool(np.any(np.isinf(self.stepped.loaded.level.base.stiffnesses)))
+
+    @property
     def points(self) -> int:
         """m, the number of interface coordinates."""
         return 0 if self.interface is None else len(self.interface.nodes)
@@ -112,6 +117,8 @@ class Coordinates:
         if self.interface is None or self.surroundings is None:
             return
         self.attached = self.surroundings.mark()
+        if not self.rigid:
+            return
         level, closed = self.stepped.loaded.level, self.stepped.closed
         physical = self.stepped.physical @ np.concatenate(self.split(x))
         eta, eta_t, eta_tt = (part[: level.modes] for part in np.split(physical, 3))
@@ -122,7 +129,7 @@ class Coordinates:
 
     def look_back(self, ago: float) -> None:
         """Find what hung on the interface some time [s] before the state that was marked: joints may have turned."""
-        if self.surroundings is not None:
+        if self.surroundings is not None and self.rigid:
             self.attached = self.surroundings.hanging(ago)
 
     def acting(self, mbs: Any, step: float) -> np.ndarray:

@@ -19,7 +19,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.attached import AttachedRule
 from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
-from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, shift
+from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, centre_of
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.motion import Motion
@@ -132,35 +132,29 @@ class ExactStep:
         def until(level: tuple[int, ...]) -> np.ndarray:
             return force if level == closed else after(level)
 
+        first = self._rule if self._alone else self._forced(until)
+        then = first if entered is force else self._forced(after)
         q, q_t, _ = self.coordinates.split(before)
         acting = (force + self._own_force(closed, begun))[: self._size]
         eta_t = self._stepped(closed).velocity(q, q_t, acting)
         loaded = self._rule.level(closed)
         r = loaded.level.modes
-        state, instant = State(loaded, q[:r], eta_t[:r], self._state.phases), None
-        state, segment = self._advanced(state, begun, None if self._alone else until, to_change=True)
+        state, segment = self._advanced(State(loaded, q[:r], eta_t[:r], self._state.phases), begun, first, True)
+        instant = None
         if len(self.events) > known:
-            times, centre = np.array([segment.end]), shift(loaded.level, force)
-            moved = segment.modal(times)[:r, 0] + centre, segment.modal(times, 1)[:r, 0]
+            times = np.array([segment.end])
+            moved = segment.modal(times)[:r, 0] + centre_of(first, closed), segment.modal(times, 1)[:r, 0]
             instant = _Instant(segment.end, moved, state)
         if self._motion.time < self.time:
-            state, _ = self._advanced(state, self._motion.time, None if self._alone else after)
+            state, _ = self._advanced(state, self._motion.time, then)
         return state, instant
 
-    def _advanced(
-        self, state: State, begun: float, force_in: ForceIn | None, to_change: bool = False
-    ) -> tuple[State, Segment]:
-        """The state now, or at the first event before, of the exact motion under modal forces by levels.
-
-        And the last part of the way there.
-        """
+    def _advanced(self, state: State, begun: float, rule: EventRule, to_change: bool = False) -> tuple[State, Segment]:
+        """The state now, or at the first event before, of the exact motion by a rule; and the last part of the way."""
         motion = self._motion
-        rule = self._rule if force_in is None else self._forced(force_in)
-
-        def centre(level: tuple[int, ...]) -> np.ndarray | float:
-            return 0.0 if force_in is None else shift(rule.level(level).level, force_in(level))
-
-        shifted = replace(state, level=rule.level(state.closed), displacement=state.displacement - centre(state.closed))
+        shifted = replace(
+            state, level=rule.level(state.closed), displacement=state.displacement - centre_of(rule, state.closed)
+        )
         motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
         motion.advance(self.time, to_change)
         if motion.message:
@@ -170,8 +164,8 @@ class ExactStep:
             motion.segments.pop()  # those that remain end with events: the chatter check counts them
         del motion.segments[: -motion.window - 1]
         end = self._plain(motion.state)
-        level = self._rule.level(end.closed)
-        return State(level, end.displacement + centre(end.closed), end.velocity, end.phases), last
+        moved = end.displacement + centre_of(rule, end.closed)
+        return State(self._rule.level(end.closed), moved, end.velocity, end.phases), last
 
     def _forced(self, force_in: ForceIn) -> EventRule:
         """The event rule under modal forces by levels, and with what hangs on the interface."""

@@ -20,7 +20,7 @@ from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["ForcedRule", "shift"]
+__all__ = ["ForcedRule", "centre_of", "shift"]
 
 
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
@@ -60,6 +60,12 @@ class _ForcedLevel(LoadedLevel):
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the static load [J]."""
         return self.plain.potential(displacement + self.centre)
+
+
+def centre_of(rule: EventRule, closed: tuple[int, ...]) -> np.ndarray | float:
+    """d (r,) in a level of a rule, zero where no modal force acts."""
+    level = rule.level(closed)
+    return level.centre if isinstance(level, _ForcedLevel) else 0.0
 
 
 def _forced(plain: LoadedLevel, force: np.ndarray, direct: np.ndarray) -> LoadedLevel:

@@ -3,7 +3,7 @@
     M a + C^T mu = f(q, v, t),   C a = -d(C v + c_t)/dt at constant v
 
 q, v, a the coordinates of the whole system, C the Jacobian of all its constraints, ties of interfaces among them. The
-derivative is a difference along the motion. Coordinates that neither mass nor constraints connect are solved apart.
+derivative is a difference along the motion.
 
 Given changes of the points y move what is connected to them with the least kinetic energy that constraints allow,
 
@@ -14,12 +14,12 @@ the body's own coordinates and ties left out of it. So an impact on the body is 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
+import scipy.linalg
 
 from multiphi_exudyn.exudyn_plugin.attached import Attached
 
@@ -90,8 +90,10 @@ class Surroundings:
         solver = self._mbs.sys["dynamicSolver"]
         solver.ComputeODE2RHS(self._mbs)
         forces = np.array(solver.GetSystemResidual())[: len(mass)]
-        given = np.concatenate([forces, self._along_the_motion(APART * step) if len(jacobian) else np.zeros(0)])
-        found = _balanced(mass, jacobian, given)
+        turning = np.zeros(len(jacobian))
+        if len(jacobian) > len(self._ties):
+            turning = self._along_the_motion(APART * step)
+        found = _balanced(mass, jacobian, np.concatenate([forces, turning]))
         self._state["AECoords"][:] = found[len(mass) :]
         return found[: len(mass)]
 
@@ -100,9 +102,11 @@ class Surroundings:
         mass, jacobian = self._matrices()
         jacobian = np.delete(jacobian, self._ties, axis=0)
         jacobian[:, self._own] = 0.0
-        label = _connected(mass, jacobian)[0]
-        moving = self.struck = np.flatnonzero(np.isin(label, label[self._points]))
+        moving = self.struck = _connected(mass, jacobian, self._points)
         jacobian, mass, at = jacobian[:, moving], mass[np.ix_(moving, moving)], np.searchsorted(moving, self._points)
+        follow = np.zeros((len(self.coordinates[0]), len(at)))
+        if not (np.any(mass) or np.any(jacobian)):
+            return Attached(np.zeros((len(at), len(at))), np.eye(len(at))), follow  # nothing hangs there
         ways = _null_space(jacobian)
         shown = ways[at]  # y of the ways that are left
         inertia, heaviest = ways.T @ mass @ ways, float(np.max(np.diagonal(mass)))
@@ -110,7 +114,6 @@ class Surroundings:
         mobility, directions = np.linalg.eigh(shown @ flexible @ shown.T)
         free = directions[:, mobility > NEGLIGIBLE * np.max(mobility, initial=0.0)]
         carried = ways @ flexible @ shown.T @ np.linalg.pinv(shown @ flexible @ shown.T, NEGLIGIBLE, hermitian=True)
-        follow = np.zeros((len(self.coordinates[0]), len(at)))
         follow[moving] = carried
         return Attached(carried.T @ mass @ carried, free), follow
 
@@ -152,22 +155,26 @@ class Surroundings:
         return np.asarray((found[0] - found[1]) / (2 * apart))
 
 
-def _connected(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which coordinates (n,) and constraints (k,) belong together, by number."""
-    links = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(jacobian),) * 2)]])
-    label = connected_components(scipy.sparse.csr_array(links != 0), directed=False)[1]
-    return label[: len(mass)], label[len(mass) :]
+def _connected(mass: np.ndarray, jacobian: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Positions of these coordinates and of all that mass and constraints connect with them, ascending."""
+    masses, holds = mass != 0, jacobian != 0
+    found, count = np.zeros(len(mass), bool), 0
+    found[points] = True
+    while np.sum(found) > count:
+        count = np.sum(found)
+        found |= np.any(masses[found], axis=0) | np.any(holds[np.any(holds[:, found], axis=1)], axis=0)
+    return np.flatnonzero(found)
 
 
 def _balanced(mass: np.ndarray, jacobian: np.ndarray, given: np.ndarray) -> np.ndarray:
     """(a, mu) (n + k,) of M a + C^T mu = f, C a = g, (f, g) given; redundant constraints share mu."""
     system = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(jacobian),) * 2)]])
-    found = np.zeros(len(given))
-    label = np.concatenate(_connected(mass, jacobian))
-    for number in range(int(np.max(label)) + 1):
-        here = np.flatnonzero(label == number)
-        found[here] = np.linalg.lstsq(system[np.ix_(here, here)], given[here], rcond=None)[0]
-    return found
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+        try:
+            return np.asarray(scipy.linalg.solve(system, given, check_finite=False))
+        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
+            return np.asarray(np.linalg.lstsq(system, given, rcond=None)[0])
 
 
 def _null_space(jacobian: np.ndarray) -> np.ndarray:
