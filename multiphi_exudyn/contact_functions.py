@@ -119,13 +119,15 @@ class ContactFunctions:
         """s of the ``ends`` in a level, together."""
         known, own = self._of(level.level.indices), level.level
         if known.together is None:
-            ends = self.ends(own.indices)
+            ends, closed = self.ends(own.indices), set(own.indices)
             position, constant = own.gap_rows[list(ends)], level.gap_constants[list(ends)]
             rate = np.zeros_like(position)
             for k, contact in enumerate(ends):
-                if contact in own.indices:
+                if contact in closed and self._never_pulls(contact):
                     row = self.function(level, contact)
                     position[k], rate[k], constant[k] = row.position, row.rate, row.constant
+                elif contact in closed:
+                    position[k], constant[k] = -position[k], -constant[k]
             known.together = Rows(position, rate if np.any(rate) else None, constant)
         return known.together
 
@@ -180,16 +182,23 @@ class ContactFunctions:
 
     def watched(self, level: LoadedLevel, phases: tuple[Phase, ...]) -> tuple[list[tuple[int, bool]], Rows, list[bool]]:
         """(contact, whether it then asks to change or is armed), functions, and whether their rate is meant."""
+        ends, together = self.ends(level.level.indices), self._rows(level)
         if phases == self._armed:
-            ends = self.ends(level.level.indices)
-            return [(contact, True) for contact in ends], self._rows(level), [False] * len(ends)
-        found = [
-            (contact, *wait)
-            for contact in self.candidates(level.level.indices, phases)
-            for wait in self._waiting_for(level, contact, phases[contact])
-        ]
-        rows = Rows.of([item[2] for item in found], level.level.modes)
-        return [(item[0], item[1]) for item in found], rows, [item[3] for item in found]
+            return [(contact, True) for contact in ends], together, [False] * len(ends)
+        places, others = {contact: k for k, contact in enumerate(ends)}, list[Row]()
+        waiting, taken, rates = list[tuple[int, bool]](), list[int](), list[bool]()
+        for contact in self.candidates(level.level.indices, phases):
+            if phases[contact] is Phase.ARMED and contact in places:
+                waiting.append((contact, True))
+                taken.append(places[contact])
+                rates.append(False)
+                continue
+            for asks, row, rate in self._waiting_for(level, contact, phases[contact]):
+                waiting.append((contact, asks))
+                taken.append(len(ends) + len(others))
+                rates.append(rate)
+                others.append(row)
+        return waiting, together.beside(Rows.of(others, level.level.modes)).some(taken), rates
 
     def _waiting_for(self, level: LoadedLevel, contact: int, phase: Phase) -> list[tuple[bool, Row, bool]]:
         """(asks, function, whether its rate is meant) of what ends a contact's phase by falling through zero."""

@@ -211,6 +211,18 @@ class Rows:
         rate = np.array([row.rate for row in rows]).reshape(len(rows), modes)
         return cls(position, rate if np.any(rate) else None, np.array([row.constant for row in rows]))
 
+    def beside(self, others: Rows) -> Rows:
+        """These, then the others."""
+        known = [rows.rate if rows.rate is not None else np.zeros_like(rows.position) for rows in (self, others)]
+        rate = None if self.rate is None and others.rate is None else np.vstack(known)
+        position = np.vstack([self.position, others.position])
+        return Rows(position, rate, np.concatenate([self.constant, others.constant]))
+
+    def some(self, places: list[int]) -> Rows:
+        """Those at these places."""
+        rate = None if self.rate is None else self.rate[places]
+        return Rows(self.position[places], rate if np.any(rate) else None, self.constant[places])
+
     def clear(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Which of them (k,) ``Row.sign`` calls positive, whatever the order in which their terms are added."""
         value = self.position @ displacement + self.constant
