@@ -430,18 +430,26 @@ def test_two_bodies_coupled_by_a_spring_converge_with_order_two_to_one_structure
     assert error < 3e-4
 
 
-def test_a_second_run_of_one_system_begins_in_the_level_of_its_start():
-    model = chain(STIFFNESS)
+@pytest.mark.parametrize(
+    ("stiffness", "load", "closed"),
+    [(STIFFNESS, -60.0, False), (math.inf, -200.0, True)],
+    ids=["from an open end", "from a closed end"],
+)
+def test_a_second_run_of_one_system_begins_in_the_level_of_its_start(stiffness, load, closed):
+    model = chain(stiffness)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    items = CreateMultiPhiBody(mbs, model, displacement=-START, interface=("m2",))
+    items = CreateMultiPhiBody(mbs, model, displacement=START, interface=("m2",))
     sensor = watch(mbs, items["nInterface"]["m2"])
     spring(mbs, items)
+    mass_tied(mbs, items)
+    mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["m2"]), load=load))
     mbs.Assemble()
     stored = []
     for _ in range(2):
         mbs.SolveDynamic(settings(STEP), solverType=TRAPEZOIDAL)
         stored.append(mbs.GetSensorStoredData(sensor))
+        assert (mbs.GetSensorStoredData(items["sLevel"])[-1, 1] > 0.5) == closed
     assert np.max(np.abs(stored[0] - stored[1])) < 1e-12
 
 

@@ -200,7 +200,8 @@ class MultiPhiBody(ExactStep):
         closed, phases = here.stored()
         if closed != stepped.closed:  # the accelerations have been computed with stale matrices
             stepped = self._enter(mbs, closed)
-            q_tt[:] = stepped.acceleration(q, q_t, here.applied(mbs))
+            acting = here.acting(mbs, mbs.sys["dynamicSolver"].it.currentStepSize)
+            q_tt[:] = stepped.acceleration(q, q_t, acting[: self._size])
         force = here.force(here.read())[: self._size]
         fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
         self.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []

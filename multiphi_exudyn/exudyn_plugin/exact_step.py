@@ -9,6 +9,7 @@ of the body and of all that hangs on its interface (attached.py, surroundings.py
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -42,7 +43,7 @@ class _Instant:
     after: State
 
 
-class ExactStep:
+class ExactStep(ABC):
     """What a body does within a step; ``MultiPhiBody`` says when, and holds what is used here."""
 
     name: str
@@ -60,16 +61,17 @@ class ExactStep:
         """Closings and openings with their exact times."""
         return self._motion.events
 
+    @abstractmethod
     def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
-        """Put a state at the end of a step into the system, with the acceleration under a modal force."""
-        raise NotImplementedError
+        """Put a state at the end of a step into the system, with the acceleration under forces (p, f)."""
 
+    @abstractmethod
     def _keep(self, state: State) -> None:
         """Remember a state, choose its test, and write its level into the data node."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
-        raise NotImplementedError
+        """A level as the solver has it."""
 
     def _plain(self, state: State) -> State:
         """A state of the motion as one of the level under static loads."""

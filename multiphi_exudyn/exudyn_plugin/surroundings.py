@@ -80,12 +80,10 @@ class Surroundings:
         """a (n,) at the end of the step, where everything has followed the body for the time ``elapsed`` [s]."""
         q, v = self._unstruck
         self._move(np.array([q, v + elapsed * self._change]))
-        found = self.accelerations(step)
-        self.coordinates[2][self._others] = found[self._others]
-        return found
+        return self.accelerations(step)
 
     def accelerations(self, step: float) -> np.ndarray:
-        """a (n,) at the current state, which gets the multipliers mu; step [s]: that of the solver."""
+        """a (n,) at the current state, which gets mu and, beside the body, a; step [s]: that of the solver."""
         mass, jacobian = self._matrices()
         solver = self._mbs.sys["dynamicSolver"]
         solver.ComputeODE2RHS(self._mbs)
@@ -95,6 +93,7 @@ class Surroundings:
             turning = self._along_the_motion(APART * step)
         found = _balanced(mass, jacobian, np.concatenate([forces, turning]))
         self._state["AECoords"][:] = found[len(mass) :]
+        self.coordinates[2][self._others] = found[self._others]
         return found[: len(mass)]
 
     def _attached(self) -> tuple[Attached, np.ndarray]:
