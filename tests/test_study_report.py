@@ -310,6 +310,15 @@ def test_labels_avoid_points_each_other_and_the_edge():
     assert all(axes.bbox.x0 < box.x0 and box.x1 < axes.bbox.x1 for box in boxes)
 
 
+def test_labels_keep_clear_of_what_is_written_already():
+    figure = pareto_figure(result_of([row("a", 0.1)], [timing("a", 1.0)]), {})
+    axes = figure.axes[0]
+    across = axes.text(1.0, 10.0, "along a line", rotation=90)
+    place_labels(figure, axes, [Label("beside it", "#000000", [(1.0, 10.0)])], [])
+    figure.draw_without_rendering()
+    assert not axes.texts[-1].get_window_extent().overlaps(across.get_window_extent())
+
+
 def test_a_label_in_a_corner_stays_inside_even_where_it_covers_points():
     figure = pareto_figure(result_of([row("a", 0.1)], [timing("a", 1.0)]), {})
     axes = figure.axes[0]
