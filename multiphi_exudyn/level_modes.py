@@ -13,7 +13,13 @@ largest eigenvectors of the level's compliance, a matrix of rank d away from the
 
     A = Omega^-2 - Omega^-2 P (1/K + P^T Omega^-2 P)^-1 P^T Omega^-2            (rigid: 1/K = 0)
 
-and their omega the singular values in the space of these few: the cost is that of a few vectors, the accuracy stays.
+and their omega the singular values in the space of these few: the cost is that of a few vectors, the accuracy stays. In
+a large base they come from Lanczos iterations, and Sylvester's law of inertia says whether none is missing: below sigma
+a level has
+
+    #(Omega^2 < sigma) - #(eigenvalues <= 0 of 1/K + P^T (Omega^2 - sigma)^-1 P)
+
+modes.
 """
 
 from __future__ import annotations
@@ -22,6 +28,7 @@ import math
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse.linalg
 
 from multiphi_exudyn.base import Base
 from multiphi_exudyn.modes import right_singular_vectors
@@ -31,6 +38,8 @@ __all__ = ["level_modes"]
 
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
 FEW = 4  # modes of the base for each mode asked for: from there on the compliance is the cheaper way to them
+LARGE = 150  # modes of a base from which iterations are the cheaper way to the few
+APART = 1e-6  # relative distance of two compliances at least, to count what lies beyond the middle between them
 
 
 def level_modes(base: Base, supports: Supports, modes: int | None) -> tuple[np.ndarray, np.ndarray, float]:
@@ -70,15 +79,48 @@ def _lowest(base: Base, supports: Supports, modes: int) -> tuple[np.ndarray, np.
     bent = compliance[:, None] * directions / lengths
     flexibility = directions.T @ bent / lengths[:, None] + np.diag(1 / stiffness / lengths**2)
     taken = scipy.linalg.solve_triangular(np.linalg.cholesky(flexibility), bent.T, lower=True)
-    own, count = -(taken.T @ taken), base.modes.count
-    own.flat[:: count + 1] += compliance
-    wanted = [count - modes, count - 1]
-    _, vectors = scipy.linalg.eigh(own.T, subset_by_index=wanted, overwrite_a=True, check_finite=False)
+    vectors = None
+    if base.modes.count >= LARGE:
+        scaled, yielding = directions / lengths, 1 / stiffness / lengths**2
+        vectors = _iterated(base.modes.omega**2, scaled, yielding, taken, modes)
+    if vectors is None:
+        vectors = _of_all(compliance, taken, modes)
     pinned = directions[:, np.isinf(stiffness)]
     if pinned.shape[1]:
         held = np.linalg.qr(pinned)[0]
         vectors = vectors - held @ (held.T @ vectors)
     return _modes(base, supports, np.linalg.qr(vectors)[0])
+
+
+def _of_all(compliance: np.ndarray, taken: np.ndarray, modes: int) -> np.ndarray:
+    """The largest eigenvectors (m, modes) of A = diag(compliance) - taken^T taken, from all of A."""
+    own, count = -(taken.T @ taken), len(compliance)
+    own.flat[:: count + 1] += compliance
+    wanted = [count - modes, count - 1]
+    return np.asarray(scipy.linalg.eigh(own.T, subset_by_index=wanted, overwrite_a=True, check_finite=False)[1])
+
+
+def _iterated(
+    squares: np.ndarray, directions: np.ndarray, yielding: np.ndarray, taken: np.ndarray, modes: int
+) -> np.ndarray | None:
+    """``_of_all`` by Lanczos iterations, None where some may be missing.
+
+    squares: Omega^2 (m,). directions, yielding: P (m, d) and 1/K (d,), both in units that make P^T Omega^-2 P one.
+    """
+    count = len(squares)
+    operator = scipy.sparse.linalg.LinearOperator(
+        (count, count), lambda x: x / squares - taken.T @ (taken @ x), dtype=float
+    )
+    start = np.random.default_rng(0).uniform(-1, 1, count)  # a start with a symmetry would not see all modes
+    try:
+        found, vectors = scipy.sparse.linalg.eigsh(operator, modes + 1, which="LA", v0=start)
+    except scipy.sparse.linalg.ArpackError:
+        return None
+    if not found[0] < (1 - APART) * found[1]:
+        return None
+    shifted = squares - 2 / (found[0] + found[1])
+    lifted = np.linalg.eigvalsh(directions.T @ (directions / shifted[:, None]) + np.diag(yielding)) <= 0
+    return vectors[:, 1:] if np.sum(shifted < 0) - np.sum(lifted) == modes else None
 
 
 def _softened(squares: np.ndarray, vectors: np.ndarray, pull: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg
 from numpy.testing import assert_allclose
 from run_checks import complaints
 
@@ -20,12 +21,12 @@ EVALUATIONS = 500  # samples of event signals that an event may take
 SYMMETRIC = 1e-12  # of the largest displacement
 
 
-def bed(stiffness, *, n=160, stops=40, modes=12, twins=False):
-    """A bending chain, pinned at its ends, over a bed of stops; ``twins``: two with nearly the same frequencies."""
+def bed(stiffness, *, n=160, stops=40, modes=12, twins=False, apart=1e-10):
+    """A bending chain, pinned at its ends, over a bed of stops; ``twins``: two, their stiffnesses so far ``apart``."""
     second = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     bending = 1e8 * second @ second
     if twins:
-        bending = np.kron(np.diag([1.0, 1 + 1e-10]), bending)
+        bending = np.kron(np.diag([1.0, 1 + apart]), bending)
     count = len(bending)
     places = np.linspace(2, count - 3, stops).astype(int)
     contacts = [UnilateralContact(f"c{i}", f"p{i}", 1e-3, stiffness) for i in range(stops)]
@@ -64,6 +65,39 @@ class TestFewModesOfALevel:
         for modes in (12, 48):
             assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
         assert columns == [12, 48]
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):
+        base, made = bed(stiffness).base, []
+        monkeypatch.setattr("multiphi_exudyn.level_modes._of_all", lambda *given: made.append(given))
+        for indices in SETS:
+            assert build_level(base, indices, 12).modes == 12
+        assert not made
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    @pytest.mark.parametrize("missed", [0, 5, 12])
+    def test_that_iterations_miss_are_found_by_counting(self, monkeypatch, stiffness, missed):
+        """missed: of the modes from the highest asked for down; the one beyond them, asked for too, is the highest."""
+        base = bed(stiffness, twins=True, n=80, apart=0.3).base
+
+        def lacking(operator, count, **given):
+            values, vectors = eigsh(operator, count + 1, **given)
+            return np.delete(values, missed), np.delete(vectors, missed, axis=1)
+
+        eigsh = scipy.sparse.linalg.eigsh
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lacking)
+        for indices in SETS[1:]:
+            few, full = build_level(base, indices, 12), build_level(base, indices)
+            assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
+
+    def test_equal_each_other_where_iterations_fail(self, monkeypatch):
+        def failing(*given, **options):
+            raise scipy.sparse.linalg.ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+        base = bed(1e6).base
+        found = build_level(base, SETS[-1], 12)
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", failing)
+        assert_allclose(build_level(base, SETS[-1], 12).omega, found.omega, rtol=FREQUENCIES)
 
     def test_rigid_contacts_do_not_move_in_them(self):
         level = bed(math.inf).level(("c3", "c20"))
