@@ -3,7 +3,7 @@
     M a + C^T mu = f(q, v, t),   C a = -d(C v + c_t)/dt at constant v
 
 q, v, a the coordinates of the whole system, C the Jacobian of all its constraints, ties of interfaces among them. The
-derivative is a difference along the motion.
+derivative is a difference along the motion. The matrices are full ones: an event takes a few solutions of the system.
 
 Given changes of the points y move what is connected to them with the least kinetic energy that constraints allow,
 
