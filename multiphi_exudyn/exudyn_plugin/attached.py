@@ -1,14 +1,16 @@
 """What hangs on points of a body takes part in its impacts: masses and constraints of the system.
 
-    min |v+ - v|^2 + (y+ - y).M_a (y+ - y),   y' = R v,   A v+ >= 0,   y+ - y = U u
+    min |dv|^2 + dw.M_a dw,   dw = R dv = U u,   H (v + dv) >= 0
 
-v (r,) the modal velocity of the body, y' (m,) that of its points, M_a (m, m) the inertia they carry and the columns of
-U (m, k) the velocities that constraints leave them (surroundings.py). An impulse i on the body then gives it
+v (r,) the modal velocity of the body, R v (m,) that of its points, M_a (m, m) the inertia they carry and the columns of
+U (m, k) the velocities that constraints leave them (surroundings.py), H the contacts that touch. An impulse i on the
+body then gives it
 
-    v+ - v = B i,   B = 1 - R^T X R,   X (A + M_a^-1) = 1,   A = R R^T,
+    dv = B i,   B = 1 - R^T X R,   X (R R^T + M_a^-1) = 1 where nothing is held,
 
--X R i of it back through the points, and what a level's modes miss of y' by e (m,) takes -R^T X e to mend. The
-accelerations of contacts at rest obey the same law. Where nothing is attached X = 0, where all is held B holds it.
+-X R i of it goes back through the points, and what a level's modes miss of R v by e (m,) takes -R^T X e to mend. The
+accelerations of contacts at rest obey the same law. A contact that cannot move for what is attached stays open at its
+stop, without a force, as one does which the closed ones hold (event_rule.py).
 """
 
 from __future__ import annotations
@@ -23,9 +25,12 @@ from multiphi_exudyn.base import Base
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule
 from multiphi_exudyn.recent import Recent
+from multiphi_exudyn.state import State
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
 
 __all__ = ["Attached", "AttachedRule", "Reactions"]
+
+IMMOVABLE = 1e-11  # of a contact's mobility: below it what is attached holds it
 
 InLevel = Callable[[tuple[int, ...]], np.ndarray]  # an array by the closed contacts of a level
 
@@ -39,19 +44,35 @@ class Attached:
 
     def resistance(self, rows: np.ndarray) -> np.ndarray:
         """X (m, m) beside a body whose points have the rows R (m, r)."""
-        (carried, moved), own = self._ways, rows @ rows.T
-        return np.asarray(carried @ np.linalg.inv(moved + own @ carried))
+        own = rows @ rows.T
+        held = self._held / (np.linalg.norm(own) or 1.0)
+        carried, moved = np.hstack([self.mass @ self.free, held]), np.hstack([self.free, np.zeros_like(held)])
+        return np.asarray(carried @ np.linalg.pinv(moved + own @ carried))  # held may be what no mode moves
 
     @functools.cached_property
-    def _ways(self) -> tuple[np.ndarray, np.ndarray]:
-        """[M_a U, V] and [U, 0], V (m, m - k) what constraints hold."""
+    def _held(self) -> np.ndarray:
+        """What constraints hold (m, m - k), orthonormal."""
         m, k = self.free.shape
-        held = np.linalg.svd(self.free)[0][:, k:] if k else np.eye(m)
-        return np.hstack([self.mass @ self.free, held]), np.hstack([self.free, np.zeros((m, m - k))])
+        return np.linalg.svd(self.free)[0][:, k:] if k else np.eye(m)
 
     def reactions(self, rows: np.ndarray, impulses: np.ndarray) -> np.ndarray:
         """Impulses (m, k) on the body's points that follow impulses (r, k) on it."""
         return -self.resistance(rows) @ (rows @ impulses)
+
+    def mobilities(self, directions: np.ndarray, in_base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is left of the mobility of contacts, as shares (k,), and W (k, k): W^T (H B H^T) W = diag(shares).
+
+        directions: H^T (b, k). in_base: R (m, b).
+        """
+        lengths = np.linalg.norm(directions, axis=0)
+        moved = directions + in_base.T @ self.reactions(in_base, directions)
+        shares, ways = np.linalg.eigh(directions.T @ moved / np.outer(lengths, lengths))
+        return shares, ways / lengths[:, None]
+
+    def immovable(self, base: Base, in_base: np.ndarray) -> set[int]:
+        """Rigid contacts that cannot move for what is attached."""
+        rigid = np.flatnonzero(np.isinf(base.stiffnesses)).tolist()
+        return {i for i in rigid if self.mobilities(base.directions[:, [i]], in_base)[0][0] <= IMMOVABLE}
 
 
 class Reactions:
@@ -78,8 +99,10 @@ class Reactions:
     def at(self, closed: tuple[int, ...]) -> np.ndarray:
         """The forces (m,) in a level, beside those of a level without closed rigid contacts."""
         directions, answers = self._answers(closed)
-        pressed = directions.T @ (directions + self._rows.T @ answers)
-        return np.asarray(-answers @ np.linalg.lstsq(pressed, directions.T @ self._acceleration, rcond=None)[0])
+        mobility, ways = self._attached.mobilities(directions, self._rows)
+        moving = mobility > IMMOVABLE
+        pushed = ways[:, moving] @ ((ways[:, moving].T @ (directions.T @ self._acceleration)) / mobility[moving])
+        return np.asarray(-answers @ pushed)
 
     def _answers(self, closed: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """H (b, k) of the closed rigid contacts, and the forces (m, k) that follow unit reactions."""
@@ -88,21 +111,51 @@ class Reactions:
 
 
 class AttachedRule(ForcedRule):
-    """``ForcedRule`` for a body on whose points ``attached`` hangs; rows_in: R (m, r) by a level's closed contacts."""
+    """``ForcedRule`` for a body on whose points ``attached`` hangs; rows_in: R (m, r) by a level's closed contacts.
+
+    in_base: the same (m, b) in base coordinates.
+    """
 
     def __init__(
-        self, plain: EventRule, force_in: InLevel, direct_in: InLevel, attached: Attached, rows_in: InLevel
+        self,
+        plain: EventRule,
+        force_in: InLevel,
+        direct_in: InLevel,
+        attached: Attached,
+        rows_in: InLevel,
+        in_base: np.ndarray,
     ) -> None:
         super().__init__(plain, force_in, direct_in)
         self._attached = attached
         self._rows_in = rows_in
+        self._in_base = in_base
+        self._immovable = attached.immovable(plain.model.base, in_base)
         self._mobilities = Recent[tuple[int, ...], np.ndarray](plain.model.most_levels)
 
     def _nearest(self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         root = self._mobilities.made(level.level.indices, lambda: self._mobility_root(level))
-        within = np.column_stack([rows @ root, rows @ vector])
-        moved, impulses = nearest_admissible(within, np.append(np.zeros(len(vector)), 1.0), len(vector))
+        within, impulses = rows @ root, np.zeros(len(rows))
+        moving = np.sum(within**2, axis=1) > IMMOVABLE * np.sum(rows**2, axis=1)
+        asked = np.column_stack([within, rows @ vector])[moving]
+        moved, impulses[moving] = nearest_admissible(asked, np.append(np.zeros(len(vector)), 1.0), len(vector))
         return vector + root @ moved[:-1], impulses
+
+    def _joining(self, state: State, held: set[int], asking: set[int]) -> set[int]:
+        joined = set(held)
+        for i in sorted(super()._joining(state, held, asking)):
+            if self._movable(sorted(joined | {i})):
+                joined.add(i)
+        return joined - held
+
+    def _movable(self, rigid: list[int]) -> bool:
+        """Whether what is attached leaves each of these contacts a motion that the others do not take."""
+        return bool(
+            np.min(self._attached.mobilities(self.model.base.directions[:, rigid], self._in_base)[0]) > IMMOVABLE
+        )
+
+    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
+        """As there, without contacts that cannot move: what is left of their gaps is round-off of the constraints."""
+        return tuple(i for i in super().ends(closed) if i not in self._immovable)
 
     def _mobility_root(self, level: LoadedLevel) -> np.ndarray:
         """F (r, r) of B = F F^T."""

@@ -29,7 +29,6 @@ from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.exact_step import ExactStep
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.surroundings import Surroundings
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of, nothing_acts_on, running_solver
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.recent import Recent
@@ -38,6 +37,7 @@ from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["MultiPhiBody"]
 
+ROUND_OFF = 1e-12  # of the energy at the start: an impact that takes less is none
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 LOOK_AGAIN = 8  # steps to wait after a lookahead that could not decide
 
@@ -191,9 +191,9 @@ class MultiPhiBody(ExactStep):
         self._check_settings(mbs)
         here = self.coordinates
         here.attach(mbs)
-        if here.surroundings is not None and here.rigid:
-            self._check_impacts(mbs, here.surroundings)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
+        if here.rigid and not self._alone:
+            self._check_start(mbs)
         self._clear = self._wait = 0
         self._motion.segments.clear()
         stepped, (q, q_t, q_tt) = here.stepped, here.views
@@ -211,6 +211,7 @@ class MultiPhiBody(ExactStep):
         here.write(here.views)
         r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
+        self._most = 0.0
         self._x = here.read()
         self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
         self._sample()
@@ -228,26 +229,30 @@ class MultiPhiBody(ExactStep):
                 f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )
 
-    def _check_impacts(self, mbs: Any, surroundings: Surroundings) -> None:
-        """Raises for what cannot be struck together with the body."""
-        attached = surroundings.mark()
-        fresh = np.array_equal(self.coordinates.views[:2], self._given[:2])
-        struck = fresh and any(event.impulse > 0 for event in self._given_events)
+    def _check_start(self, mbs: Any) -> None:
+        """Raises for what cannot be struck together with a body that has rigid contacts."""
+        here = self.coordinates
+        around = here.surroundings or here.beside(mbs)
+        if around.on_body(here.stepped.mass):
+            raise MultiPhiValueError(
+                f"node of {self.name!r}: got a mass or a constraint on it beside rigid contacts, need it on an "
+                "interface coordinate, as part of the structure, or compliant contacts"
+            )
+        attached, lost = around.mark(), sum(event.loss.impact for event in self._given_events)
+        q_t = here.views[1]
+        fresh = np.array_equal(here.views[:2], self._given[:2])
+        struck = fresh and lost > ROUND_OFF * (lost + 0.5 * float(q_t @ q_t))
         if struck and np.any(attached.resistance(np.eye(len(attached.mass)))):
             raise MultiPhiValueError(
                 f"start of {self.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
                 "interface, need one that does not strike at the start"
             )
-        for other in bodies_of(mbs).values():
-            if (
-                other is not self
-                and other.coordinates.rigid
-                and mbs.GetNodeODE2Index(other.items["nGenericODE2"]) in surroundings.struck
-            ):
-                raise MultiPhiValueError(
-                    f"interface of {self.name!r}: got a constraint to body {other.name!r}, both with rigid contacts, "
-                    "need compliant ones, a spring between, or both structures in one model (assemble)"
-                )
+        around.apart = {
+            mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
+            for other in bodies_of(mbs).values()
+            if other is not self and other.coordinates.rigid
+        }
+        around.mark()
 
     def check_called(self, mbs: Any, t: float) -> None:
         """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""

@@ -60,11 +60,15 @@ class Coordinates:
         self._copies = tuple((x, *self.split(x)) for x in np.ones((2, 3 * size + 1 + self.points)))
         if self.interface is not None:
             self.interface.attach(state)
-            own = range(self._own.start, self._own.stop)
-            self.surroundings = Surroundings(mbs, own, self.interface.places, self.interface.ties)
+            self.surroundings = self.beside(mbs)
         if "nGenericData" in self.items:
             places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][places[0] : places[0] + len(places)]
+
+    def beside(self, mbs: Any) -> Surroundings:
+        """The system around the body."""
+        own, interface = range(self._own.start, self._own.stop), self.interface
+        return Surroundings(mbs, own, interface.places if interface else (), interface.ties if interface else ())
 
     def read(self) -> np.ndarray:
         """A copy x = (q, q', q'', 1, f) of the present state, good until the next but one."""

@@ -87,7 +87,7 @@ def CreateMultiPhiBody(
     if rows:
         _add_interface(mbs, body, rows)
     body.items.update(add_sensors(mbs, body))
-    bodies[name] = body
+    bodies.add(body)
     if model.contacts or rows or matchedStepSize is not None or isinstance(body, DrivenBody):
         bodies.install(mbs)
     if isinstance(body, DrivenBody):

@@ -31,6 +31,9 @@ __all__ = ["ExactStep"]
 
 NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
 
+UNRESOLVED = 0.1  # of the largest energy at an event: work that a force which is held constant may miss
+DRIVEN = 1e-3  # of its terms: a gap below minus that is no drift of constraints
+
 ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # (p, f), modal and on points, by the closed contacts of a level
 
 
@@ -54,6 +57,7 @@ class ExactStep(ABC):
     _state: State
     _size: int
     _step: float
+    _most: float
     _alone: bool
 
     @property
@@ -92,6 +96,7 @@ class ExactStep(ABC):
         given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
         force = self._significant((here.force(before) + here.force(after) - given) / 2, after)
         here.mark(after)
+        self._check_driven(after)
         state, instant = self._travel(before, begun, force, force, own)
         if instant is None:
             self._keep(replace(start, phases=state.phases))
@@ -107,8 +112,50 @@ class ExactStep(ABC):
         state, _ = self._travel(before, begun, force, present, entered)
         self._write(mbs, state, here.told(present, entered, self._stepped(state.closed)))
         if here.interface is not None:
-            self._write(mbs, state, here.settled(self.time - instant.time, self._step))
+            held = here.told(present, entered, here.stepped)
+            reached = here.settled(self.time - instant.time, self._step)
+            self._check_resolved(instant, own, state, (reached - held)[: self._size])
+            self._write(mbs, state, reached)
             bodies_of(mbs).disturbed = True
+
+    def _check_resolved(self, instant: _Instant, own: SteppedLevel, state: State, missed: np.ndarray) -> None:
+        """Raises where a force that is held from an event to the end of its step does not tell what happens there.
+
+        That is where the force (s,) that it missed in the end would have done a work that counts, or where body and
+        attached masses are left with more than twice the energy they had.
+        """
+        eta, eta_t = instant.before
+        before = replace(self._state, level=own.loaded, displacement=eta, velocity=eta_t)
+        bent = 0.5 * float(np.abs(own.loaded.level.squares) @ eta**2)
+        self._most = max(self._most, self._carried_kinetic(before) + bent)
+        doubtful = self._carried_kinetic(state) + state.potential - self._carried_kinetic(before) - before.potential
+        if state.closed == instant.after.closed:
+            moved = state.displacement - instant.after.displacement
+            doubtful = max(doubtful, abs(float(missed[: len(moved)] @ moved)) / (2 * UNRESOLVED))
+        if doubtful > self._most:
+            raise NumericalFailure(
+                f"body {self.name!r}: at t = {instant.time:.9g} s: steps of {self._step:g} s do not resolve what hangs "
+                "on its interface, need shorter steps, fewer modes, or constraints in place of stiff connectors"
+            )
+
+    def _carried_kinetic(self, state: State) -> float:
+        """Kinetic energy [J] of the body and of what its points carry."""
+        attached = self.coordinates.attached
+        assert attached is not None
+        speeds = self._interface_rows(state.closed) @ state.velocity
+        return state.kinetic + 0.5 * float(speeds @ attached.mass @ speeds)
+
+    def _check_driven(self, x: np.ndarray) -> None:
+        """Raises where what is attached drives a contact that it holds into its stop."""
+        here, loaded = self.coordinates, self.coordinates.stepped.loaded
+        if here.attached is None or here.interface is None or not here.rigid:
+            return
+        base, eta = loaded.level.base, here.split(x)[0][: loaded.level.modes]
+        for i in here.attached.immovable(base, here.interface.in_base(base)) - set(loaded.level.indices):
+            terms = np.append(loaded.level.gap_rows[i] * eta, loaded.gap_constants[i])
+            if np.sum(terms) < -DRIVEN * np.sum(np.abs(terms)):
+                name = self._rule.model.contacts[i].name
+                raise NumericalFailure(f"body {self.name!r}: what is tied to it drives contact {name!r} into its stop")
 
     def _present(self, mbs: Any, instant: _Instant, force: np.ndarray, own: SteppedLevel) -> np.ndarray:
         """(p, f) right after an event, from those before it, ``force`` in the level ``own``."""
@@ -174,7 +221,9 @@ class ExactStep(ABC):
         attached = self.coordinates.attached
         if attached is None:
             return ForcedRule(self._rule, force_in, self._direct)
-        return AttachedRule(self._rule, force_in, self._direct, attached, self._interface_rows)
+        assert self.coordinates.interface is not None
+        in_base = self.coordinates.interface.in_base(self._rule.model.base)
+        return AttachedRule(self._rule, force_in, self._direct, attached, self._interface_rows, in_base)
 
     def _interface_rows(self, closed: tuple[int, ...]) -> np.ndarray:
         """R (m, r) in a level."""

@@ -16,7 +16,9 @@ loads, connectors and inertia (exact_step.py): exact for a force that is constan
 free points: one whose motion is prescribed takes more of them.
 
 An impact on a rigid contact is one of the body with all that masses and constraints tie to its points (attached.py);
-springs and dampers are no part of it, being finite.
+springs and dampers are no part of it, being finite. What they do within the step of an event has to be resolved by it,
+stiff ones by a short step; a run in which it is not ends with an error (exact_step.py). A point that a closed rigid
+contact holds may carry anything but a further constraint: Exudyn then has two for one coordinate.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector, SensorObject
 
-from multiphi_exudyn.base import Base
+from multiphi_exudyn.base import Base, cleared
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.modal_force import shift
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
@@ -125,8 +127,8 @@ class Interface:
     def _read(self, stepped: SteppedLevel) -> _Reading:
         level = stepped.loaded.level
         rows = np.zeros((len(self._rows), stepped.size))
-        rows[:, : level.modes] = self._rows @ level.shapes
         in_base = self.in_base(level.base)
+        rows[:, : level.modes] = cleared(in_base @ level.vectors, np.abs(in_base) @ np.abs(level.vectors))
         direct = _reactions(level, in_base, rows[:, : level.modes])
         return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, direct)
 

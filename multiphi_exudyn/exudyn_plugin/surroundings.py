@@ -21,16 +21,18 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.attached import Attached
 
 __all__ = ["Surroundings"]
 
 APART = 1e-3  # of a step: between the states of a difference along the motion
+SCALED = 5  # times rows and columns are divided by the root of their largest entry (D. Ruiz 2001)
 NEGLIGIBLE = 1e-10  # of the largest mobility: below it constraints hold a point, and of the largest singular value
 
 
 class Surroundings:
-    """The system around one body during a run. struck: positions of the coordinates that hang on its points.
+    """The system around one body during a run. apart: names of bodies that may not hang on it, by their first position.
 
     own, points: positions of the body's coordinates and of its interface coordinates among those of the system.
     ties: objects that tie them.
@@ -38,9 +40,10 @@ class Surroundings:
 
     def __init__(self, mbs: Any, own: Iterable[int], points: Iterable[int], ties: Iterable[Any]) -> None:
         self._mbs = mbs
+        self.apart: dict[int, str] = {}
         self._state = mbs.systemData.GetSystemStateDict(reference=True)
-        self._points = np.array(list(points))
-        self._own = np.array(list(own))
+        self._points = np.array(list(points), dtype=int)
+        self._own = np.array(list(own), dtype=int)
         self._ties = [row for tie in ties for row in mbs.systemData.GetObjectLTGAE(tie)]
         self._others = np.setdiff1d(np.arange(len(self.coordinates[0])), [*self._own, *self._points])
 
@@ -49,6 +52,13 @@ class Surroundings:
         """Views of q, v, a (n,) in the system's current state."""
         state = self._state
         return state["ODE2Coords"], state["ODE2Coords_t"], state["ODE2Coords_tt"]
+
+    def on_body(self, inertia: np.ndarray) -> bool:
+        """Whether a mass or a constraint beside the ties acts on the body's own coordinates; inertia: its M (s, s)."""
+        mass, jacobian = self._matrices()
+        added = mass[self._own].copy()
+        added[:, self._own] -= inertia
+        return bool(np.any(added) or np.any(np.delete(jacobian, self._ties, axis=0)[:, self._own]))
 
     def mark(self) -> Attached:
         """Take the current state as that of a step without event; what hangs on the points."""
@@ -101,8 +111,15 @@ class Surroundings:
         mass, jacobian = self._matrices()
         jacobian = np.delete(jacobian, self._ties, axis=0)
         jacobian[:, self._own] = 0.0
-        moving = self.struck = _connected(mass, jacobian, self._points)
-        jacobian, mass, at = jacobian[:, moving], mass[np.ix_(moving, moving)], np.searchsorted(moving, self._points)
+        moving = _connected(mass, jacobian, self._points)
+        for place in sorted(self.apart.keys() & set(moving.tolist())):
+            raise MultiPhiValueError(
+                f"interface: got constraints that tie body {self.apart[place]!r} to another, both with rigid contacts, "
+                "need compliant ones, a spring between, or both structures in one model (assemble)"
+            )
+        jacobian = jacobian[:, moving]
+        jacobian = jacobian[np.any(jacobian, axis=1)]
+        mass, at = mass[np.ix_(moving, moving)], np.searchsorted(moving, self._points)
         follow = np.zeros((len(self.coordinates[0]), len(at)))
         if not (np.any(mass) or np.any(jacobian)):
             return Attached(np.zeros((len(at), len(at))), np.eye(len(at))), follow  # nothing hangs there
@@ -128,12 +145,13 @@ class Surroundings:
     def _matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """M (n, n) and C (k, n) at the current state."""
         solver, mbs = self._mbs.sys["dynamicSolver"], self._mbs
-        count, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()
+        count, first = solver.GetODE2size(), solver.GetODE2size() + solver.GetODE1size()
+        size = first + solver.GetAEsize()
         solver.ComputeMassMatrix(mbs)
         mass = np.array(solver.GetSystemMassMatrix())[:count, :count]
         solver.SetSystemJacobian(np.zeros((size, size)))
         solver.ComputeJacobianAE(mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=1.0)
-        jacobian = np.array(solver.GetSystemJacobian())[count:, :count]
+        jacobian = np.array(solver.GetSystemJacobian())[first:, :count]
         mbs.solverSignalJacobianUpdate = True  # the solver's own has been overwritten
         return mass, jacobian
 
@@ -147,7 +165,7 @@ class Surroundings:
                 q[:] = here + way * v
                 mbs.systemData.SetTime(t + way)
                 solver.ComputeAlgebraicEquations(mbs, velocityLevel=True)
-                found.append(np.array(solver.GetSystemResidual())[len(q) :])
+                found.append(np.array(solver.GetSystemResidual())[len(q) + solver.GetODE1size() :])
         finally:
             q[:] = here
             mbs.systemData.SetTime(t)
@@ -168,12 +186,17 @@ def _connected(mass: np.ndarray, jacobian: np.ndarray, points: np.ndarray) -> np
 def _balanced(mass: np.ndarray, jacobian: np.ndarray, given: np.ndarray) -> np.ndarray:
     """(a, mu) (n + k,) of M a + C^T mu = f, C a = g, (f, g) given; redundant constraints share mu."""
     system = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(jacobian),) * 2)]])
+    scale = np.ones(len(system))
+    for _ in range(SCALED):
+        largest = np.max(np.abs(system) * np.outer(scale, scale), axis=1, initial=0.0)
+        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    system = system * np.outer(scale, scale)
     with warnings.catch_warnings():
         warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
         try:
-            return np.asarray(scipy.linalg.solve(system, given, check_finite=False))
+            return np.asarray(scale * scipy.linalg.solve(system, scale * given, check_finite=False))
         except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
-            return np.asarray(np.linalg.lstsq(system, given, rcond=None)[0])
+            return np.asarray(scale * np.linalg.lstsq(system, scale * given, rcond=None)[0])
 
 
 def _null_space(jacobian: np.ndarray) -> np.ndarray:

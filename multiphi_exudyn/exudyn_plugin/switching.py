@@ -36,6 +36,12 @@ class Switching(dict[str, "MultiPhiBody"]):
     following: StepFunction | None = None
     disturbed: bool = False
 
+    def add(self, body: MultiPhiBody) -> None:
+        """Take a body in; those with rigid contacts come last, so that what they strike has had its own events."""
+        self[body.name] = body
+        for other in [each for each in self.values() if each.coordinates.rigid]:
+            self[other.name] = self.pop(other.name)
+
     def before_step(self, mbs: Any, t: float) -> bool:
         """Called by Exudyn; whether the run goes on."""
         for body in self.values():
