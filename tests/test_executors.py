@@ -102,6 +102,21 @@ def test_nothing_arrives_after_a_call_that_ends_when_its_time_does():
     assert ends == {True, False}
 
 
+def test_nothing_is_raised_while_the_timer_starts(monkeypatch):
+    """It would leave a lock unbalanced, which says so in place of the limit."""
+    through, start = [], threading.Thread.start
+
+    def slow(thread):
+        start(thread)
+        spin(5e-3)
+        through.append(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", slow)
+    with pytest.raises(TimeLimitExceeded):
+        call_within(1e-4, lambda: spin(LONG))
+    assert len(through) == 1
+
+
 @pytest.mark.usefixtures("restless")
 def test_nothing_arrives_after_a_call_that_could_not_be_stopped():
     assert {stopped(1e-3, partial(time.sleep, 2e-2)) for _ in range(50)} == {True}

@@ -25,6 +25,7 @@ __all__ = ["TimeLimitExceeded", "call_within"]
 T = TypeVar("T")
 
 AGAIN_S = 1.0  # s, from one attempt to stop the call to the next
+SOON_S = 1e-4  # s, until the next look at a timer that has not started yet
 
 
 class TimeLimitExceeded(BaseException):
@@ -54,14 +55,16 @@ class _Watch:
     """Timer of the thread that makes it; ``over``: nothing is raised any more."""
 
     def __init__(self, seconds: float) -> None:
-        self.over = self._raised = False
+        self.over = self._raised = self._started = False
         self._deadline = time.perf_counter() + seconds
         self._thread = ctypes.c_ulong(threading.get_ident())
         self._left: queue.SimpleQueue[None] = queue.SimpleQueue()  # an Event cut short in ``set`` stays locked
         self._lock = threading.Lock()
 
     def start(self) -> None:
+        """Nothing is raised before this is through: it waits with a lock that an exception would leave unbalanced."""
         threading.Thread(target=self._watch, name="time limit", daemon=True).start()
+        self._started = True
 
     def call_off(self) -> None:
         """Wait for an attempt that is under way, and let arrive here what has not arrived."""
@@ -85,11 +88,11 @@ class _Watch:
                 except queue.Empty:
                     pass
             self._raise()
-            self._deadline = time.perf_counter() + AGAIN_S
+            self._deadline = time.perf_counter() + (AGAIN_S if self._raised else SOON_S)
 
     def _raise(self) -> None:
         with self._lock:
-            if not self.over:
+            if self._started and not self.over:
                 self._raised = True
                 self._interrupt()
 
