@@ -413,15 +413,15 @@ def pin(mbs, items):
 
 def test_a_contact_that_constraints_hold_at_its_stop_stays_open_without_a_force():
     start, given = np.array([0.01, -GAP, 0.02]), {"interface": ("m0", "m1"), "watched": "m0"}
-    y, events = simulated(chain(math.inf, COUPLING), pin, STEPS[-1], displacement=start, **given)
+    y, events = simulated(chain(math.inf, COUPLING), pin, STEPS[2], displacement=start, **given)
     s, free = chain(math.inf, COUPLING).structure, [0, 2]
     part = np.ix_(free, free)
     rest = mp.LinearStructure(s.mass[part], s.stiffness[part], s.damping[part], {"m0": 0, "m2": 1})
     pulled = [mp.ConstantLoad(f"m{i}", float(s.stiffness[i, 1] * GAP)) for i in free]
     native = mp.simulate(mp.MultiPhiModel(rest, modes="all"), END, displacement=start[free], loads=pulled)
-    expected = native.at("m0", np.minimum(np.arange(len(y)) * STEPS[-1], END))
+    expected = native.at("m0", np.minimum(np.arange(len(y)) * STEPS[2], END))
     assert events == []
-    assert np.linalg.norm(y - expected) < 1e-3 * np.linalg.norm(expected)
+    assert np.linalg.norm(y - expected) < 2e-2 * np.linalg.norm(expected)
 
 
 def test_what_drives_a_contact_into_its_stop_is_an_error():
