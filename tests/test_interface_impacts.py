@@ -36,6 +36,8 @@ from test_interface import (
     TRAPEZOIDAL,
     chain,
     coordinate,
+    mass_on,
+    mass_tied,
     run,
     settings,
     watch,
@@ -76,17 +78,6 @@ def on_point(model, attach, at="m2", matched=True, **given):
         return y[:, 0], events
 
     return shown
-
-
-def mass_on(mbs, items):
-    mbs.AddObject(ObjectGenericODE2(name="mass", nodeNumbers=[items["nInterface"]["m2"]], massMatrix=[[MASS]]))
-
-
-def mass_tied(mbs, items):
-    node = mbs.AddNode(Node1D(referenceCoordinates=[0.0], initialCoordinates=[START[2]]))
-    mbs.AddObject(Mass1D(nodeNumber=node, mass=MASS))
-    ends = [coordinate(mbs, node), coordinate(mbs, items["nInterface"]["m2"])]
-    mbs.AddObject(ObjectConnectorCoordinate(name="tie", markerNumbers=ends))
 
 
 @pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])

@@ -16,14 +16,13 @@ stop, without a force, as one does which the closed ones hold (event_rule.py).
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.base import Base
 from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule
+from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, InLevel
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import State
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
@@ -31,8 +30,6 @@ from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissib
 __all__ = ["Attached", "AttachedRule", "Reactions"]
 
 IMMOVABLE = 1e-11  # of a contact's mobility: below it what is attached holds it
-
-InLevel = Callable[[tuple[int, ...]], np.ndarray]  # an array by the closed contacts of a level
 
 
 @dataclass(frozen=True)
@@ -71,8 +68,11 @@ class Attached:
 
     def immovable(self, base: Base, in_base: np.ndarray) -> set[int]:
         """Rigid contacts that cannot move for what is attached."""
-        rigid = np.flatnonzero(np.isinf(base.stiffnesses)).tolist()
-        return {i for i in rigid if self.mobilities(base.directions[:, [i]], in_base)[0][0] <= IMMOVABLE}
+        rigid = np.flatnonzero(np.isinf(base.stiffnesses))
+        directions = base.directions[:, rigid]
+        moved = directions + in_base.T @ self.reactions(in_base, directions)
+        left = np.sum(directions * moved, axis=0) <= IMMOVABLE * np.sum(directions**2, axis=0)
+        return set(rigid[left].tolist())
 
 
 class Reactions:

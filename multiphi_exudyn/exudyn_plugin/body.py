@@ -238,6 +238,11 @@ class MultiPhiBody(ExactStep):
                 f"node of {self.name!r}: got a mass or a constraint on it beside rigid contacts, need it on an "
                 "interface coordinate, as part of the structure, or compliant contacts"
             )
+        around.apart = {
+            mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
+            for other in bodies_of(mbs).values()
+            if other is not self and other.coordinates.rigid
+        }
         attached, lost = around.mark(), sum(event.loss.impact for event in self._given_events)
         q_t = here.views[1]
         fresh = np.array_equal(here.views[:2], self._given[:2])
@@ -247,12 +252,6 @@ class MultiPhiBody(ExactStep):
                 f"start of {self.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
                 "interface, need one that does not strike at the start"
             )
-        around.apart = {
-            mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
-            for other in bodies_of(mbs).values()
-            if other is not self and other.coordinates.rigid
-        }
-        around.mark()
 
     def check_called(self, mbs: Any, t: float) -> None:
         """Raises if a step has been made without ``after_step``: somebody else's PostStep function is installed."""

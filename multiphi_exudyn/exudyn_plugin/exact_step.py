@@ -10,7 +10,6 @@ of the body and of all that hangs on its interface (attached.py, surroundings.py
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +19,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.attached import AttachedRule
 from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
-from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, centre_of
+from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, InLevel, centre_of
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of
 from multiphi_exudyn.motion import Motion
@@ -30,11 +29,8 @@ from multiphi_exudyn.state import Event, State
 __all__ = ["ExactStep"]
 
 NEGLIGIBLE = 1e-9  # of the accelerations: what Newton's iterations leave unbalanced is no modal force
-
 UNRESOLVED = 0.1  # of the largest energy at an event: work that a force which is held constant may miss
 DRIVEN = 1e-3  # of its terms: a gap below minus that is no drift of constraints
-
-ForceIn = Callable[[tuple[int, ...]], np.ndarray]  # (p, f), modal and on points, by the closed contacts of a level
 
 
 @dataclass(frozen=True)
@@ -216,7 +212,7 @@ class ExactStep(ABC):
         moved = end.displacement + centre_of(rule, end.closed)
         return State(self._rule.level(end.closed), moved, end.velocity, end.phases), last
 
-    def _forced(self, force_in: ForceIn) -> EventRule:
+    def _forced(self, force_in: InLevel) -> EventRule:
         """The event rule under modal forces by levels, and with what hangs on the interface."""
         attached = self.coordinates.attached
         if attached is None:

@@ -163,13 +163,8 @@ class Interface:
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""
-        change = self.of(wanted).rows - self.of(given).rows
-        return self.added(force, force[given.size :] @ change)
-
-    @staticmethod
-    def added(force: np.ndarray, modal: np.ndarray) -> np.ndarray:
-        """(p, f) with more of p (s,)."""
-        return np.concatenate([force[: len(modal)] + modal, force[len(modal) :]])
+        modal, points = np.split(force, [given.size])
+        return np.concatenate([modal + points @ (self.of(wanted).rows - self.of(given).rows), points])
 
 
 def _reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:

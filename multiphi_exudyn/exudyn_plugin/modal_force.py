@@ -20,7 +20,9 @@ from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["ForcedRule", "centre_of", "shift"]
+__all__ = ["ForcedRule", "InLevel", "centre_of", "shift"]
+
+InLevel = Callable[[tuple[int, ...]], np.ndarray]  # an array by the closed contacts of a level
 
 
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
@@ -38,8 +40,8 @@ class ForcedRule(EventRule):
     def __init__(
         self,
         plain: EventRule,
-        force_in: Callable[[tuple[int, ...]], np.ndarray],
-        direct_in: Callable[[tuple[int, ...]], np.ndarray],
+        force_in: InLevel,
+        direct_in: InLevel,
     ) -> None:
         super().__init__(plain.model, plain.load)
         self._plain = plain
