@@ -8,7 +8,13 @@ from multiphi_exudyn.assemble import Assembly, assemble
 from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.courses import Harmonic, Sampled, Smooth, Sweep
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import (
+    MultiPhiError,
+    MultiPhiTypeError,
+    MultiPhiValueError,
+    MultiPhiWarning,
+    NumericalFailure,
+)
 from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.level import Level, LevelOverride
@@ -55,6 +61,7 @@ __all__ = [
     "MultiPhiModel",
     "MultiPhiTypeError",
     "MultiPhiValueError",
+    "MultiPhiWarning",
     "NumericalFailure",
     "PointMass",
     "RayleighDamping",

@@ -1,12 +1,12 @@
-"""Errors raised on purpose: what was given, and what was needed.
+"""Errors raised on purpose: what was given, and what was needed; the warning that an answer may be wrong.
 
-Every one is a :class:`MultiPhiError` and, beside that, the built-in error an engineer would expect,
+Every error is a :class:`MultiPhiError` and, beside that, the built-in error an engineer would expect,
 so ``except ValueError`` keeps working in code that has never heard of this package.
 """
 
 from __future__ import annotations
 
-__all__ = ["MultiPhiError", "MultiPhiTypeError", "MultiPhiValueError", "NumericalFailure"]
+__all__ = ["MultiPhiError", "MultiPhiTypeError", "MultiPhiValueError", "MultiPhiWarning", "NumericalFailure"]
 
 
 class MultiPhiError(Exception):
@@ -23,3 +23,7 @@ class MultiPhiTypeError(MultiPhiError, TypeError):
 
 class NumericalFailure(MultiPhiError, RuntimeError):
     """A computation could not be carried through; the message names the cause."""
+
+
+class MultiPhiWarning(UserWarning):
+    """An answer was found, and there is a reason to distrust it; the sentence is in ``Trajectory.warnings`` too."""

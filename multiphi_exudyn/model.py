@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -42,6 +42,8 @@ class MultiPhiModel:
     modes: r of every level, or "all"; or ``UpTo`` a frequency; or a ``Tolerance``, from which ``simulate`` finds that
     frequency. Levels are truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
+    validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
+    hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
     rules: what simulations keep for later ones, by static load, at most ``RULES``.
 
     Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
@@ -52,6 +54,7 @@ class MultiPhiModel:
     contacts: Sequence[Given] = ()
     modes: int | str | UpTo | Tolerance = 6
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
+    validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     rules: Recent[bytes, Any] = field(init=False, default_factory=lambda: Recent(RULES), repr=False, compare=False)
 

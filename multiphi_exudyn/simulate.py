@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import importlib
 import math
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,13 +20,14 @@ from multiphi_exudyn.driven.excitation import Excitation
 from multiphi_exudyn.driven.motion import DrivenMotion
 from multiphi_exudyn.driven.refinement import to_tolerance
 from multiphi_exudyn.driven.rule import DrivenRule
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.force_law import Contact
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.mode_choice import Tolerance
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.motion import CompiledMotion, Motion
+from multiphi_exudyn.reliability import warnings_of
 from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Start, Trajectory
 from multiphi_exudyn.truncation import adapted
@@ -65,7 +68,11 @@ def simulate(
         motion.advance(end)
         return motion.trajectory(end)
 
-    return to_tolerance(run, loads)
+    trajectory = to_tolerance(run, loads)
+    trajectory = replace(trajectory, warnings=warnings_of(trajectory))
+    for sentence in trajectory.warnings:
+        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    return trajectory
 
 
 def started(

@@ -73,7 +73,9 @@ class Trajectory:
 
     final: the state it ends in, after whatever happened at that instant; final_work: see Motion.
 
-    status: "ok" | "failed"; message: the cause. t_end [s]: how far it goes. events: in order of time.
+    status: "ok" | "failed"; message: the cause. warnings: what to distrust in this answer, and what to do about it, a
+    sentence each that begins with its kind and a colon (reliability.py). t_end [s]: how far it goes. events: in order
+    of time.
     Times are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or "left".
     """
 
@@ -89,6 +91,7 @@ class Trajectory:
     final_work: float
     load: np.ndarray
     stats: Statistics
+    warnings: tuple[str, ...] = ()
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
         """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""

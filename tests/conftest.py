@@ -16,6 +16,11 @@ settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Many tests run badly truncated models on purpose; those of the warnings ask for them."""
+    config.addinivalue_line("filterwarnings", "ignore::multiphi_exudyn.errors.MultiPhiWarning")
+
+
 @pytest.fixture(scope="session")
 def refused() -> Callable[..., None]:
     """``refused(kind, begins, build, ...)``: build(...) raises a MultiPhiError that is also a ``kind``.

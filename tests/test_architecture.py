@@ -44,6 +44,7 @@ FLOORS = (
         "segment",
         "trajectory",
         "truncation",
+        "reliability",
         "motion",
         "driven",
         "simulate",
