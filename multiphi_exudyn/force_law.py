@@ -97,9 +97,10 @@ class ForceLaw:
     @functools.cached_property
     def springs(self) -> tuple[LawSpring, ...]:
         """The chain of one-sided springs: those above q_m from it outward, then those below it."""
-        slopes, middle = self.slopes, int(np.searchsorted(self.knots, self.centre))
-        above = np.diff(slopes[middle:], prepend=0.0), self.knots[middle:-1]
-        below = np.diff(slopes[:middle][::-1], prepend=0.0), self.knots[1 : middle + 1][::-1]
+        slopes, knots, middle = self.slopes, self.knots, int(np.searchsorted(self.knots, self.centre))
+        up, down = max(len(slopes) - middle, 1), max(middle, 1)  # where q_m is an end, its line goes on beyond it
+        above = np.diff(slopes[-up:], prepend=0.0), knots[middle : middle + up]
+        below = np.diff(slopes[:down][::-1], prepend=0.0), knots[middle + 1 - down : middle + 1][::-1]
         return (*self._chain(*above, 1), *self._chain(*below, -1))
 
     def _chain(self, changes: np.ndarray, places: np.ndarray, side: int) -> list[LawSpring]:

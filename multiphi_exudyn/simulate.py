@@ -158,7 +158,7 @@ def _start(
             touching.append(i)
         elif gap < -scale and not _pulls(contact, gap, float(v @ base.directions[:, i])):
             penetrating.append(i)
-    return Start(y, v, tuple(penetrating), tuple(touching))
+    return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved)
 
 
 def _pulls(contact: Contact, gap: float, rate: float) -> bool:

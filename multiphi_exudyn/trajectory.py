@@ -25,12 +25,16 @@ __all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
 
 @dataclass(frozen=True)
 class Start:
-    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap."""
+    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
+
+    gaps: (c,) [m] of all contacts at y = 0, as stops that have moved leave them.
+    """
 
     displacement: np.ndarray
     velocity: np.ndarray
     penetrating: tuple[int, ...]
     touching: tuple[int, ...]
+    gaps: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -164,7 +168,7 @@ class Trajectory:
         varying = sum((segment.varying_work() for segment in self.segments), self.final_work)
         reached = last.level.configuration(last.displacement)
         return Ledger(
-            initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating),
+            initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating, self.start.gaps),
             work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
