@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -20,6 +20,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.history import History
+from multiphi_exudyn.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
 from multiphi_exudyn.structure import is_real, real_array
 
 __all__ = ["Course", "Harmonic", "Sampled", "Smooth", "Sweep", "check_course", "check_numbers"]
@@ -94,23 +95,30 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Smooth:
-    """u(t) = function(t), a smooth function of time [s] that takes (k,) times or single ones.
+    """u(t) = function(t), a function of time [s] that takes (k,) times or single ones, smooth but for single instants.
 
     tolerance: of the response, relative to its largest value; see simulate.
+    breaks: instants [s] at which the function or a derivative jumps. Jumps and kinks are found without them, unless
+    they are as close as 2e-5 of a run's length.
+    A function is known by samples: what is shorter than 2.5e-5 of a run's length may not be seen (1.1e-4 where it takes
+    single times only, which a function of arrays avoids), unless ``breaks`` enclose it.
     """
 
     function: Callable[[Any], Any]
     tolerance: float = 1e-9
+    breaks: Sequence[float] = ()
 
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise MultiPhiTypeError(f"function: got {self.function!r}, need a function of time")
         _check_tolerance(self.tolerance)
+        object.__setattr__(self, "breaks", _breaks(self.breaks))
 
     def history(self, end: float, finer: float = 1.0) -> History:
         """The course up to ``end`` [s], to tolerance / finer of its largest value."""
-        largest = float(np.max(np.abs(self._values(np.linspace(0.0, end, 257)))))
-        return History.smooth(self._values, end, self.tolerance / finer * largest)
+        many = self._together(np.array([0.0, end])) is not None
+        seen = Samples.of(self._values, end, MANY_SAMPLES if many else FEW_SAMPLES)
+        return History.smooth(self._values, end, self.tolerance / finer * seen.largest, seen, self.breaks)
 
     def acceleration(self, end: float, finer: float = 1.0) -> History:
         """u'' up to ``end`` [s], of the polynomials that stand for u: less certain than they are."""
@@ -236,6 +244,14 @@ def _check_tolerance(value: float) -> None:
 def check_course(what: str, course: Any) -> None:
     if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
         raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
+
+
+def _breaks(given: Any) -> tuple[float, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"breaks: got {given!r}, need a sequence of times in s")
+    times = tuple(given)
+    check_numbers("breaks", **{f"{i}": t for i, t in enumerate(times)})
+    return tuple(float(t) for t in times)
 
 
 def _samples(name: str, given: Any) -> np.ndarray:

@@ -7,32 +7,24 @@ One form holds everything a load or a moving support does in time: a constant (m
 carrier is the frequency in the middle of the piece. The response to a piece is known in closed form
 (forced_response.py). A history is zero before its first and after its last break.
 
-Smooth functions are interpolated at Chebyshev points of the second kind, the ends of a piece among them; a piece is
-halved until the interpolant agrees with the function between its points. Source: L. N. Trefethen, Approximation
-Theory and Approximation Practice, 2013, ch. 2 and 16.
+How smooth functions and sweeps become pieces is in interpolation.py.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.polynomial.chebyshev as chebyshev
 
-from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.interpolation import DEGREE, Function, Interpolant, Samples, interpolated
 
 __all__ = ["History", "Piece", "differentiated", "translated"]
 
-DEGREE = 8  # of the polynomials that stand for smooth functions
-MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
-FIRST_PIECES = 64  # into which a smooth function's interval is divided before any comparison
-ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
+JUMP = 1e-6  # of a bound of a history: less is no jump
 PHASE_ROUND_OFF = 2e-15  # of a phase, several roundings: no interpolant is asked to know it better
-
-Function = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -74,9 +66,21 @@ class History:
         return cls(time, np.zeros(len(slopes), complex), np.stack([values[:-1], slopes], axis=1).astype(complex))
 
     @classmethod
-    def smooth(cls, function: Function, end: float, tolerance: float) -> History:
-        """A function of (k,) times on [0, end] to ``tolerance``, in units of u."""
-        return cls._interpolated(function, lambda t: np.zeros_like(t), end, tolerance)
+    def smooth(
+        cls,
+        function: Function,
+        end: float,
+        tolerance: float,
+        samples: Samples | None = None,
+        breaks: Sequence[float] = (),
+    ) -> History:
+        """A function of (k,) times on [0, end] to ``tolerance``, in units of u.
+
+        samples: of the function, taken here where there are none. breaks: instants (k,) at which it is not smooth.
+        """
+        seen = Samples.of(function, end) if samples is None else samples
+        known = np.asarray(breaks, dtype=float)
+        return cls._interpolated(interpolated(function, lambda t: np.zeros_like(t), end, tolerance, seen, known))
 
     @classmethod
     def modulated(cls, amplitude: Function, phase: Function, omega: Function, end: float, tolerance: float) -> History:
@@ -86,32 +90,16 @@ class History:
         """
         ends = np.array([0.0, end])
         known = PHASE_ROUND_OFF * float(np.max(np.abs(amplitude(ends) * phase(ends))))
-        return cls._interpolated(lambda t: amplitude(t) * np.exp(1j * phase(t)), omega, end, max(tolerance, known))
+        none = Samples(np.zeros(0), np.zeros(0))
+
+        def function(t: np.ndarray) -> np.ndarray:
+            return np.asarray(amplitude(t) * np.exp(1j * phase(t)))
+
+        return cls._interpolated(interpolated(function, omega, end, max(tolerance, known), none, np.zeros(0)))
 
     @classmethod
-    def _interpolated(cls, function: Function, omega: Function, end: float, tolerance: float) -> History:
-        """Pieces of degree DEGREE on [0, end], halved until they agree with the function."""
-        lefts, widths = np.arange(FIRST_PIECES) * (end / FIRST_PIECES), np.full(FIRST_PIECES, end / FIRST_PIECES)
-        done: list[tuple[np.ndarray, ...]] = []
-        count, worst = 0, 0.0
-        while len(lefts):
-            carriers = omega(lefts + widths / 2)
-            series, errors, size = _fit(function, lefts, widths, carriers)
-            good = errors <= max(tolerance, ROUND_OFF * size)
-            done.append((lefts[good], widths[good], carriers[good], series[good]))
-            lefts, widths = lefts[~good], widths[~good] / 2
-            lefts, widths = np.concatenate([lefts, lefts + widths]), np.concatenate([widths, widths])
-            count += int(np.sum(good))
-            worst = max(worst, float(np.max(errors[good], initial=0.0)))
-            if count + len(lefts) > MOST_PIECES or np.any(widths < np.finfo(float).eps * end):
-                raise NumericalFailure(
-                    f"function of time: not smooth enough for a tolerance of {tolerance:g} near t = {lefts[0]:g} s "
-                    f"(more than {MOST_PIECES} polynomials of degree {DEGREE})"
-                )
-        starts, widths, carriers, series = (np.concatenate(parts) for parts in zip(*done, strict=True))
-        order = np.argsort(starts)
-        scaled = series[order] @ _power_matrix() / widths[order, None] ** np.arange(DEGREE + 1)
-        return cls(np.append(starts[order], end), 1j * carriers[order], scaled, max(worst, ROUND_OFF * size))
+    def _interpolated(cls, found: Interpolant) -> History:
+        return cls(found.edges, 1j * found.carriers, found.coefficients, found.error)
 
     @property
     def pieces(self) -> int:
@@ -145,6 +133,16 @@ class History:
         last[finite] *= np.exp(self.rates[finite] * ends[finite])
         first = self.coefficients[:, 0].real
         return np.append(first, 0.0) - np.concatenate([[0.0], last.real])
+
+    def jump_times(self, error: float = 0.0) -> np.ndarray:
+        """The breaks (k,) at which u jumps, by more than interpolation leaves; error: of what u is the derivative of.
+
+        Where a polynomial is off by e on a piece of length w, its derivative is by some 2 D^2 e / w (Markov).
+        """
+        steepness = np.abs(self.rates) + 2 * DEGREE**2 / np.diff(self.breaks)
+        beside = np.maximum(np.append(steepness, 0.0), np.insert(steepness, 0, 0.0))
+        left = error * beside if error else self.error
+        return np.asarray(self.breaks[np.abs(self.jumps) > JUMP * self.largest + 4 * left])
 
     @functools.cached_property
     def largest(self) -> float:
@@ -185,43 +183,3 @@ def translated(rate: complex, coefficients: np.ndarray, delay: float) -> np.ndar
         for d in range(len(moved) - 2, lowest - 1, -1):
             moved[d] += delay * moved[d + 1]
     return moved
-
-
-@functools.cache
-def _nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Chebyshev points and midway points on [0, 1], values -> Chebyshev series, series -> values midway."""
-    angles = np.linspace(math.pi, 0.0, 2 * DEGREE + 1)
-    x = np.cos(angles)
-    own, between = x[::2], x[1::2]
-    fitted = np.linalg.inv(chebyshev.chebvander(own, DEGREE))
-    return (own + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
-
-
-def _fit(
-    function: Function, lefts: np.ndarray, widths: np.ndarray, carriers: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Chebyshev series (n, D + 1) of every piece on its carrier, its error (n,) midway, the largest value."""
-    own, between, fitted, midway = _nodes()
-
-    def sampled(places: np.ndarray) -> np.ndarray:
-        offsets = widths[:, None] * places
-        values = function((lefts[:, None] + offsets).ravel()).reshape(offsets.shape)
-        return np.asarray(values * np.exp(-1j * carriers[:, None] * offsets) if np.any(carriers) else values)
-
-    values, checks = sampled(own), sampled(between)
-    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(checks))):
-        raise NumericalFailure("function of time: gives a value that is not finite")
-    series = values @ fitted.T
-    errors = np.max(np.abs(series @ midway.T - checks), axis=1)
-    return series.astype(complex), errors, float(np.max(np.abs(values)))
-
-
-@functools.cache
-def _power_matrix() -> np.ndarray:
-    """Chebyshev series on [0, 1] -> powers of the place in the piece, (D + 1, D + 1)."""
-    rows = []
-    for k in range(DEGREE + 1):
-        powers = np.polynomial.Polynomial(chebyshev.cheb2poly(np.eye(DEGREE + 1)[k]))
-        shifted = powers(np.polynomial.Polynomial([-1.0, 2.0]))
-        rows.append(np.pad(shifted.coef, (0, DEGREE + 1 - len(shifted.coef))))
-    return np.array(rows)

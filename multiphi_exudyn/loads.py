@@ -132,15 +132,16 @@ class SampledLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class FunctionLoad(VaryingLoad):
-    """f(t) = p function(t), a smooth function of time [s]; tolerance: of the response, see Smooth."""
+    """f(t) = p function(t), a function of time [s]; tolerance: of the response; breaks: where it jumps; see Smooth."""
 
     function: Callable[[Any], Any]
     tolerance: float = 1e-9
+    breaks: Sequence[float] = ()
 
     @property
     def course(self) -> Smooth:
         """u(t)."""
-        return Smooth(self.function, self.tolerance)
+        return Smooth(self.function, self.tolerance, self.breaks)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,8 @@ FLOORS = (
         "modal_response",
         "root_search",
         "first_root",
+        "corners",
+        "interpolation",
         "history",
         "forced_response",
         "nonnegative",

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import NumericalFailure
-from multiphi_exudyn.history import MOST_PIECES, History
+from multiphi_exudyn.history import History
+from multiphi_exudyn.interpolation import MOST_PIECES
 
 T = np.linspace(0.0, 3.0, 20_011)
 
@@ -145,7 +146,7 @@ class TestFailures:
         "function",
         [lambda t, k: np.abs(t - k), lambda t, k: np.where(t < k, 0.0, 1.0), lambda t, k: np.sqrt(np.abs(t - k))],
     )
-    def test_a_function_that_is_not_smooth_is_resolved_or_refused_in_little_work(self, function, kink):
+    def test_a_function_that_is_not_smooth_is_resolved_in_little_work(self, function, kink):
         evaluated = 0
 
         def counted(t):
@@ -153,16 +154,11 @@ class TestFailures:
             evaluated += t.size
             return function(t, kink)
 
-        complaint = ""
-        try:
-            history = History.smooth(counted, 1.0, 1e-9)
-        except NumericalFailure as failure:
-            complaint = str(failure)
-        if not complaint:
-            t = np.linspace(0, 1, 10_001)[:-1]
-            assert np.max(np.abs(history.at(t) - function(t, kink))[np.abs(t - kink) > 1e-9]) < 1e-8
-        assert complaint == "" or "not smooth enough" in complaint
-        assert evaluated < 20_000
+        history = History.smooth(counted, 1.0, 1e-9)
+        t = np.linspace(0, 1, 10_001)[:-1]
+        assert np.max(np.abs(history.at(t) - function(t, kink))[np.abs(t - kink) > 1e-9]) < 1e-8
+        assert evaluated < 40_000
+        assert history.pieces < 150
 
     def test_noise_ends_at_the_most_pieces(self):
         random, evaluated = np.random.default_rng(0), 0
@@ -172,7 +168,7 @@ class TestFailures:
             evaluated += t.size
             return random.normal(size=t.shape)
 
-        with pytest.raises(NumericalFailure, match="not smooth enough"):
+        with pytest.raises(NumericalFailure, match="not smooth enough .* need a larger tolerance, or breaks"):
             History.smooth(noise, 1.0, 1e-6)
         assert evaluated < 40 * MOST_PIECES
 

@@ -14,7 +14,6 @@ from multiphi_exudyn import (
     Harmonic,
     HarmonicLoad,
     MultiPhiError,
-    NumericalFailure,
     Sampled,
     SampledLoad,
     Smooth,
@@ -167,7 +166,7 @@ class TestFunctions:
         assert "\n" not in str(caught.value)
 
     @pytest.mark.parametrize("function", [lambda t: math.floor(10 * t), lambda t: math.fmod(7 * t, 1.0)])
-    def test_a_function_with_jumps_is_refused_soon(self, function):
+    def test_jumps_are_found_in_calls_that_are_no_more_than_the_samples_and_their_search_need(self, function):
         calls = 0
 
         def counted(t):
@@ -175,6 +174,12 @@ class TestFunctions:
             calls += 1
             return function(t)
 
-        with pytest.raises(NumericalFailure, match="not smooth enough"):
-            Smooth(counted).history(1.0)
-        assert calls < 100_000
+        history = Smooth(counted).history(1.0)
+        assert_allclose(history.at(T[T < 1]), [function(t) for t in T[T < 1].tolist()], rtol=0, atol=1e-12)
+        assert len(history.jump_times()) in (10, 7)
+        assert calls < 25_000
+
+    @pytest.mark.parametrize("breaks", [3.0, "0.1", [None], [math.nan], ["a"]])
+    def test_breaks_that_are_no_times_are_refused(self, breaks):
+        with pytest.raises(MultiPhiError, match="breaks"):
+            FunctionLoad("m0", math.sin, breaks=breaks)

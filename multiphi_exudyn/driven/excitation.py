@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.courses import Course, Sampled
-from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.force_law import LawSpring
 from multiphi_exudyn.history import History, differentiated, translated
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
@@ -72,7 +72,8 @@ class Excitation:
         if not isinstance(loads, Iterable):
             raise MultiPhiTypeError(f"loads: got {type(loads).__name__}, need a sequence of loads")
         base, channels = model.base, _Channels(model, end, finer)
-        for load in loads:
+        for number, load in enumerate(loads):
+            channels.called = _called(number, load)
             channels.add(load)
         channels.add_static(static_load(model, loads))
         patterns = columns(channels.patterns, base.modes.count)
@@ -119,6 +120,7 @@ class _Channels:
         self.stops: list[np.ndarray] = []
         self.histories: list[History] = []
         self.rate_of: list[int] = []
+        self.called = ""  # the load that is added
 
     def add(self, load: Load) -> None:
         """One load's channels; static loads have none."""
@@ -154,6 +156,7 @@ class _Channels:
         structure = self._model.structure
         moved = structure.row(load.direction)
         inertia = -(self._model.base.modes.shapes.T @ (structure.mass @ moved))
+        self._check_continuous(self._history(load.course), "of the base", speed=True)
         self._append(inertia, self._no_stop(), load.course.acceleration(self._end, self._finer))
         fixed = self._no_stop()
         for name in load.fixed_stops:
@@ -178,9 +181,22 @@ class _Channels:
             raise MultiPhiTypeError(
                 f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
             )
-        if rigid or any(contact.damping for contact in moving):
+        viscous = [contact.name for contact in moving if contact.damping]
+        if rigid or viscous:
+            self._check_continuous(history, f"of the stop of {(rigid + viscous)[0]!r}", speed=bool(rigid))
             self.rate_of[-1] = len(self.histories)
             self._append(nothing, self._no_stop(), history.derivative)
+
+    def _check_continuous(self, history: History, of: str, speed: bool) -> None:
+        """Refuse a motion that jumps, or whose speed does."""
+        rate = history.derivative.jump_times(history.error) if speed else np.zeros(0)
+        for what, times in (("position", history.jump_times()), ("speed", rate)):
+            jumps = times[(times > 0) & (times < self._end)]
+            if len(jumps):
+                raise MultiPhiValueError(
+                    f"{self.called}: got a motion {of} whose {what} jumps at t = {jumps[0]:.9g} s, need a {what} "
+                    "without jumps"
+                )
 
     def _append(self, pattern: np.ndarray, stop: np.ndarray, history: History) -> None:
         self.patterns.append(pattern)
@@ -195,7 +211,18 @@ class _Channels:
         return np.zeros(len(self._model.contacts))
 
     def _history(self, course: Course) -> History:
-        return course.history(self._end, self._finer)
+        """The course of the load that is added; what is wrong with it is told with the load's name."""
+        try:
+            return course.history(self._end, self._finer)
+        except MultiPhiError as error:
+            raise type(error)(f"{self.called}: {error}") from error
+
+
+def _called(number: int, load: Load) -> str:
+    """How errors call a load."""
+    place = getattr(load, "at", getattr(load, "contact", None))
+    named = f" at {place!r}" if isinstance(place, (str, dict)) else ""
+    return f"loads[{number}] ({type(load).__name__}{named})"
 
 
 def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:

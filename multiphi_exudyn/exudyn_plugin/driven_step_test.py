@@ -25,8 +25,6 @@ from multiphi_exudyn.state import Row
 
 __all__ = ["DrivenStepTest", "jump_times"]
 
-JUMP = 1e-6  # of a course's largest value: what interpolation leaves between pieces is no jump
-
 
 class DrivenStepTest:
     """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s]."""
@@ -61,8 +59,7 @@ class DrivenStepTest:
 
 def jump_times(excitation: Excitation) -> np.ndarray:
     """When a channel jumps, ascending [s]."""
-    found = [h.breaks[np.abs(h.jumps) > JUMP * h.largest] for h in excitation.histories]
-    times = np.unique(np.concatenate(found))
+    times = np.unique(np.concatenate([history.jump_times() for history in excitation.histories]))
     return np.asarray(times[times > 0])
 
 
