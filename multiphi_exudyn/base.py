@@ -39,11 +39,12 @@ CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-
 class Base:
     """The structure and its contacts in coordinates y of its own modes, x = Phi y.
 
-    modes: of the open structure, (n, m). damping: (m, m), C in these coordinates. directions: H (m, c).
+    modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, c).
     contacts: as given. complete: whether m = n. mass: M (n, n), the structure's own.
     """
 
     modes: Modes
+    points: np.ndarray
     damping: np.ndarray
     directions: np.ndarray
     contacts: tuple[Contact, ...]
@@ -185,16 +186,18 @@ class Base:
 def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> Base:
     """The base of a structure: all its modes where that is affordable, else enough for ``modes`` of any level."""
     rows = np.array([structure.row(contact.direction) for contact in contacts]).reshape(-1, structure.n)
+    points = structure.point_rows
     complete = structure.n <= COMPLETE or modes == "all"
     if complete:
         found = complete_modes(_dense(structure.mass), _dense(structure.stiffness))
     else:
-        points = np.array([structure.row(name) for name in structure.points]).reshape(-1, structure.n)
         count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
         distinct = rows[sorted(set(rays_of(contacts)))]
         found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))
+    found = found.turned(points)
     return Base(
         modes=found,
+        points=points @ found.shapes,
         damping=_base_damping(structure, found),
         directions=cleared(found.shapes.T @ rows.T, np.abs(found.shapes.T) @ np.abs(rows.T)),
         contacts=tuple(contacts),

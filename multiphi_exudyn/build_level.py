@@ -14,6 +14,7 @@ from multiphi_exudyn.base import Base, cleared
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.level_modes import level_modes
+from multiphi_exudyn.modes import turned
 from multiphi_exudyn.supports import INDEPENDENT, Supports
 
 __all__ = ["build_level", "independent"]
@@ -35,6 +36,7 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     rigid_body = _rigid_body_modes(base, supports)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
+    squares, vectors = _turned(base, squares, vectors)
     zero = squares == 0
     _check(base, squares, vectors, supports, accuracy)
     damping = base.resistance(closed)
@@ -53,7 +55,14 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],
         computed=squares,
+        kept_beyond=0,
     )
+
+
+def _turned(base: Base, squares: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Modes of a level with signs and clusters chosen by contacts, then points, then the base's own modes."""
+    rows = np.vstack([base.directions.T, base.points])
+    return turned(squares, vectors, rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(base.modes.count)]))
 
 
 def _force_rows(

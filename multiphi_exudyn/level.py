@@ -21,6 +21,7 @@ from multiphi_exudyn.base import Base
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
+from multiphi_exudyn.modes import NEAR
 from multiphi_exudyn.rest import rest
 from multiphi_exudyn.structure import real_array
 from multiphi_exudyn.supports import Supports
@@ -77,6 +78,7 @@ class Level:
     force_rows, force_rate_rows: (k, r), contact force of the closed contacts from eta and eta'.
     neutral: (m, z), the zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
     computed: omega^2 (r,) of M and K themselves; ``squares`` differ where they are overridden.
+    kept_beyond: number of modes beyond those asked for, kept so that no cluster of modes of one frequency is cut.
     """
 
     closed: tuple[str, ...]
@@ -90,6 +92,7 @@ class Level:
     force_rate_rows: np.ndarray
     neutral: np.ndarray
     computed: np.ndarray
+    kept_beyond: int
 
     @property
     def modes(self) -> int:
@@ -147,10 +150,18 @@ class Level:
         """Let go of the samples for event location, most of what a level takes; they are made again when needed."""
         vars(self).pop("finder", None)
 
-    def truncated(self, modes: int) -> Level:
-        """The same level with its lowest ``modes`` modes."""
+    def apart(self, modes: int) -> int | None:
+        """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
+        steps = np.diff(self.squares[modes - 1 :])
+        clear = np.flatnonzero(steps > NEAR * np.abs(self.squares[modes:]))
+        return modes + int(clear[0]) if clear.size else None
+
+    def truncated(self, asked: int) -> Level:
+        """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
+        modes = self.apart(asked) or self.modes
         return replace(
             self,
+            kept_beyond=modes - asked,
             squares=self.squares[:modes],
             vectors=self.vectors[:, :modes],
             damping=self.damping[:modes, :modes],

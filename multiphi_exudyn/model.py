@@ -47,7 +47,8 @@ class MultiPhiModel:
     rules: what simulations keep for later ones, by static load, at most ``RULES``.
 
     Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
-    asked for, to the bit.
+    asked for, to the bit. Where a number of modes, or a cut-off, would part modes of one frequency, a level keeps all
+    of them (``Level.kept_beyond``), and a run says so.
     """
 
     structure: LinearStructure
@@ -116,7 +117,7 @@ class MultiPhiModel:
 
     @property
     def most_modes(self) -> int | None:
-        """The largest number of modes that a level can have; None where it has all of them."""
+        """The largest number of modes that a level is asked for; None where it has all of them."""
         if isinstance(self.modes, (UpTo, Tolerance)):
             return max(1, min(self.modes.most, self.structure.n - self.directions))
         return None if isinstance(self.modes, str) else int(self.modes)
@@ -130,6 +131,11 @@ class MultiPhiModel:
     def levels_kept(self) -> int:
         """Number of levels that are kept."""
         return len(self._levels)
+
+    @property
+    def keeps_clusters(self) -> bool:
+        """Whether one of the levels that are kept has modes beyond those asked for."""
+        return any(level.kept_beyond for _, level in self._levels.items())
 
     @functools.cached_property
     def most_levels(self) -> int:
@@ -177,9 +183,13 @@ class MultiPhiModel:
         """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
         base = self.base
         shared: Recent[tuple[int, ...], Level] = self._shared.setdefault("levels", Recent(self.most_levels))
-        found = shared.find(indices)
-        if found is None or found.modes < self._needed(indices):
-            found = shared.keep(indices, build_level(base, indices, self.most_modes))
+        most = base.modes.count - int(np.sum(np.isinf(base.stiffnesses[list(indices)])))
+        needed = most if self.most_modes is None else min(self.most_modes, most)
+        found, further = shared.find(indices), 1
+        while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
+            wanted = needed + further
+            found = shared.keep(indices, build_level(base, indices, wanted if wanted < most else None))
+            further *= 2
         return found
 
     def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
@@ -225,13 +235,8 @@ class MultiPhiModel:
     def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self.contacts[i].name for i in indices)
 
-    def _needed(self, indices: tuple[int, ...]) -> int:
-        """Number of modes that a level has to be built with, for a base that has them."""
-        all_of_it = self.base.modes.count - int(np.sum(np.isinf(self.base.stiffnesses[list(indices)])))
-        return all_of_it if self.most_modes is None else min(self.most_modes, all_of_it)
-
     def _modes_of(self, full: Level) -> int:
-        """Number of modes of a level that has been built with all it may have."""
+        """Number of modes that are asked for of a level that has been built with all it may have."""
         most = min(self.most_modes or full.modes, full.modes)
         if not isinstance(self.modes, UpTo):
             return most

@@ -8,10 +8,14 @@ R L^-T, K = R^T R, M = L L^T, taken by a one-sided Jacobi method (LAPACK gejsv) 
 accuracy in all of them. Source: J. Demmel et al., Computing the singular value decomposition with high
 relative accuracy, Linear Algebra Appl. 299 (1999) 21; Z. Drmac, K. Veselic, SIAM J. Matrix Anal. Appl.
 29 (2008) 1322.
+
+An eigensolver leaves the sign of a mode open, and the basis of what modes of one frequency span; round-off then
+chooses, and it differs between processors. ``turned`` makes both definite.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,11 +26,14 @@ import scipy.sparse.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 
-__all__ = ["Modes", "complete_modes", "lowest_modes", "right_singular_vectors"]
+__all__ = ["NEAR", "Modes", "complete_modes", "lowest_modes", "right_singular_vectors", "turned"]
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of |phi|^T |K| |phi|: strain energy below it is round-off, not stiffness
 FIRST_SHIFT = 1e-8  # of the largest K_ii / M_ii: regularises K until the first elastic mode is known
 DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it is round-off below
+EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
+NEAR = 1e-6  # of omega^2: round-off turns nearer modes into each other by more than 1e-10, so they are kept together
+MOVES = 1e-5  # of what modes can move a row by: with less, the round-off of a mode could choose its sign
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,12 @@ class Modes:
     def count(self) -> int:
         """Number of modes m."""
         return len(self.omega)
+
+    def turned(self, rows: np.ndarray) -> Modes:
+        """The same modes with what an eigensolver leaves open chosen by ``rows`` (k, n), then by the coordinates."""
+        sizes = np.linalg.norm(np.vstack([rows @ self.shapes, self.shapes]), axis=1)
+        squares, shapes = turned(self.omega**2, self.shapes, rows, sizes)
+        return Modes(np.sqrt(squares), shapes, self.rigid)
 
 
 def complete_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
@@ -110,6 +123,53 @@ def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if info != 0:
         raise NumericalFailure(f"singular values: the Jacobi iteration did not converge (info {info})")
     return (values * (work[0] / work[1]))[::-1], vectors[:, ::-1]
+
+
+def turned(
+    squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """omega^2 (m,) and modes (n, m), the same on every processor: signs, and bases of clusters of equal omega^2.
+
+    squares: ascending. rows: (k, n), followed by the coordinates themselves. sizes: (k + n,), what modes of unit length
+    can move each of these by. Of a cluster the first row that moves in it sees the first mode only, of the others the
+    first row that moves in one of them sees the first of these only, and so on; its omega^2 become their mean. The
+    first row that moves in a mode moves forward.
+    """
+    squares, shapes = squares.copy(), shapes.copy()
+    seen = np.vstack([rows @ shapes, shapes])
+    for first, last in _clusters(squares):
+        squares[first:last] = np.mean(squares[first:last])
+        turn = _turn(seen[:, first:last], sizes)
+        shapes[:, first:last] = shapes[:, first:last] @ turn
+        seen[:, first:last] = seen[:, first:last] @ turn
+    forward = seen[_first_moved(np.abs(seen), sizes[:, None]), np.arange(len(squares))] >= 0
+    return squares, np.where(forward, shapes, -shapes)
+
+
+def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
+    """First and one past the last mode of every cluster of two or more equal omega^2, ascending."""
+    apart = np.diff(squares) > EQUAL * np.maximum(np.abs(squares[1:]), np.abs(squares[:-1]))
+    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(squares)]
+    return [(first, last) for first, last in itertools.pairwise(edges) if last - first > 1]
+
+
+def _turn(seen: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Rotation (d, d) of d modes after which each is seen by its own row first; seen: (k, d) of all rows."""
+    turn = np.eye(seen.shape[1])
+    for j in range(len(turn) - 1):
+        left = seen @ turn[:, j:]
+        row = int(_first_moved(np.linalg.norm(left, axis=1), sizes))
+        towards = left[row] / (np.linalg.norm(left[row]) or 1.0)  # the mode that it sees comes first
+        towards[0] += np.copysign(1.0, towards[0])
+        turn[:, j:] -= np.outer(turn[:, j:] @ towards, towards) * (2 / (towards @ towards))
+    return turn
+
+
+def _first_moved(moved: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """First row that moves, by ``moved`` (k,) or in every column of (k, m), or else the one nearest to moving."""
+    share = np.divide(moved, sizes, out=np.zeros_like(moved), where=sizes > 0)
+    moves = share > MOVES
+    return np.where(np.any(moves, axis=0), np.argmax(moves, axis=0), np.argmax(share, axis=0))
 
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:

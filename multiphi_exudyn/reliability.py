@@ -3,6 +3,7 @@
 Every warning is one plain sentence with its number. It begins with its kind and a colon; many runs group them by kind:
 
     "linear range: ..."   what the model's own validity check says
+    "cluster: ..."        levels that keep more modes than asked for, so that no modes of one frequency are parted
 """
 
 from __future__ import annotations
@@ -16,7 +17,25 @@ def warnings_of(trajectory: Trajectory) -> tuple[str, ...]:
     """What a user must not miss of a run, one sentence each."""
     if not trajectory.segments:
         return ()
-    found = list[str]()
+    found = _clusters(trajectory)
     if trajectory.model.validity is not None:
         found.extend(trajectory.model.validity(trajectory))
     return tuple(found)
+
+
+def _clusters(trajectory: Trajectory) -> list[str]:
+    """One sentence where levels of the run keep modes beyond those asked for."""
+    if not trajectory.model.keeps_clusters:
+        return []  # without a look at segments, which a run makes only when they are asked for
+    visited = dict.fromkeys(segment.level.level.indices for segment in trajectory.segments)
+    levels = [trajectory.model.level_at(indices) for indices in visited]
+    kept = [level for level in levels if level.kept_beyond]
+    if not kept:
+        return []
+    most = max(kept, key=lambda level: level.kept_beyond)
+    asked, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
+    return [
+        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
+        f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
+        f"arbitrary; ask for {most.modes} modes"
+    ]

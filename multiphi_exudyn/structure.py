@@ -41,7 +41,10 @@ REAL_KINDS = "biufO"  # numpy's codes of what may be converted: numbers, and obj
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """Damping ratios of the open level's modes, lowest first: C = M Phi diag(2 zeta omega) Phi^T M.
+    """Damping ratios of the structure's modes, lowest first: C = M Phi diag(2 zeta omega) Phi^T M.
+
+    Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are
+    those that it does not see.
 
     ratios: fractions of critical damping (0.01 is 1 %), one per mode from the lowest.
     beyond: the ratio of every mode that is not listed.
@@ -129,6 +132,11 @@ class LinearStructure:
             return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
         return _vector("row", at, self.n)
 
+    @property
+    def point_rows(self) -> np.ndarray:
+        """The rows (k, n) of all points."""
+        return np.array(list(self.points.values())).reshape(-1, self.n)
+
     def vector(self, name: str, given: Any) -> np.ndarray:
         """A copy of ``given`` as finite (n,) numbers; ``name`` is what an error calls it."""
         return _vector(name, given, self.n)
@@ -140,7 +148,7 @@ def damping_matrix(structure: LinearStructure) -> Matrix | None:
     if isinstance(given, ModalDamping):
         if scipy.sparse.issparse(structure.mass) or scipy.sparse.issparse(structure.stiffness):
             raise MultiPhiValueError("damping: got ModalDamping of sparse matrices as one matrix, need dense ones")
-        modes = complete_modes(structure.mass, structure.stiffness)
+        modes = complete_modes(structure.mass, structure.stiffness).turned(structure.point_rows)
         momenta = structure.mass @ modes.shapes
         return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T
     if isinstance(given, RayleighDamping):

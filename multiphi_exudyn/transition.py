@@ -29,7 +29,7 @@ from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
 __all__ = ["LoadedLevel", "Transition", "mixed", "nearest_admissible"]
 
-UNMIXED = 1e-15  # product of two modes of unit length, below which they have no part in each other
+UNMIXED = 1e-13  # product of two modes of unit length, below which they have no part in each other
 
 
 @dataclass(frozen=True)

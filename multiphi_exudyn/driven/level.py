@@ -82,6 +82,7 @@ class DrivenLevel(LoadedLevel):
             force_rate_rows=np.hstack([own.force_rate_rows, parts.contact_force_rate]),
             neutral=own.neutral,
             computed=np.concatenate([own.computed, none]),
+            kept_beyond=own.kept_beyond,
             speeds=np.hstack([own.gap_rows, speeds]),
         )
         return cls(
