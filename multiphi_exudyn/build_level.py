@@ -12,10 +12,11 @@ import numpy as np
 
 from multiphi_exudyn.base import Base, cleared
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.least_distance import INDEPENDENT
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.level_modes import level_modes
 from multiphi_exudyn.modes import turned
-from multiphi_exudyn.supports import INDEPENDENT, Supports
+from multiphi_exudyn.supports import Supports
 
 __all__ = ["build_level", "independent"]
 

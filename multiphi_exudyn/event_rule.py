@@ -44,6 +44,7 @@ import numpy as np
 
 from multiphi_exudyn.build_level import independent
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.least_distance import Infeasible
 from multiphi_exudyn.passage import RESTING, Passage
 from multiphi_exudyn.state import Change, Loss, Phase, Rows, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
@@ -67,7 +68,10 @@ class EventRule(Passage):
         level, changes, admissible, stop_work = self.level(penetrating), list[Change](), velocity, 0.0
         if touching:
             rows = np.column_stack([self.model.base.directions.T, -self.stop_speeds])[list(touching)]
-            moved, impulses = nearest_admissible(rows, np.append(velocity, 1.0), len(velocity))
+            try:
+                moved, impulses = nearest_admissible(rows, np.append(velocity, 1.0), len(velocity))
+            except Infeasible as found:
+                raise self._squeezed([touching[k] for k in found.rows]) from found
             admissible, stop_work = moved[:-1], float(impulses @ self.stop_speeds[list(touching)])
             open_state = self._entered(level, displacement, velocity)
             level = self._impact(open_state, set(touching), set(penetrating))[0].level
@@ -137,12 +141,10 @@ class EventRule(Passage):
         if value > 0:
             return Phase.ARMED
         rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
-        if value == 0 or rate == 0:
+        if rate == 0:
             table = SignalTable(state.basis, state.shapes, Rows.of([own], len(state.shapes)), [False])
-            signals = table.signals(state.coefficients())
-            orders = (2, 2) if value == rate else (0, 1)  # from which on a derivative is more than round-off
-            value, rate = (state.finder.signs(signals, since)[0] for since in orders)
-        if value >= 0:
+            (rate,) = state.finder.signs(table.signals(state.coefficients(), state), since=2)
+        if value == 0 and rate >= 0:
             return Phase.ARMED
         stays = contact in self._viscous or (self._rigid[contact] and contact in state.closed)
         return Phase.RECOVERING if rate > 0 and not stays else Phase.REFUSED
@@ -155,7 +157,7 @@ class EventRule(Passage):
         sign = force.sign(state.displacement, state.velocity, state.reach)
         if sign == 0:
             table = SignalTable(state.basis, state.shapes, Rows.of([force], len(state.shapes)), [False])
-            (sign,) = state.finder.signs(table.signals(state.coefficients()))
+            (sign,) = state.finder.signs(table.signals(state.coefficients(), state))
         return sign <= 0
 
     def _held(self, state: State, contacts: Iterable[int]) -> set[int]:
@@ -269,9 +271,11 @@ class EventRule(Passage):
         The same function as ``entered_function``: a refused contact asks where that one says it may.
         """
         own, move = self.function(level, contact), self.transition(state.level, level)
+        there = self.transition(struck.level, level)
         pushed = (own.position @ move.matrix) * state.displacement
-        damped = (own.rate @ self.transition(struck.level, level).velocity_matrix) * struck.velocity
-        return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset))
+        damped = (own.rate @ there.velocity_matrix) * struck.velocity
+        size = float(np.abs(own.position @ there.matrix) @ struck.reach)
+        return sign_of(np.concatenate([pushed, damped]), own.constant + float(own.position @ move.offset), size)
 
     def _changes(
         self, state: State, striking: set[int], after: State, compliant: set[int], pushed: dict[int, float]
@@ -296,8 +300,9 @@ class EventRule(Passage):
         )
         if not np.any(resting):
             return set()
-        _, multipliers = self._nearest(state.level, rows[resting], state.acceleration)
         at_rest = np.array(touching)[resting].tolist()
+        sizes = np.abs(rows[resting]) @ state.accelerating
+        _, multipliers = self._nearest(state.level, at_rest, rows[resting], state.acceleration, sizes)
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         pressing = pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
         return self._joining(state, set(), pressing)

@@ -42,10 +42,14 @@ INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes l
 
 @dataclass(frozen=True)
 class Signals:
-    """s signals on one basis: coefficients (s, p) complex, constants (s,)."""
+    """s signals on one basis: coefficients (s, p) complex, constants (s,).
+
+    noise: (s,) what is round-off of the sums that the signals are, None where that of their exponentials is all.
+    """
 
     coefficients: np.ndarray
     constants: np.ndarray
+    noise: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ class DescentFinder:
         if len(signals.constants) == 0:
             return None
         constants: list[float] = signals.constants.tolist()
+        noise: list[float] = [0.0] * len(constants) if signals.noise is None else signals.noise.tolist()
         while start < horizon:
             until = min(horizon, start + self._window)
             latest = 2 * until - start  # a block may end behind
@@ -90,10 +95,13 @@ class DescentFinder:
                 return None
             if not math.isfinite(sum([bound[0] + bound[-1] for bound in bounds])):
                 raise NumericalFailure("the motion is not finite")
-            if start == 0.0 and (near := self._near(signals.coefficients, constants, bounds, latest)) is not None:
+            if (
+                start == 0.0
+                and (near := self._near(signals.coefficients, constants, bounds, noise, latest)) is not None
+            ):
                 return near if near.time <= horizon else None
             step = self._step(constants, bounds, until - start)
-            found = self._search_block(signals.coefficients, constants, bounds, start, step, horizon)
+            found = self._search_block(signals.coefficients, constants, bounds, noise, start, step, horizon)
             if found is not None:
                 return found
             start += INTERVALS * step
@@ -152,7 +160,12 @@ class DescentFinder:
             return found
 
     def _near(
-        self, coefficients: np.ndarray, constants: list[float], bounds: list[list[float]], valid: float
+        self,
+        coefficients: np.ndarray,
+        constants: list[float],
+        bounds: list[list[float]],
+        noise: list[float],
+        valid: float,
     ) -> Descent | None:
         """A first descent near t = 0 that Taylor's theorem certifies at once, None if it is not that plain.
 
@@ -175,7 +188,7 @@ class DescentFinder:
                 o == s or values[o] + constants[o] > bounds[o][1] * latest or slopes[o] > bounds[o][2] * latest
                 for o in range(len(constants))
             ):
-                search = RootSearch(self.basis, self._derivatives(coefficients[s], SAMPLED), constant, bound)
+                search = RootSearch(self.basis, self._derivatives(coefficients[s], SAMPLED), constant, bound, noise[s])
                 found = search.root(latest)
                 self.evaluations += search.evaluations
                 return Descent(found, s)
@@ -206,6 +219,7 @@ class DescentFinder:
         coefficients: np.ndarray,
         constants: list[float],
         bounds: list[list[float]],
+        noise: list[float],
         start: float,
         step: float,
         horizon: float,
@@ -215,13 +229,13 @@ class DescentFinder:
         table = self._table(step)
         controls = real_parts(local) @ table.controls
         self.evaluations += INTERVALS + 1
-        suspects = _doubtful(controls, constants, bounds, step)
+        suspects = _doubtful(controls, constants, bounds, noise, step)
         first: Descent | None = None
         end = horizon - start
         for k, s in sorted(suspects):  # the earliest doubt first: a descent found ends the search for others sooner
             if max(0, (k - 1) // 3) * step >= end:
                 break
-            search = RootSearch(self.basis, self._derivatives(local[s], SAMPLED), constants[s], bounds[s])
+            search = RootSearch(self.basis, self._derivatives(local[s], SAMPLED), constants[s], bounds[s], noise[s])
             found = search.in_block(_intervals(suspects[k, s]), table.values, step, end)
             self.evaluations += search.evaluations
             if found is not None and (first is None or found < end or s > first.signal):
@@ -255,7 +269,7 @@ class _Table:
 
 
 def _doubtful(
-    controls: np.ndarray, constants: list[float], bounds: list[list[float]], step: float
+    controls: np.ndarray, constants: list[float], bounds: list[list[float]], noise: list[float], step: float
 ) -> dict[tuple[int, int], list[int]]:
     """Control values (s, 3 INTERVALS + 1) that leave room for a root: by (the first of them, signal), ascending."""
     limits = [HERMITE * step**4 * bound[4] - constant for constant, bound in zip(constants, bounds, strict=True)]
@@ -265,7 +279,7 @@ def _doubtful(
     every: list[int] = places.tolist()
     for s, constant in enumerate(constants):
         doubtful = every[firsts[s] : firsts[s + 1]]
-        if doubtful and doubtful[0] < 3 and lifts_off(controls[s, :4].tolist(), constant, step, bounds[s]):
+        if doubtful and doubtful[0] < 3 and lifts_off(controls[s, :4].tolist(), constant, step, bounds[s], noise[s]):
             doubtful = [k for k in doubtful if k > 2]
         if doubtful:
             found[doubtful[0], s] = doubtful

@@ -17,9 +17,9 @@ from multiphi_exudyn.equilibrium import equilibrium
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.first_root import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
+from multiphi_exudyn.least_distance import Infeasible, least_distance
 from multiphi_exudyn.level import Level, LevelOverride
 from multiphi_exudyn.mode_choice import Tolerance, UpTo, is_count
-from multiphi_exudyn.nonnegative import nonnegative_least_squares
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import LinearStructure
 
@@ -29,7 +29,6 @@ CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept be
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
 RULES = 8  # static loads for which a model keeps what simulations have made of its levels
 SIGNAL_TABLES = 16  # kept of a level: sets of phases of its contacts; few come back
-INFEASIBLE = 1e-7  # residual of a least distance: below it the distance is some 1e7 of its nearest constraint
 
 
 @dataclass(frozen=True)
@@ -276,18 +275,12 @@ def _check_overrides(given: Any) -> None:
 def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
     """Which of the constraints rows z >= least press on the shortest z; they are independent of each other.
 
-    Least distance programming by non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares
-    Problems, 1974, ch. 23. Raises MultiPhiValueError where no z meets all of them.
+    Raises MultiPhiValueError where no z meets all of them.
     """
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0] = 1.0
-    wanted = least / lengths
-    if not np.any(wanted > 0):
-        return np.zeros(len(least), bool)
-    system = np.vstack([(rows / lengths[:, None]).T, wanted / np.max(wanted)])
-    target = np.zeros(len(system))
-    target[-1] = 1.0
-    multipliers = nonnegative_least_squares(system, target)
-    if np.linalg.norm(target - system @ multipliers) < INFEASIBLE:
-        raise MultiPhiValueError("static equilibrium: got rigid contacts that exclude each other, need a way between")
+    try:
+        _, multipliers = least_distance(rows, least, np.abs(least))
+    except Infeasible as found:
+        raise MultiPhiValueError(
+            "static equilibrium: got rigid contacts that exclude each other, need a way between"
+        ) from found
     return np.asarray(multipliers > 0)

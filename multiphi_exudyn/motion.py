@@ -123,7 +123,7 @@ class Motion:
         phases = state.phases
         while not asking:
             waiting, table = self.rule.watch(state, phases)
-            signals = table.signals(coefficients)
+            signals = table.signals(coefficients, state)
             found = finder.first(signals, horizon, reached)
             if found is None:
                 reached = horizon

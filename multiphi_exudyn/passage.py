@@ -12,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.contact_functions import ContactFunctions
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.least_distance import Infeasible
 from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.state import Loss, Phase, State
 from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
@@ -61,7 +63,7 @@ class Passage(ContactFunctions):
         """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
         rows = state.level.level.speed_rows[touching]
         free = self._free(state.level)
-        velocity, impulses = self._nearest(state.level, rows, state.velocity)
+        velocity, impulses = self._nearest(state.level, touching, rows, state.velocity)
         before, left = np.abs(state.velocity[:free]), np.abs(velocity[:free])
         stopped = left <= RESTING * before  # round-off of rest, which would bounce and rock on until it underflows
         velocity[:free][stopped | (np.linalg.norm(left) <= RESTING * np.linalg.norm(before))] = 0.0
@@ -70,9 +72,29 @@ class Passage(ContactFunctions):
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
         return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
 
-    def _nearest(self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``nearest_admissible`` among the motions of a level."""
-        return nearest_admissible(rows, vector, self._free(level))
+    def _nearest(
+        self,
+        level: LoadedLevel,
+        touching: Sequence[int],
+        rows: np.ndarray,
+        vector: np.ndarray,
+        sizes: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """``nearest_admissible`` among the motions of a level, for the rows of these contacts."""
+        try:
+            return self._nearest_of(level, rows, vector, sizes)
+        except Infeasible as found:
+            raise self._squeezed([touching[k] for k in found.rows]) from found
+
+    def _nearest_of(
+        self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray, sizes: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return nearest_admissible(rows, vector, self._free(level), sizes)
+
+    def _squeezed(self, contacts: Sequence[int]) -> NumericalFailure:
+        """The failure of a run in which stops that move leave no way out between these contacts."""
+        names = ", ".join(self.model.contacts[i].name for i in sorted(contacts))
+        return NumericalFailure(f"rigid contacts {names}: their stops move against each other and leave no way out")
 
     @staticmethod
     def _free(level: LoadedLevel) -> int:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.base import Base, cleared
-from multiphi_exudyn.supports import INDEPENDENT, Supports
+from multiphi_exudyn.least_distance import INDEPENDENT
+from multiphi_exudyn.supports import Supports
 
 __all__ = ["rest"]
 

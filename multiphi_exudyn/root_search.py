@@ -28,16 +28,19 @@ class RootSearch:
     """Search for the first descent of one signal, with bounds (7,) that hold on every interval it is asked about.
 
     derivatives: coefficients (5, p) of g and its first four derivatives. evaluations: times at which it was sampled.
+    noise: |g| that is round-off of what g is the sum of, beside that of its exponentials.
     """
 
-    def __init__(self, basis: Exponentials, derivatives: np.ndarray, constant: float, bounds: list[float]) -> None:
+    def __init__(
+        self, basis: Exponentials, derivatives: np.ndarray, constant: float, bounds: list[float], noise: float = 0.0
+    ) -> None:
         self.evaluations = 0
         self._basis = basis
         self._rates = basis.rates if basis.pure else None
         self._rows = real_parts(derivatives)
         self._constant = constant
         self._bounds = bounds
-        self._noise = ZERO * (bounds[0] + abs(constant)), ZERO * bounds[1], ZERO * bounds[2]
+        self._noise = max(ZERO * (bounds[0] + abs(constant)), noise), ZERO * bounds[1], ZERO * bounds[2]
 
     def in_block(self, intervals: Iterable[int], samples: np.ndarray, step: float, end: float) -> float | None:
         """First descent in these intervals of a block, up to ``end``, from the block's start."""
@@ -166,10 +169,10 @@ class RootSearch:
         return t
 
 
-def lifts_off(controls: list[float], constant: float, width: float, bounds: list[float]) -> bool:
+def lifts_off(controls: list[float], constant: float, width: float, bounds: list[float], noise: float) -> bool:
     """``RootSearch`` on a signal that rises, by the Bernstein coefficients of an interval, without their constant."""
     left, inner_left, inner_right, right = controls
-    if left + constant < -ZERO * (bounds[0] + abs(constant)):
+    if left + constant < -max(ZERO * (bounds[0] + abs(constant)), noise):
         return False
     lifted = min(3 * (inner_left + constant), 1.5 * (inner_right + constant), right + constant)
     return lifted > LIFTED * width**4 * bounds[4]

@@ -67,6 +67,14 @@ class State:
         """eta'' (r,)."""
         return self.level.acceleration(self.displacement, self.velocity)
 
+    @functools.cached_property
+    def accelerating(self) -> np.ndarray:
+        """Of which terms (r,) the accelerations are the sums, and omega |eta'|, how large the velocities make them."""
+        own = self.level.level
+        speeds = np.abs(self.velocity)
+        forced = np.abs(self.level.asymptotic.drive) + np.abs(own.damping) @ speeds
+        return np.asarray(np.abs(own.squares * self.displacement) + own.omega * speeds + forced)
+
     @property
     def basis(self) -> Exponentials:
         """The exponentials of the motion that starts here."""
@@ -226,10 +234,25 @@ class Rows:
     def clear(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Which of them (k,) ``Row.sign`` calls positive, whatever the order in which their terms are added."""
         value = self.position @ displacement + self.constant
-        size = np.abs(self.position) @ (np.abs(displacement) + reach) + np.abs(self.constant)
         if self.rate is not None:
-            value, size = value + self.rate @ velocity, size + np.abs(self.rate) @ np.abs(velocity)
-        return np.asarray(value > CLEAR * size)
+            value = value + self.rate @ velocity
+        return np.asarray(value > CLEAR * self.sizes(displacement, velocity, reach))
+
+    def sizes(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> np.ndarray:
+        """Of which terms (k,) their values are the sums, as in ``Row.sign``."""
+        position, rate = self._magnitudes
+        size = position @ (np.abs(displacement) + reach) + np.abs(self.constant)
+        return np.asarray(size if rate is None else size + rate @ np.abs(velocity))
+
+    def rate_sizes(self, velocity: np.ndarray, acceleration: np.ndarray, swing: np.ndarray) -> np.ndarray:
+        """Of which terms (k,) their time derivatives are the sums, as in ``Row.rate_sign``."""
+        position, rate = self._magnitudes
+        size = position @ (np.abs(velocity) + swing)
+        return np.asarray(size if rate is None else size + rate @ np.abs(acceleration))
+
+    @functools.cached_property
+    def _magnitudes(self) -> tuple[np.ndarray, np.ndarray | None]:
+        return np.abs(self.position), None if self.rate is None else np.abs(self.rate)
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
@@ -250,16 +273,20 @@ class SignalTable:
 
     def __init__(self, basis: Exponentials, shapes: np.ndarray, rows: Rows, rates: list[bool]) -> None:
         self._basis = basis
+        self._rows = rows
         self._position = rows.position @ shapes
         self._rate = None if rows.rate is None else rows.rate @ shapes
         self._rates = np.flatnonzero(rates)
         self._constants = np.where(rates, 0.0, rows.constant)
 
-    def signals(self, coefficients: np.ndarray) -> Signals:
-        """The signals of the motion with these coefficients (p,)."""
+    def signals(self, coefficients: np.ndarray, state: State) -> Signals:
+        """The signals of the motion with these coefficients (p,), which starts at ``state``."""
         values = self._position * coefficients
         if self._rate is not None:
             values = values + self._basis.derivative(self._rate * coefficients)
+        noise = CLEAR * self._rows.sizes(state.displacement, state.velocity, state.reach)
         if len(self._rates):
             values[self._rates] = self._basis.derivative(values[self._rates])
-        return Signals(values, self._constants)
+            meant = self._rows.some(self._rates.tolist())
+            noise[self._rates] = CLEAR * meant.rate_sizes(state.velocity, state.acceleration, state.swing)
+        return Signals(values, self._constants, noise)

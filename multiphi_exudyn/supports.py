@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["INDEPENDENT", "Supports"]
-
-INDEPENDENT = 1e-10  # of the largest: singular values of contact directions below it are dependent contacts
+__all__ = ["Supports"]
 
 
 @dataclass(frozen=True)

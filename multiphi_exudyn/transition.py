@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.base import cleared
+from multiphi_exudyn.least_distance import least_distance
 from multiphi_exudyn.level import Asymptotic, Level
-from multiphi_exudyn.nonnegative import nonnegative_least_squares
 
 __all__ = ["LoadedLevel", "Transition", "mixed", "nearest_admissible"]
 
@@ -130,22 +130,18 @@ def mixed(target: Level, source: Level) -> np.ndarray:
     return np.where(np.abs(products) <= UNMIXED, 0.0, products)
 
 
-def nearest_admissible(rows: np.ndarray, vector: np.ndarray, free: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+def nearest_admissible(
+    rows: np.ndarray, vector: np.ndarray, free: int | None = None, sizes: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(v+, p): the vector nearest to ``vector`` (r,) with rows v+ >= 0, and its multipliers p (k,) >= 0.
 
     Both of Moreau's laws: velocities at an impact, accelerations of contacts that touch at rest. Only the first
-    ``free`` components change, all of them for None.
+    ``free`` components change, all of them for None; the others are those of stops that move. sizes: (k,) of the terms
+    of rows v beside those of v itself, for what is round-off. Post-conditions and errors are those of least_distance.
     """
     free = len(vector) if free is None else free
-    rows, given = rows[:, :free], rows @ vector
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0] = 1.0  # a contact that no kept mode moves
-    if len(rows) == 1:
-        multipliers = np.array([max(0.0, -float(given[0]) / float(lengths[0]) ** 2)])
-    else:
-        units = rows / lengths[:, None]
-        same = vector if free == len(vector) else np.linalg.lstsq(units, given / lengths, rcond=None)[0]
-        multipliers = nonnegative_least_squares(units.T, -same) / lengths
+    terms = np.abs(rows) @ np.abs(vector) + (0.0 if sizes is None else sizes)
+    change, multipliers = least_distance(rows[:, :free], -(rows @ vector), terms)
     after = vector.copy()
-    after[:free] += multipliers @ rows
+    after[:free] += change
     return after, multipliers

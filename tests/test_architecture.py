@@ -21,7 +21,7 @@ FLOORS = (
         "interpolation",
         "history",
         "forced_response",
-        "nonnegative",
+        "least_distance",
         "recent",
         "chords",
     ),

@@ -43,14 +43,16 @@ def row_sign(k: Levels, a: int, row: np.ndarray, constant: float, x: np.ndarray,
     return sign_of(value + constant, size)
 
 
-@jit
-def reaction_sign(row: np.ndarray, constant: float, x: np.ndarray, v: np.ndarray, r: int) -> int:
+@inlined
+def reaction_sign(k: Levels, a: int, row: np.ndarray, constant: float, x: np.ndarray, v: np.ndarray) -> int:
     """The same, every term taken for itself."""
     value, size = 0.0, abs(constant)
-    for i in range(r):
+    for i in range(k.sizes[a, 0]):
         pushed, damped = row[0, i] * x[i], row[1, i] * v[i]
         value += pushed + damped
         size += abs(pushed) + abs(damped)
+        if k.squared[a, i] != 0:
+            size += abs(row[0, i] * v[i]) / math.sqrt(abs(k.squared[a, i]))
     return sign_of(value + constant, size)
 
 
@@ -76,6 +78,19 @@ def accelerate(k: Levels, a: int, x: np.ndarray, v: np.ndarray, result: np.ndarr
     for j in range(r):
         for i in range(r):
             result[i] -= k.damping[a, j, i] * v[j]
+
+
+@inlined
+def accelerating(k: Levels, a: int, row: np.ndarray, x: np.ndarray, v: np.ndarray) -> float:
+    """Of which terms row . eta'' is the sum; see State.accelerating."""
+    total = 0.0
+    for i in range(k.sizes[a, 0]):
+        square = abs(k.squared[a, i])
+        terms = square * abs(x[i]) + math.sqrt(square) * abs(v[i])
+        for j in range(k.sizes[a, 0]):
+            terms += abs(k.damping[a, j, i] * v[j])
+        total += abs(row[0, i]) * terms
+    return total
 
 
 @inlined
@@ -167,12 +182,9 @@ def standing(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, c: n
     if k.rated[a]:
         accelerate(k, a, x, v, work)
     rate = rate_sign(k, a, row, x, v, work)
-    if value == 0 and rate == 0:
-        value = rate = first_sign(k, a, contact, c, 2)
-    elif value == 0 or rate == 0:
-        value = first_sign(k, a, contact, c, 0)
-        rate = first_sign(k, a, contact, c, 1)
-    if value >= 0:
+    if rate == 0:
+        rate = first_sign(k, a, contact, c, 2)
+    if value == 0 and rate >= 0:
         return ARMED
     pulls = k.rigid[contact] and k.closed[a, contact]
     return RECOVERING if rate > 0 and not pulls else REFUSED
@@ -215,14 +227,15 @@ def strike(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, work: 
             v[i] = 0.0
     left, _, more = push(row, v, r)
     accelerate(k, a, x, v, work)
-    pressing, _, noise = push(row, work, r)
+    pressing, _, _ = push(row, work, r)
+    noise = accelerating(k, a, row, x, v)
     if abs(left) > RESTING * (size + more) or abs(pressing) <= ZERO * noise:
         return NOT_PLAIN, 0.0
     if pressing > 0:
         return LIFTED, impulse
     if k.target[a, contact] < 0:
         return NOT_PLAIN, 0.0
-    sign = reaction_sign(k.entered[a, contact], k.entered_constant[a, contact], x, v, r)
+    sign = reaction_sign(k, a, k.entered[a, contact], k.entered_constant[a, contact], x, v)
     return (PULLED if sign < 0 else PLAIN), impulse
 
 

@@ -47,6 +47,15 @@ class Drive:
             result += np.array([given[0], first[0], differentiated(rate, first)[0]]).real
         return result
 
+    @functools.cached_property
+    def sizes(self) -> np.ndarray:
+        """Of which terms w, w', w'' (3, q) at the instant are the sums."""
+        result = np.zeros((3, self.terms[0][1].shape[1]))
+        for rate, given in self.terms:
+            first = differentiated(rate, given)
+            result += np.abs([given[0], first[0], differentiated(rate, first)[0]])
+        return result
+
     def after(self, t: float) -> Drive:
         """The same from a time t [s] later."""
         return Drive(self.time + t, self.until, tuple((rate, translated(rate, a, t)) for rate, a in self.terms))

@@ -60,7 +60,8 @@ class DrivenSegment(Segment):
     @functools.cached_property
     def _works(self) -> tuple[float, float]:
         """Work [J] of damping and of what varies, by one quadrature."""
-        damped, damping, varying = bool(np.any(self.level.level.damping)), 0.0, 0.0
+        own = self.level.level
+        damped, damping, varying = bool(np.any(own.base.resistance(own.indices))), 0.0, 0.0
         for times, weights in self._quadrature(self.start, self.end):
             xi, xi_t = self.modal(times), self.modal(times, 1)
             varying += float(weights @ self._power(xi, xi_t, times))

@@ -47,6 +47,23 @@ class DrivenState(State):
         forced = self.level.force @ w + self.level.force_rate @ w_t
         return np.concatenate([self.level.plain.acceleration(eta, eta_t) + forced, self.drive.values[2]])
 
+    @functools.cached_property
+    def reach(self) -> np.ndarray:
+        """How far (r + q,) the velocities carry the modes, and the terms of the channels."""
+        return np.concatenate([self.plain.reach, self.drive.sizes[0]])
+
+    @functools.cached_property
+    def swing(self) -> np.ndarray:
+        """How fast (r + q,) the displacements make the modes, and the terms of the channels' rates."""
+        return np.concatenate([self.plain.swing, self.drive.sizes[1]])
+
+    @functools.cached_property
+    def accelerating(self) -> np.ndarray:
+        """Of which terms (r + q,) the accelerations are the sums, and how large the velocities make them."""
+        w, w_t, w_tt = self.drive.sizes
+        forced = np.abs(self.level.force) @ w + np.abs(self.level.force_rate) @ w_t
+        return np.concatenate([self.plain.accelerating + forced, w_tt])
+
     @property
     def basis(self) -> Exponentials:
         """The exponentials of the motion that starts here."""

@@ -23,6 +23,7 @@ import numpy as np
 from multiphi_exudyn.base import Base
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.modal_force import ForcedRule, InLevel
+from multiphi_exudyn.least_distance import Infeasible
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.state import State
 from multiphi_exudyn.transition import LoadedLevel, Transition, nearest_admissible
@@ -132,12 +133,19 @@ class AttachedRule(ForcedRule):
         self._immovable = attached.immovable(plain.model.base, in_base)
         self._mobilities = Recent[tuple[int, ...], np.ndarray](plain.model.most_levels)
 
-    def _nearest(self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _nearest_of(
+        self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray, sizes: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         root = self._mobilities.made(level.level.indices, lambda: self._mobility_root(level))
         within, impulses = rows @ root, np.zeros(len(rows))
         moving = np.sum(within**2, axis=1) > IMMOVABLE * np.sum(rows**2, axis=1)
         asked = np.column_stack([within, rows @ vector])[moving]
-        moved, impulses[moving] = nearest_admissible(asked, np.append(np.zeros(len(vector)), 1.0), len(vector))
+        terms = np.abs(rows) @ np.abs(vector) + (0.0 if sizes is None else sizes)
+        given = np.append(np.zeros(len(vector)), 1.0)
+        try:
+            moved, impulses[moving] = nearest_admissible(asked, given, len(vector), terms[moving])
+        except Infeasible as found:
+            raise Infeasible(np.flatnonzero(moving)[found.rows].tolist()) from found
         return vector + root @ moved[:-1], impulses
 
     def _joining(self, state: State, held: set[int], asking: set[int]) -> set[int]:
