@@ -9,6 +9,7 @@ import threading
 import numpy as np
 import pytest
 
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.sweep import Row, Store
 from multiphi_exudyn.study.sweep.store import pack
 
@@ -122,6 +123,85 @@ def test_a_file_that_is_no_store_is_refused_and_left_as_it_is(tmp_path, refused)
     for path in paths:
         refused(ValueError, f"path: {path}: ", Store, path)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def overwritten(whole, kind, seed):
+    """The bytes with something random written over them: single ones, a stretch, nothings, a page by another one."""
+    rng, content = np.random.default_rng(seed), bytearray(whole)
+    begin, length = int(rng.integers(72, len(whole))), int(rng.integers(1, 9000))
+    end = min(begin + length, len(whole))
+    if kind == "bytes":
+        content[begin] = int(rng.integers(256))
+        for place in rng.integers(0, len(whole), int(rng.integers(0, 60))):
+            content[place] = int(rng.integers(256))
+    elif kind == "page":
+        one, other = rng.integers(1, len(whole) // PAGE, 2) * PAGE
+        content[one : one + PAGE] = whole[other : other + PAGE]
+    else:
+        content[begin:end] = rng.bytes(end - begin) if kind == "stretch" else bytes(end - begin)
+    return bytes(content)
+
+
+PAGE = 4096  # bytes of the file that SQLite reads at once
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """The bytes of a store with 200 runs, and its rows."""
+    path = tmp_path_factory.mktemp("sound") / "runs.db"
+    with Store(path) as store:
+        for x in range(200):
+            arrays = pack({"y": np.full(40, x)}) if x % 10 == 0 else None
+            store.add("pass", {"x": x}, row({"x": x}, values={"y": 1.5 * x}, environment={"host": str(x % 3)}), arrays)
+        rows = store.rows("pass")
+    return path.read_bytes(), rows
+
+
+def read(store):
+    """All runs, each of them asked for alone, and their histories' means."""
+    alone = tuple(store.find("pass", {"x": x}) for x in range(200))
+    return store.rows("pass"), alone, [store.histories("pass", {"x": x})["y"].mean() for x in range(0, 200, 10)]
+
+
+@pytest.mark.parametrize("kind", ["bytes", "stretch", "nothing", "page"])
+def test_a_store_overwritten_at_random_is_refused_or_gives_every_run(tmp_path, sound, kind):
+    whole, rows = sound
+    said = []
+    for seed in range(60):
+        path = tmp_path / f"{seed}.db"
+        path.write_bytes(overwritten(whole, kind, seed))
+        try:
+            with Store(path) as store:
+                assert read(store) == (rows, rows, list(range(0, 200, 10))), f"seed {seed}"
+        except MultiPhiValueError as error:
+            said.append(str(error))
+    assert len(said) >= 40
+    assert all(sentence.startswith(f"path: {tmp_path}") and "\n" not in sentence for sentence in said)
+
+
+def test_a_run_with_another_value_in_its_place_is_refused(tmp_path, sound, refused):
+    changed = sound[0].replace(b'{"y": 150.0}', b'{"y": 151.0}')
+    assert changed != sound[0]
+    (tmp_path / "runs.db").write_bytes(changed)
+    with Store(tmp_path / "runs.db") as store:
+        assert store.find("pass", {"x": 99}) == sound[1][99]
+        refused(ValueError, f"path: {store.path}: is damaged (a run is not", store.find, "pass", {"x": 100})
+        refused(ValueError, f"path: {store.path}: is damaged (a run is not", store.rows, "pass")
+
+
+def test_a_run_that_is_missing_in_page_and_index_is_noticed(tmp_path, sound, refused):
+    (tmp_path / "runs.db").write_bytes(sound[0])
+    database(tmp_path / "runs.db", "DELETE FROM runs WHERE number = 7")
+    begins = f"path: {tmp_path / 'runs.db'}: is damaged (199 runs where the last one has the number 200)"
+    refused(ValueError, begins, Store, tmp_path / "runs.db")
+
+
+def test_a_store_of_an_earlier_format_is_refused_with_what_can_be_done(tmp_path, refused):
+    with Store(tmp_path / "runs.db"):
+        pass
+    database(tmp_path / "runs.db", "UPDATE format SET version = 1")
+    begins = f"path: {tmp_path / 'runs.db'}: has format 1, this version reads 2; need a sound file"
+    refused(ValueError, begins, Store, tmp_path / "runs.db")
 
 
 def test_a_folder_or_a_path_without_one_is_refused(tmp_path, refused):

@@ -7,6 +7,11 @@ holds outlives a killed process; a power failure may take the last runs, never t
 again. The log needs memory that its users share: all who write into one file are on one machine (workers elsewhere are
 not concerned, they hand their rows back).
 
+A file that was damaged is refused, never read in part: SQLite's own check of all pages and indices and the numbers of
+the runs, which have no gaps, are looked at when it is opened and when all runs are asked for; what a run is read from
+has to have the sha256 that was stored with it. Nothing is repaired: what a damaged file still holds cannot be told
+from what it has lost.
+
 A run's key is (name, sha256 of its parameters' canonical JSON): sorted, without blanks, 1 and 1.0 being different.
 A new file is made under a temporary name and linked to its own, so that nobody ever sees a part of it.
 """
@@ -35,7 +40,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 __all__ = ["STATUSES", "Row", "Store", "checked", "key_of", "pack", "plain"]
 
 STATUSES = ("ok", "failed", "over budget")
-FORMAT = 1
+FORMAT = 2
 MARK = int.from_bytes(b"mPhi", "big")  # SQLite's application id, bytes 68 to 71 of the file
 WAIT_S = 60.0  # s, for another process that writes
 SCHEMA = f"""
@@ -48,12 +53,13 @@ CREATE TABLE environments (number INTEGER PRIMARY KEY, content TEXT NOT NULL UNI
 CREATE TABLE runs (
     number INTEGER PRIMARY KEY, name TEXT NOT NULL, key TEXT NOT NULL, parameters TEXT NOT NULL, status TEXT NOT NULL,
     message TEXT NOT NULL, content TEXT NOT NULL, elapsed_s REAL NOT NULL, environment INTEGER NOT NULL,
-    finished TEXT NOT NULL, histories BLOB, UNIQUE (name, key)
+    finished TEXT NOT NULL, histories BLOB, histories_sum TEXT, sum TEXT NOT NULL, UNIQUE (name, key)
 );
 COMMIT;
 """
-ROW = """SELECT runs.parameters, status, message, runs.content, elapsed_s, environments.content, finished
-FROM runs JOIN environments ON environments.number = environment WHERE name = ?"""
+SUMMED = ("name", "key", "parameters", "status", "message", "content", "elapsed_s", "finished", "histories_sum")
+ROW = f"""SELECT {", ".join(f"runs.{column}" for column in SUMMED)}, environments.content, sum
+FROM runs LEFT JOIN environments ON environments.number = environment WHERE name = ?"""
 
 
 @dataclass(frozen=True)
@@ -98,6 +104,7 @@ class Store:
     def rows(self, name: str) -> tuple[Row, ...]:
         """All runs of ``name``, in the order in which they were added."""
         with self._sound():
+            _check(self._connection)
             return tuple(map(_row, self._connection.execute(f"{ROW} ORDER BY runs.number", (name,))))
 
     def find(self, name: str, parameters: Mapping[str, Any]) -> Row | None:
@@ -108,12 +115,15 @@ class Store:
 
     def histories(self, name: str, parameters: Mapping[str, Any]) -> dict[str, np.ndarray] | None:
         """The run's arrays; None where none were kept."""
-        question = "SELECT histories FROM runs WHERE name = ? AND key = ?"
+        question = "SELECT histories, histories_sum FROM runs WHERE name = ? AND key = ?"
         with self._sound():
             found = self._connection.execute(question, (name, key_of(parameters))).fetchone()
-        if found is None or found[0] is None:
-            return None
-        with np.load(io.BytesIO(found[0]), allow_pickle=False) as arrays:
+            if found is None or found == (None, None):
+                return None
+            packed, known = found
+            if not isinstance(packed, bytes) or hashlib.sha256(packed).hexdigest() != known:
+                raise _Damaged("the histories of a run are not those that were stored")
+        with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
             return dict(arrays)
 
     def add(self, name: str, parameters: Mapping[str, Any], row: Row, histories: bytes | None = None) -> bool:
@@ -126,16 +136,18 @@ class Store:
         given, values = checked(parameters), plain(row.values, "values")
         fields: dict[str, Any] = {"name": name, "key": key_of(given), "parameters": json.dumps(given)}
         fields |= {"status": row.status, "message": row.message, "content": json.dumps(values)}
-        fields |= {"elapsed_s": row.elapsed_s, "finished": row.finished, "histories": histories}
+        fields |= {"elapsed_s": float(row.elapsed_s), "finished": row.finished}
+        fields["histories_sum"] = None if histories is None else hashlib.sha256(histories).hexdigest()
+        environment = json.dumps(plain(row.environment, "environment"), sort_keys=True)
+        fields["sum"] = _sum(*(fields[column] for column in SUMMED), environment)
         with self._sound():
-            fields["environment"] = self._environment(row.environment)
+            fields |= {"environment": self._environment(environment), "histories": histories}
             places, marks = ", ".join(fields), ", ".join(f":{field}" for field in fields)
             order = f"INSERT INTO runs ({places}) VALUES ({marks}) ON CONFLICT DO NOTHING"
             return self._connection.execute(order, fields).rowcount == 1
 
-    def _environment(self, environment: Mapping[str, Any]) -> int:
+    def _environment(self, content: str) -> int:
         """Number of the environment, which stands in the file once."""
-        content = json.dumps(plain(environment, "environment"), sort_keys=True)
         if content not in self._environments:
             self._connection.execute("INSERT INTO environments (content) VALUES (?) ON CONFLICT DO NOTHING", (content,))
             found = self._connection.execute("SELECT number FROM environments WHERE content = ?", (content,))
@@ -146,8 +158,15 @@ class Store:
     def _sound(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.DatabaseError as error:
-            raise _unusable(self.path, str(error)) from error
+        except READING as error:
+            raise _unusable(self.path, f"is damaged ({error})") from error
+
+
+class _Damaged(Exception):
+    """What was stored is not there any more; the message says what."""
+
+
+READING = (sqlite3.Error, UnicodeDecodeError, _Damaged)  # raised where a file is damaged
 
 
 def key_of(parameters: Mapping[str, Any]) -> str:
@@ -195,14 +214,35 @@ def _refused(value: float, place: str) -> Any:
     raise MultiPhiValueError(f"{place}: {value}; need a finite number")
 
 
+def _sum(*columns: Any) -> str:
+    """sha256 of what a run is read from."""
+    return hashlib.sha256(repr(columns).encode()).hexdigest()
+
+
 def _row(found: tuple[Any, ...]) -> Row:
-    parameters, status, message, values, elapsed_s, environment, finished = found
+    *columns, known = found
+    if _sum(*columns) != known:
+        raise _Damaged("a run is not the one that was stored")
+    _, _, parameters, status, message, values, elapsed_s, finished, _, environment = columns
     content = json.loads(parameters), json.loads(values), json.loads(environment)
     return Row(content[0], status, message, content[1], elapsed_s, content[2], finished)
 
 
+def _check(connection: sqlite3.Connection) -> None:
+    """Raises where the file is not whole: its pages and indices, and the runs' numbers 1 to their count."""
+    (said,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    if said != "ok":
+        raise _Damaged(" ".join(str(said).split()))
+    count, last = connection.execute("SELECT count(*), coalesce(max(number), 0) FROM runs").fetchone()
+    if count != last:
+        raise _Damaged(f"{count} runs where the last one has the number {last}")
+
+
 def _unusable(path: Path, cause: str) -> MultiPhiValueError:
-    return MultiPhiValueError(f"path: {path}: {cause}; need a sound file of this library's sweeps, or a new name")
+    return MultiPhiValueError(
+        f"path: {path}: {cause}; need a sound file of this library's sweeps (a copy of it), or a new name, under which "
+        "all runs are computed again"
+    )
 
 
 def _create(path: Path) -> None:
@@ -233,10 +273,12 @@ def _opened(path: Path) -> sqlite3.Connection:
             connection.execute("PRAGMA synchronous = NORMAL")
             found = connection.execute("SELECT version FROM format").fetchall()
             if found != [(FORMAT,)]:
-                raise _unusable(path, f"has format {found}, this version has {FORMAT}")
+                versions = ", ".join(str(version) for (version,) in found)
+                raise _unusable(path, f"has format {versions or 'none'}, this version reads {FORMAT}")
+            _check(connection)
         except BaseException:
             connection.close()
             raise
-    except sqlite3.DatabaseError as error:
-        raise _unusable(path, str(error)) from error
+    except READING as error:
+        raise _unusable(path, f"is damaged ({error})") from error
     return connection
