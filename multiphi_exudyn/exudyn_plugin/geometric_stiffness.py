@@ -21,8 +21,9 @@ from exudyn.advancedUtilities import NumericalJacobian
 
 from multiphi_exudyn.exudyn_plugin.items import is_curved
 
-__all__ = ["generalised_forces", "geometric_stiffness", "static_solver"]
+__all__ = ["constraint_jacobian", "generalised_forces", "geometric_stiffness", "static_solver"]
 
+ROUND_OFF = 1e-12  # of the largest force: what solving for a constraint force of zero leaves of it
 STRAIGHT = ("MassPoint", "Mass1D", "ANCF", "Ground")  # bodies whose points move linearly with the coordinates
 
 
@@ -63,25 +64,28 @@ def _may_turn(mbs: Any, load: Mapping[str, Any]) -> bool:
 
 
 def _of_constraints(mbs: Any, solver: Any) -> np.ndarray:
-    count, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()
-
-    def jacobian() -> np.ndarray:
-        solver.SetSystemJacobian(np.zeros((size, size)))
-        solver.ComputeJacobianAE(mbs)
-        return np.array(solver.GetSystemJacobian())[count:, :count]
-
+    count = solver.GetODE2size()
     solver.ComputeMassMatrix(mbs)
     mass = np.array(solver.GetSystemMassMatrix())[:count, :count]
-    carried = _carried(mass, jacobian(), generalised_forces(mbs, solver))
-    return np.asarray(NumericalJacobian(mbs, lambda: carried @ jacobian(), range(count)))
+    carried = _carried(mass, constraint_jacobian(mbs, solver), generalised_forces(mbs, solver))
+    return np.asarray(NumericalJacobian(mbs, lambda: carried @ constraint_jacobian(mbs, solver), range(count)))
+
+
+def constraint_jacobian(mbs: Any, solver: Any) -> np.ndarray:
+    """C (m, n_full) at the current state."""
+    count, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()
+    solver.SetSystemJacobian(np.zeros((size, size)))
+    solver.ComputeJacobianAE(mbs)
+    return np.array(solver.GetSystemJacobian())[count:, :count]
 
 
 def _carried(mass: np.ndarray, jacobian: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """mu (m,); redundant constraints share it."""
+    """mu (m,); redundant constraints share it. What is round-off of the forces is zero, and gives no stiffness."""
     held = len(jacobian)
     system = np.block([[mass, jacobian.T], [jacobian, np.zeros((held, held))]])
-    found = np.linalg.lstsq(system, np.concatenate([forces, np.zeros(held)]), rcond=None)[0]
-    return np.asarray(found[len(forces) :])
+    found = np.linalg.lstsq(system, np.concatenate([forces, np.zeros(held)]), rcond=None)[0][len(forces) :]
+    pushed = np.max(np.abs(found[:, None] * jacobian), axis=1, initial=0.0)
+    return np.where(pushed > ROUND_OFF * np.max(np.abs(forces), initial=0.0), found, 0.0)
 
 
 def _of_loads(mbs: Any, solver: Any, vectors: Mapping[int, Any]) -> np.ndarray:

@@ -6,7 +6,7 @@ ObjectConnectorCoordinateSpringDamperExt; everything else is a matrix, a constra
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 __all__ = [
     "Item",
+    "grouped",
     "has_contact",
     "has_stops",
     "is_constraint",
@@ -21,11 +22,15 @@ __all__ = [
     "left_out_functions",
     "left_out_objects",
     "load_item",
+    "missing_parts",
     "rough_parameters",
     "taken_objects",
     "user_function",
     "value_key",
 ]
+
+INACTIVE = "not active"
+NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"
 _FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor", "stickingStiffness")
@@ -114,6 +119,26 @@ def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
             yield Item("mbs", 0, f"{kind}UserFunction"), "what it does in a run"
 
 
+def grouped(told: Iterable[tuple[Item, str]]) -> list[str]:
+    """Sentences "16 ObjectContactCircleCable2D ('a', 'b', ...): ...", one for each type and what is said of it."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for item, said in told:
+        groups.setdefault((item.type, said), []).append(repr(item.name))
+    return [f"{_members(kind, names)}: {said}" for (kind, said), names in groups.items()]
+
+
+def _members(kind: str, names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"{kind} {names[0]}"
+    more = ["..."] if len(names) > NAMED else []
+    return f"{len(names)} {kind} ({', '.join([*names[:NAMED], *more])})"
+
+
+def missing_parts(left_out: Iterable[tuple[Item, str]]) -> list[str]:
+    """What a run of the model lacks, grouped; an item that is switched off acts in no run."""
+    return grouped((item, reason) for item, reason in left_out if reason != INACTIVE)
+
+
 def load_item(index: int, load: Mapping[str, Any], became: str = "") -> Item:
     return Item(load["name"], index, f"Load{load['loadType']}", became)
 
@@ -147,7 +172,7 @@ def _refusal(item: Mapping[str, Any]) -> str:
 def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
     """Why an object, or a part of it, is left out; empty if it is not."""
     if not _is_active(item):
-        return "not active"
+        return INACTIVE
     if _is_contact(item) and item["name"] not in contacts:
         return _refusal(item) or "constraints hold its gap"
     if has_stops(item) and not _stops(item, contacts):

@@ -22,7 +22,9 @@ import numpy as np
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.full_system import initial_is_current
 from multiphi_exudyn.exudyn_plugin.geometric_stiffness import generalised_forces, geometric_stiffness, static_solver
+from multiphi_exudyn.exudyn_plugin.linearisation import Linearisation
 from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 
@@ -123,22 +125,6 @@ def _check_law(item: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def initial_is_current(mbs: Any) -> Iterator[None]:
-    """Make the current state the initial one, about which Exudyn linearises; restore both afterwards."""
-    data, initial = mbs.systemData, exu.ConfigurationType.Initial
-    stored, current = data.GetSystemState(initial), data.GetSystemState()
-    accelerations, time = data.GetODE2Coordinates_tt(), data.GetTime()
-    data.SetSystemState(current, initial)
-    try:
-        yield
-    finally:
-        data.SetSystemState(stored, initial)
-        data.SetSystemState(current)
-        data.SetODE2Coordinates_tt(accelerations)
-        data.SetTime(time)
-
-
-@contextmanager
 def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
     """Switch the contacts off and, whatever happens, on again."""
     try:
@@ -168,6 +154,15 @@ def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     if basis.shape[1] == 0:
         raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
     return _symmetric("mass", mass), _symmetric("stiffness", stiffness), _symmetric("damping", damping), basis
+
+
+def linearised(mbs: Any, time: float) -> Linearisation:
+    """The system about its initial state, at a time [s], without contacts and loads by functions of time."""
+    mass, stiffness, damping, basis = projected_matrices(mbs)
+    data, initial = mbs.systemData, exu.ConfigurationType.Initial
+    displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+    static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
+    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time)
 
 
 def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:

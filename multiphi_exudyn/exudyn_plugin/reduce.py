@@ -13,9 +13,8 @@ Exudyn's contact dampers pull at separation; those of the model do not (contact.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import exudyn as exu
@@ -23,30 +22,28 @@ import numpy as np
 
 from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.full_system import initial_is_current, items_of, smooth
 from multiphi_exudyn.exudyn_plugin.items import (
     Item,
+    grouped,
     has_contact,
     has_stops,
     left_out_functions,
     left_out_objects,
     load_item,
-    rough_parameters,
+    missing_parts,
     taken_objects,
     user_function,
-    value_key,
 )
-from multiphi_exudyn.exudyn_plugin.linearize import (
-    LinearizedStructure,
-    check_system,
-    forces,
-    initial_is_current,
-    projected_matrices,
-)
+from multiphi_exudyn.exudyn_plugin.linear_range import LinearLimits, LinearRange, RangeCheck
+from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, check_system, linearised
 from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
-from multiphi_exudyn.loads import ConstantLoad, FunctionLoad, Load
+from multiphi_exudyn.exudyn_plugin.timed_loads import TimedLoad, function_loads, timed_loads
+from multiphi_exudyn.loads import ConstantLoad, Load
 from multiphi_exudyn.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.structure import Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.trajectory import Trajectory
 
 __all__ = ["Item", "Reduction", "reduce"]
 
@@ -77,11 +74,17 @@ class Reduction:
 
     @property
     def report(self) -> str:
-        """What was taken and what was left out, one item a line."""
+        """What was taken and what was left out, items of one type and one fate a line."""
         size = f"{self.structure.n} degrees of freedom, {len(self.model.contacts)} contacts, modes: {self.model.modes}"
-        taken = [f"  {item.type} {item.name!r}: {item.became}" for item in self.taken]
-        left = [f"  {item.type} {item.name!r}: {reason}" for item, reason in self.left_out]
+        taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
+        left = [f"  {line}" for line in grouped(self.left_out)]
         return "\n".join([size, "taken", *taken, "left out", *(left or ["  nothing"])])
+
+    def check(self, trajectory: Trajectory) -> RangeCheck:
+        """How far a trajectory of this model left the linear range (linear_range.py); its warnings say so too."""
+        validity = self.model.validity
+        assert isinstance(validity, (LinearRange, LinearLimits))
+        return validity.check(trajectory)
 
 
 def reduce(
@@ -89,6 +92,7 @@ def reduce(
     modes: int | str | UpTo | Tolerance = 12,
     points: Mapping[str, Any] | None = None,
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
+    strict: bool = False,
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
@@ -96,84 +100,58 @@ def reduce(
     points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
     ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``.
 
+    strict: whether to refuse a system of which something is left out, instead of a warning of every run.
+
     Raises MultiPhiValueError for a system without a symmetric linearisation of second order.
     """
     check_system(mbs)
-    objects = [mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())]
-    loads = [mbs.GetLoad(exu.LoadIndex(i)) for i in range(mbs.systemData.NumberOfLoads())]
+    objects, loads = items_of(mbs)
     now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
     with initial_is_current(mbs):
         gaps = {i: _distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
-        with _smooth(mbs, objects, loads):
-            mass, stiffness, dampers, basis = projected_matrices(mbs)
-            velocity = basis.T @ mbs.systemData.GetODE2Coordinates_t()
-            static = basis.T @ forces(mbs) + dampers @ velocity
-        rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
-        contacts = [c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i], basis)]
-        varying = {i: _varying(mbs, load, now, basis) for i, load in enumerate(loads) if user_function(load)}
-    own = dampers if np.any(dampers) else None
+        with smooth(mbs, objects, loads):
+            linear = linearised(mbs, now)
+            varying = timed_loads(mbs, loads, now)
+        rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
+        full_contacts = [c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i])]
+    full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
+    timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
+    own = linear.damping if np.any(linear.damping) else None
     given = own if damping is None else damping
-    structure = LinearizedStructure(mass, stiffness, given, rows, coordinates=basis)
+    structure = LinearizedStructure(linear.mass, linear.stiffness, given, rows, coordinates=linear.basis)
+    contacts = [replace(c, direction=_projected(full_rows[c.name], linear.basis)) for c in full_contacts]
     moving = [c for c in contacts if np.any(structure.row(c.direction))]
     names = {c.name for c in moving}
+    taken = (*taken_objects(objects, names), *_taken_loads(loads, timed))
+    left_out = (
+        *left_out_objects(objects, names),
+        *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
+        *left_out_functions(mbs),
+    )
+    missing = missing_parts(left_out)
+    if strict and missing:
+        raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
+    linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed)
+    validity = LinearRange(mbs, linear, missing)
     return Reduction(
-        MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving))),
-        velocity,
-        (*([ConstantLoad(static, 1.0)] if np.any(static) else []), *_taken_of(varying).values()),
-        (*taken_objects(objects, names), *_taken_loads(loads, _taken_of(varying))),
-        (*left_out_objects(objects, names), *_left_out_loads(loads, varying), *left_out_functions(mbs)),
+        MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
+        linear.basis.T @ linear.velocity,
+        (
+            *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
+            *(each for load in timed.values() for each in function_loads(load, linear.basis)),
+        ),
+        taken,
+        left_out,
     )
 
 
-def _varying(mbs: Any, load: Mapping[str, Any], start: float, basis: np.ndarray) -> FunctionLoad | str:
-    """A load by a user function as a function of time, or why it is none."""
-    marker = exu.MarkerIndex(load["markerNumber"])
-    if load["loadType"] != "Coordinate" or mbs.GetMarker(marker)["markerType"] != "NodeCoordinate":
-        return "its user function gives no force on one coordinate"
-    value, held = load["load"], load[user_function(load)]
-    if held["type"] != "Python":
-        return f"its user function is of type {held['type']}, need Python"
-    function = held["function"]
-
-    def force(t: float) -> float:
-        return float(function(_NO_SYSTEM, start + float(t), value))
-
-    try:
-        force(0.0)
-    except Exception as error:  # whatever the user's function raises
-        return f"its user function is none of time alone ({' '.join(str(error).split())})"
-    return FunctionLoad(coordinate_row(mbs, marker) @ basis, force)
-
-
-class _NoSystem:
-    """What a load's user function gets instead of the system, which is not there in the model's run."""
-
-    def __getattr__(self, name: str) -> Any:
-        raise MultiPhiValueError(f"it reads mbs.{name}")
-
-
-_NO_SYSTEM = _NoSystem()
-
-
-def _taken_of(varying: Mapping[int, FunctionLoad | str]) -> dict[int, FunctionLoad]:
-    return {i: load for i, load in varying.items() if isinstance(load, FunctionLoad)}
-
-
-def _taken_loads(loads: list[dict[str, Any]], functions: Collection[int]) -> Iterator[Item]:
+def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) -> Iterator[Item]:
     for i, load in enumerate(loads):
-        if i in functions:
+        if i in timed:
             yield load_item(i, load, "load by its function of time")
         elif not user_function(load):
             held = " in its present direction" if load.get("bodyFixed", False) else ""
             yield load_item(i, load, f"constant load{held}")
-
-
-def _left_out_loads(
-    loads: list[dict[str, Any]], varying: Mapping[int, FunctionLoad | str]
-) -> Iterator[tuple[Item, str]]:
-    for i, reason in varying.items():
-        if isinstance(reason, str):
-            yield load_item(i, loads[i]), reason
 
 
 def _modes(modes: int | str | UpTo | Tolerance, most: int) -> int | str | UpTo | Tolerance:
@@ -187,15 +165,14 @@ def _distance(mbs: Any, index: int, item: Mapping[str, Any]) -> float:
     return float(mbs.GetObjectOutput(exu.ObjectIndex(index), variable))
 
 
-def _contacts(
-    mbs: Any, index: int, item: Mapping[str, Any], distance: float, basis: np.ndarray
-) -> Iterator[UnilateralContact]:
+def _contacts(mbs: Any, index: int, item: Mapping[str, Any], distance: float) -> Iterator[UnilateralContact]:
+    """Contacts of an object, their directions as rows (n_full,)."""
     first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
     if not has_stops(item):
         law = float(item["contactStiffness"]), float(item["contactDamping"])
-        yield UnilateralContact(item["name"], _projected(second - first, basis), distance, *law)
+        yield UnilateralContact(item["name"], second - first, distance, *law)
         return
-    row = _projected(item["factor1"] * second - item["factor0"] * first, basis)
+    row = item["factor1"] * second - item["factor0"] * first
     law = float(item["limitStopsStiffness"]), float(item["limitStopsDamping"])
     yield UnilateralContact(f"{item['name']}.upper", -row, item["limitStopsUpper"] - distance, *law)
     yield UnilateralContact(f"{item['name']}.lower", row, distance - item["limitStopsLower"], *law)
@@ -205,27 +182,3 @@ def _projected(row: np.ndarray, basis: np.ndarray) -> np.ndarray:
     """A row in z; zero if constraints hold it."""
     projected: np.ndarray = row @ basis
     return projected if np.max(np.abs(projected)) > HELD * np.max(np.abs(row), initial=1.0) else 0 * projected
-
-
-@contextmanager
-def _smooth(mbs: Any, objects: list[dict[str, Any]], loads: list[dict[str, Any]]) -> Iterator[None]:
-    """Switch off contacts, limit stops, friction and loads by user functions; on again whatever happens."""
-    changes = [
-        (exu.ObjectIndex(i), name, off) for i, item in enumerate(objects) for name, off in rough_parameters(item)
-    ]
-    timed = [exu.LoadIndex(i) for i, load in enumerate(loads) if user_function(load)]
-    try:
-        for index, name, off in changes:
-            mbs.SetObjectParameter(index, name, off)
-        for load in timed:
-            key = user_function(loads[int(load)])
-            value = loads[int(load)][value_key(loads[int(load)])]
-            mbs.SetLoadParameter(load, key, 0)
-            mbs.SetLoadParameter(load, value_key(loads[int(load)]), 0 * np.array(value) if np.ndim(value) else 0.0)
-        yield
-    finally:
-        for index, name, _ in changes:
-            mbs.SetObjectParameter(index, name, objects[int(index)][name])
-        for load in timed:
-            for key in (value_key(loads[int(load)]), user_function(loads[int(load)])):
-                mbs.SetLoadParameter(load, key, loads[int(load)][key])
