@@ -26,13 +26,19 @@ ROUNDS = 4
 EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes that are the scene's own
 
 
-def complaints(run, samples=24.0, most=60):
-    """Everything that is wrong with a run; samples: per shortest period; most: segments."""
+def complaints(run, samples=24.0, most=60, *, joule=1.0, metre=1.0, varying=False):
+    """Everything that is wrong with a run.
+
+    samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time, whose
+    work only the ledger knows.
+    """
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
     looked_at = [*run.segments[: most // 2], *run.segments[max(most // 2, len(run.segments) - most // 2) :]]
-    scale = largest_energy(run, looked_at)
-    checks = (status(run), ledger(run, scale), energy(run, looked_at, scale), missed(run, looked_at, samples))
+    scale = largest_energy(run, looked_at, joule)
+    checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre)]
+    if not varying:
+        checks.append(energy(run, looked_at, scale))
     return [complaint for complaint in checks if complaint]
 
 
@@ -45,7 +51,7 @@ def status(run):
     return None
 
 
-def largest_energy(run, segments):
+def largest_energy(run, segments, joule=1.0):
     """What round-off of energies is measured against [J]: the largest at the ends of these segments."""
     ledger = run.ledger
     times = np.unique([time for segment in segments for time in (segment.start, segment.end)])
@@ -54,7 +60,7 @@ def largest_energy(run, segments):
     rests = DIFFERENCE * max(map(_potential, segments))
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
     passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
-    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST, rests, passed)
+    return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST * joule, rests, passed)
 
 
 def _potential(segment):
@@ -94,13 +100,13 @@ def energy(run, segments, scale, samples=5):
     return f"energy: rises by {worst:g} J" if worst > NO_TRUNCATION * scale else None
 
 
-def missed(run, segments, samples):
+def missed(run, segments, samples, metre=1.0):
     """No contact leaves its state's admissible range unheard: s >= 0 (event_rule.py) on every segment.
 
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
     of the whole run: an impact that stops all motion leaves a state that is round-off of the one before.
     """
-    complete, largest, reach = _complete(run), {}, _reach(segments)
+    complete, largest, reach = _complete(run), {}, _reach(segments, SMALLEST * metre)
     looked_at = list(_signals(segments, run, complete))
     for segment, contact, _, signal in looked_at:
         key = contact, contact in segment.level.level.indices
@@ -122,16 +128,18 @@ def _signals(segments, run, complete):
     rigid = np.isinf(run.model.base.stiffnesses)
     for segment in segments:
         for contact, phase in enumerate(segment.phases):
+            if run.model.contacts[contact].damping:
+                continue  # its signal is a force with a rate of its own: brute force judges it
             held = rigid[contact] and contact in segment.level.level.indices
             if segment.end > segment.start and (phase is Phase.ARMED or complete or held):
                 yield segment, contact, phase is Phase.ARMED, Signal(segment, contact, bool(rigid[contact]))
 
 
-def _reach(segments):
+def _reach(segments, smallest):
     """The largest coordinate y of the run, within segments too: what a gap that never moves is the difference of."""
     times = [np.linspace(segment.start, segment.end, INSIDE) for segment in segments]
     places = [segment.level.configuration(segment.modal(t)) for segment, t in zip(segments, times, strict=True)]
-    return max([SMALLEST, *(float(np.max(np.abs(y), initial=0.0)) for y in places)])
+    return max([smallest, *(float(np.max(np.abs(y), initial=0.0)) for y in places)])
 
 
 class Signal:

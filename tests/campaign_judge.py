@@ -1,0 +1,254 @@
+"""What is to be said of a scene's answer: the run against brute force, its own laws, and itself in the Exudyn body.
+
+A difference is excused only by a motion that is sensitive by itself: a run nudged by 1e-12 must drift away no later,
+and in more than one event. Nudges scale the start and the stiffness matrix, so that what is zero by structure stays
+zero; no nudge excuses a status.
+"""
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+
+import brute_force
+import numpy as np
+from campaign_scenes import later, scaled
+from run_checks import complaints
+
+import multiphi_exudyn as mp
+from reference_models.body_alone import solve_body_alone
+
+NEAR = 1e-6  # of the largest value: two motions are the same
+NUDGE = 1e-12  # of the start and of the stiffness
+DRIFTED = 1e-10  # of the largest value: what a sensitive motion has drifted before the event that makes it NEAR
+INSTANTS = 60  # at which motions are compared
+DIGEST = 8  # of them are kept for a comparison of processors
+AT_EVENT = 1e-7  # of the run: closer to an event, velocities are not compared
+IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated load misses more than motion
+BODY_STEPS = 400  # of the Exudyn body; under loads that vary it is right to second order of them
+BODY_NEAR = 1e-5  # of the largest value: body and native run, where the body is exact
+BODY_ORDER = 2.0  # at least by which the error falls when steps are halved, where it is not
+BODY_SHARE = 8  # one scene in so many runs in the body too
+SUSPECT = 0.05  # of the largest value: with the finer steps the body is wrong
+
+
+@dataclass(frozen=True)
+class Motion:
+    """x, x' (n, k) in the scene's own numbers up to where the run came, its events, and the impulse of its contacts."""
+
+    status: str
+    message: str
+    displacement: np.ndarray
+    velocity: np.ndarray
+    events: int
+    impulse: np.ndarray | None
+    runs: tuple
+
+
+def instants(scene):
+    """Times (k,) at which motions are compared, none of them a round part of the run."""
+    return scene.t_end * (np.arange(INSTANTS) + 0.637) / INSTANTS
+
+
+def judged(scene):
+    """([(kind, cause), ...], digest) of a scene."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        try:
+            motion = native(scene)
+        except mp.MultiPhiError as refusal:
+            return [("refused", str(refusal))], ["refused", 0, []]
+        return _verdicts(scene, motion), digest(motion)
+
+
+def native(scene):
+    """The package's answer; where the scene is split, every part begins at the end of the one before."""
+    model, t_end, x, v, loads = scaled(scene)
+    time, length, _ = (2.0**power for power in scene.units)
+    runs, columns, first = [], [], 0.0
+    for last in (*(t * time for t in scene.split), t_end):
+        run = mp.simulate(model, last - first, x, v, [later(load, first) for load in loads], compiled=False)
+        runs.append(run)
+        wanted = instants(scene) * time - first
+        wanted = wanted[(wanted >= 0) & (wanted <= run.t_end) & (wanted < last - first)] if run.segments else []
+        if len(wanted):
+            columns.append((run.displacement(wanted) / length, run.velocity(wanted) * (time / length)))
+        if run.status != "ok":
+            break
+        x, v, first = run.displacement(run.t_end), run.velocity(run.t_end), last
+    n = len(x)
+    places, speeds = (np.hstack([c[k] for c in columns]) if columns else np.zeros((n, 0)) for k in (0, 1))
+    events = sum(len(run.events) for run in runs)
+    return Motion(runs[-1].status, runs[-1].message, places, speeds, events, _impulse(scene, runs), tuple(runs))
+
+
+def _impulse(scene, runs):
+    """Sum of h_i p_i (n,) [N s], which is unique where the contacts' shares are not; None of truncated runs and laws."""
+    if scene.system is None or scene.system.laws or any(run.status != "ok" for run in runs):
+        return None
+    time, length, mass = (2.0**power for power in scene.units)
+    total = np.zeros(len(scene.system.mass))
+    for contact, stop in zip(runs[0].model.contacts, scene.system.stops, strict=True):
+        total += stop.row * sum(run.contact_impulse(contact.name, 0.0, run.t_end) for run in runs)
+    return total * time / (length * mass)
+
+
+def digest(motion):
+    """Status, number of events and some displacements: what has to be the same on every processor."""
+    every = max(1, INSTANTS // DIGEST)
+    status = motion.status if motion.status == "ok" else motion.message.split(": ", 1)[-1].split(" ")[0]
+    return [status, motion.events, [float(f"{value:.10g}") for value in motion.displacement[:, ::every].ravel()]]
+
+
+def _verdicts(scene, motion):
+    if "chatter" in motion.message:
+        return [("chatter", motion.message)]
+    if motion.status != "ok":
+        return [("named failure", motion.message)]
+    found = [(f"failure: {text.split(':')[0]}", text) for run in motion.runs for text in laws_of(scene, run)]
+    found += _compared(scene, motion)
+    if not found and scene.number % BODY_SHARE == 0 and not scene.split and scene.units == (0, 0, 0):
+        found += in_the_body(scene, motion)
+    return found or [("ok", motion.message)]
+
+
+def laws_of(scene, run):
+    """What must hold of every run (run_checks.py)."""
+    time, length, mass = (2.0**power for power in scene.units)
+    constant = all(isinstance(load, (mp.ConstantLoad, mp.Gravity)) for load in scene.loads)
+    return complaints(run, joule=mass * (length / time) ** 2, metre=length, varying=not constant)
+
+
+def _compared(scene, motion):
+    """The motion against brute force; of a truncated model against itself with its degrees of freedom in another order."""
+    if scene.system is None:
+        other = native(_reordered(scene))
+        places, speeds = np.argsort(_order(scene)), None
+        other = replace(other, displacement=other.displacement[places], velocity=other.velocity[places])
+        if other.status != motion.status:
+            return [("failure: order", f"{motion.status}, in another order {other.status} {other.message}")]
+        return _difference(scene, motion, other, "failure: order", speeds)
+    start = scene.start or (scene.displacement, scene.velocity)
+    try:
+        answer = brute_force.solved(scene.system, *start, np.append(instants(scene), scene.t_end))
+    except brute_force.NoAnswer as reason:
+        return [("unjudged", str(reason))]
+    expected = motion_of(scene, answer)
+    near = [np.min(np.abs(t - np.array([e[0] for e in answer.events])), initial=np.inf) for t in instants(scene)]
+    return _difference(scene, motion, expected, "failure: wrong", np.array(near) > AT_EVENT * scene.t_end)
+
+
+def motion_of(scene, answer):
+    """Brute force's answer in the same form."""
+    impulse = None
+    if not scene.system.laws:
+        impulse = sum((s.row * p for s, p in zip(scene.system.stops, answer.impulse, strict=True)), 0 * answer.displacement[:, 0])
+    places, speeds = answer.displacement[:, :-1], answer.velocity[:, :-1]
+    if scene.frame is not None:
+        places, speeds = scene.frame @ places, scene.frame @ speeds
+    return Motion("ok", "", places, speeds, len(answer.events), impulse, ())
+
+
+def _difference(scene, motion, expected, kind, comparable):
+    """What is to be said where two motions are not the same."""
+    errors = _errors(scene, motion, expected, comparable)
+    if np.max(errors, initial=0.0) > NEAR:
+        at = int(np.argmax(errors > NEAR))
+        cause = f"off by {np.max(errors):.3g} of the largest, from t = {instants(scene)[at]:.6g} s"
+        cause += f" ({motion.events} events, {expected.events})"
+        return [("sensitive", cause) if sensitive(scene, motion, at) else (kind, cause)]
+    missing = 0.0
+    if motion.impulse is not None and expected.impulse is not None:
+        size = max(np.max(np.abs(expected.impulse)), _momentum(scene, expected), 1e-300)
+        missing = float(np.max(np.abs(motion.impulse - expected.impulse))) / size
+    if missing > IMPULSE:
+        return [("failure: impulse", f"off by {missing:.3g} of the largest momentum")]
+    return []
+
+
+def _momentum(scene, motion):
+    if scene.frame is not None:
+        return 0.0
+    return float(np.max(np.abs(scene.system.mass @ motion.velocity)))
+
+
+def _errors(scene, motion, expected, comparable=None):
+    """Of every instant, the larger of the errors of x and x', each of its largest value."""
+    found = []
+    for ours, theirs in ((motion.displacement, expected.displacement), (motion.velocity, expected.velocity)):
+        if scene.shown is not None and len(ours) != len(theirs):
+            ours = scene.shown @ ours
+        count = min(ours.shape[1], theirs.shape[1])
+        size = max(np.max(np.abs(theirs), initial=0.0), 1e-300)
+        found.append(np.max(np.abs(ours[:, :count] - theirs[:, :count]), axis=0, initial=0.0) / size)
+    if comparable is not None:
+        found[1] = np.where(comparable[: len(found[1])], found[1], 0.0)
+    return np.maximum(*found)
+
+
+def sensitive(scene, motion, at):
+    """Whether nudged runs have drifted away by this instant, little by little."""
+    for sign in (1, -1):
+        other = native(nudged(scene, 1 + sign * NUDGE))
+        if other.status != motion.status:
+            return False
+        errors = _errors(scene, other, motion)
+        away = np.flatnonzero(errors > NEAR / 10)
+        if len(away) and away[0] <= at + 1 and np.max(errors[: away[0]], initial=0.0) > DRIFTED:
+            return True
+    return False
+
+
+def nudged(scene, factor):
+    """The scene with its start and its stiffness times a factor near 1."""
+    structure = replace(scene.model.structure, stiffness=factor * scene.model.structure.stiffness)
+    given = replace(scene.model, structure=structure)
+    return replace(scene, model=given, displacement=factor * scene.displacement, velocity=factor * scene.velocity)
+
+
+def _order(scene):
+    return np.roll(np.arange(scene.model.structure.n), 1)[::-1]
+
+
+def _reordered(scene):
+    """The scene with its degrees of freedom in another order."""
+    order, old = _order(scene), scene.model.structure
+    square = np.ix_(order, order)
+    structure = replace(
+        old, mass=old.mass[square], stiffness=old.stiffness[square], points={f"m{i}": k for k, i in enumerate(order)}
+    )
+    contacts = [replace(c, direction=old.row(c.direction)[order]) for c in scene.model.contacts]
+    loads = tuple(replace(load, at=old.row(load.at)[order]) for load in scene.loads)
+    model = mp.MultiPhiModel(structure, contacts, modes=scene.model.modes)
+    start = {"displacement": scene.displacement[order], "velocity": scene.velocity[order]}
+    return replace(scene, model=model, loads=loads, **start)
+
+
+# ---------------------------------------------------------------------- in the Exudyn body
+
+
+def in_the_body(scene, motion):
+    """The same scene as an Exudyn object: exact under what is constant, of second order in the step under what varies."""
+    found = []
+    for steps in (BODY_STEPS, 2 * BODY_STEPS, 4 * BODY_STEPS):
+        found.append(_body_error(scene, motion.runs[0], steps))
+        if found[-1] <= BODY_NEAR or (len(found) > 1 and found[-1] < found[-2] / BODY_ORDER and found[-1] < SUSPECT):
+            return []
+    cause = "errors " + ", ".join(f"{error:.3g}" for error in found)
+    return [("sensitive", cause) if _sensitive_at_all(scene, motion) else ("failure: body", cause)]
+
+
+def _body_error(scene, run, steps):
+    points = list(scene.model.structure.points)
+    start = (scene.model, scene.displacement, scene.t_end, steps, points)
+    histories, _ = solve_body_alone(*start, velocity=scene.velocity, loads=scene.loads, matched=True)
+    times = np.minimum(histories.time, run.t_end)
+    expected = np.array([run.at(point, times) for point in points])
+    found = np.array([histories.points[point] for point in points])
+    return float(np.max(np.abs(found - expected)) / max(np.max(np.abs(expected)), 1e-300))
+
+
+def _sensitive_at_all(scene, motion):
+    """Whether a nudge as large as the body's tolerance for steps changes the answer by as much."""
+    other = native(nudged(scene, 1 + math.sqrt(NUDGE)))
+    return bool(np.max(_errors(scene, other, motion), initial=0.0) > SUSPECT)
