@@ -33,8 +33,9 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     if not independent(base, held := [i for i in closed if base.contacts[i].rigid]):
         names = ", ".join(base.contacts[i].name for i in held)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    squares, vectors, accuracy = level_modes(base, supports, modes)
-    rigid_body = _rigid_body_modes(base, supports)
+    turned, _ = supports.orthogonal
+    squares, vectors, accuracy = level_modes(base, turned, modes)
+    rigid_body = _rigid_body_modes(base, turned)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
     squares, vectors = _turned(base, squares, vectors)
@@ -42,7 +43,7 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     _check(base, squares, vectors, supports, accuracy)
     damping = base.resistance(closed)
     gap_rows = cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
-    gap_rows[np.isin(base.rays, [base.rays[i] for i in held])] = 0.0  # by definition, whatever a soft mode leaves
+    gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
         closed=tuple(base.contacts[i].name for i in closed),
@@ -95,11 +96,26 @@ def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.nda
 
 def independent(base: Base, rigid: Sequence[int]) -> bool:
     """Whether none of these rigid contacts follows from the others, so that they can be closed together."""
-    pinned = base.directions[:, list(rigid)]
+    pinned = _units(base.directions[:, list(rigid)])
     if pinned.shape[1] == 0:
         return True
-    diagonal = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
-    return pinned.shape[1] <= base.modes.count and bool(np.min(diagonal) > INDEPENDENT * np.max(diagonal))
+    left = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
+    return pinned.shape[1] <= base.modes.count and bool(np.min(left) > INDEPENDENT)
+
+
+def _following(base: Base, held: Sequence[int]) -> np.ndarray:
+    """Which contacts (c,) follow from these rigid ones, which are independent: their gaps do not move."""
+    if not held:
+        return np.zeros(len(base.contacts), bool)
+    units, (q, _) = _units(base.directions), np.linalg.qr(base.directions[:, list(held)])
+    left = units - q @ (q.T @ units)
+    return np.asarray(np.linalg.norm(left, axis=0) <= INDEPENDENT)
+
+
+def _units(directions: np.ndarray) -> np.ndarray:
+    """Directions (m, c) as unit vectors, zero where no mode of the base moves a contact."""
+    lengths = np.linalg.norm(directions, axis=0)
+    return directions / np.where(lengths > 0, lengths, 1.0)
 
 
 def _rigid_body_modes(base: Base, supports: Supports) -> int:
@@ -122,10 +138,11 @@ def _reaction_rows(
     total = squared + np.abs(squares)
     smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
     weights = 1 / np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
-    residuals = (squared - squares) * vectors - spring_forces
-    grams = (pinned.T * weights.T[:, None, :]) @ pinned
-    given = (pinned.T @ (weights * residuals)).T
-    return np.asarray(np.linalg.solve(grams, given[:, :, None])[:, :, 0].T)
+    roots = np.sqrt(weights)
+    residuals = roots * ((squared - squares) * vectors - spring_forces)
+    q, r = np.linalg.qr(roots.T[:, :, None] * pinned)
+    given = np.einsum("ijk,ji->ik", q, residuals)
+    return np.asarray(np.linalg.solve(r, given[:, :, None])[:, :, 0].T)
 
 
 def _check(base: Base, squares: np.ndarray, vectors: np.ndarray, supports: Supports, accuracy: float) -> None:

@@ -250,12 +250,13 @@ class EventRule(Passage):
         closed = self._pressing(released, struck, touching)
         after, dropped = struck, loss + plastic
         while closed:
-            after = self._at_rest_on(state, struck, compliant | closed)
-            pulling = {i for i in closed if self._reaction_sign(state, struck, after.level, i) < (i in freed)}
+            still, stilled = self._stilled(struck, touching, closed)
+            after = self._at_rest_on(state, still, compliant | closed)
+            pulling = {i for i in closed if self._reaction_sign(state, still, after.level, i) < (i in freed)}
             if same and after.closed == state.closed:
                 pulling.update(closed.intersection(freed))
             if not pulling:
-                dropped = self._loss(state, after, released.kinetic - struck.kinetic, plastic)
+                dropped = self._loss(state, after, released.kinetic - still.kinetic, plastic + stilled)
                 break
             closed = closed - pulling
             after = struck

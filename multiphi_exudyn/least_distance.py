@@ -17,7 +17,7 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.root_search import ZERO
 
-__all__ = ["INDEPENDENT", "Infeasible", "least_distance"]
+__all__ = ["FOLLOWING", "INDEPENDENT", "Infeasible", "least_distance"]
 
 INDEPENDENT = 1e-10  # of its length: what is left of a direction beside others, below which it follows from them
 FOLLOWING = 10 * INDEPENDENT  # of its terms: what an inequality that follows from others may lack beside them
@@ -54,7 +54,7 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
             return x, multipliers / lengths
         entering = int(np.argmax(lacking))
         try:
-            pushing, shares = _entered(units, wanted, pushing, shares, entering)
+            pushing, shares = _entered(units, lacking[entering], pushing, shares, entering)
         except Infeasible:
             if slack[entering] > ZERO or lacking[entering] > FOLLOWING * terms[entering]:
                 raise
@@ -65,22 +65,25 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
 
 
 def _entered(
-    units: np.ndarray, wanted: np.ndarray, pushing: list[int], shares: np.ndarray, entering: int
+    units: np.ndarray, lacking: float, pushing: list[int], shares: np.ndarray, entering: int
 ) -> tuple[list[int], np.ndarray]:
-    """The equalities, and their shares, after one more has come in and those that would have to pull have gone."""
-    share, x = 0.0, shares @ units[pushing]
+    """The equalities, and their shares, after one more has come in and those that would have to pull have gone.
+
+    lacking: of the one that enters.
+    """
+    share = 0.0
     while True:
         taken, way = _split(units[pushing], units[entering])
         falling = np.flatnonzero(taken > 0)
         steps = shares[falling] / taken[falling]
         until = float(np.min(steps, initial=np.inf))
         reach = float(way @ way)
-        whole = float(wanted[entering] - units[entering] @ x) / reach if reach > 0 else np.inf
+        whole = lacking / reach if reach > 0 else np.inf
         step = min(until, whole)
         if not np.isfinite(step):
             raise Infeasible([*sorted(pushing), entering])
         shares, share = shares - step * taken, share + step
-        x = x + step * way
+        lacking -= step * reach
         if whole <= until:
             return [*pushing, entering], np.append(shares, share)
         gone = int(falling[np.argmin(steps)])

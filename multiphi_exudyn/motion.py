@@ -7,7 +7,9 @@ with its cause.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -42,10 +44,18 @@ class Motion:
 
     def __post_init__(self) -> None:
         self._evaluations, self._transitions = 0, self.rule.transitions
-        try:
+        self._decided, self._last_decision = deque[tuple[float, float]](maxlen=self.window), 0.0
+        with self._failing():
             self._begin()
-        except NumericalFailure as failure:
-            self.message = f"at t = 0 s: {failure}"
+
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """A failure ends the run, with its instant and its cause."""
+        try:
+            yield
+        except (MultiPhiError, np.linalg.LinAlgError) as failure:
+            singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
+            self.message = f"at t = {self.time:.9g} s: {singular}{failure}"
 
     def _begin(self) -> None:
         """First state, with the events of the start."""
@@ -59,11 +69,9 @@ class Motion:
     def advance(self, end: float, to_change: bool = False) -> None:
         """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""
         known = len(self.events)
-        try:
+        with self._failing():
             while not self.message and self.time < end and not (to_change and len(self.events) > known):
                 self._continue(end)
-        except MultiPhiError as failure:
-            self.message = f"at t = {self.time:.9g} s: {failure}"
 
     def trajectory(self, end: float) -> Trajectory:
         """What has been collected."""
@@ -107,12 +115,12 @@ class Motion:
     def _keep_event(self, event: Event) -> None:
         self.events.append(event)
 
-    def _count(self) -> int:
-        return len(self.segments)
+    def _recent(self) -> Sequence[tuple[float, float]]:
+        """(since when [s], highest frequency [Hz] before it) of the last decisions, at most of a ``window``.
 
-    def _recent(self, count: int) -> list[tuple[float, float]]:
-        """Start [s] and highest frequency [Hz] of the last ``count`` segments."""
-        return [(segment.start, segment.level.level.highest_frequency) for segment in self.segments[-count:]]
+        Pieces of a load are no decisions.
+        """
+        return self._decided
 
     def _one_segment(self, end: float) -> None:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
@@ -140,6 +148,8 @@ class Motion:
         self._keep(self._segment(started, coefficients, armed_at))
         self.state = replace(state.after(coefficients, reached), phases=phases)
         if asking:
+            self._decided.append((self._last_decision, state.level.level.highest_frequency))
+            self._last_decision = self.time
             self._decide(asking)
             self._check_chatter()
 
@@ -177,10 +187,10 @@ class Motion:
         return max(1, len(self.model.contacts) - sum(map(len, self.model.chains)))
 
     def _check_chatter(self) -> None:
-        window, allowed = self.window, self._allowed
-        if self._count() <= window:
+        window, allowed, recent = self.window, self._allowed, self._recent()
+        if len(recent) < window:
             return
-        starts, frequencies = zip(*self._recent(window), strict=True)
+        starts, frequencies = zip(*recent, strict=True)
         elapsed, highest = self.time - starts[0], max(frequencies)
         if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < window / allowed:
             raise NumericalFailure(
@@ -218,8 +228,5 @@ class CompiledMotion(Motion):
     def _keep_event(self, event: Event) -> None:
         self.record.add_event(event)
 
-    def _count(self) -> int:
-        return self.record.count
-
-    def _recent(self, count: int) -> list[tuple[float, float]]:
-        return self.record.recent(count)
+    def _recent(self) -> Sequence[tuple[float, float]]:
+        return self.record.recent(self.window) if self.record.count > self.window else ()

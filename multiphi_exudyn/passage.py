@@ -59,11 +59,17 @@ class Passage(ContactFunctions):
             total += opened * 0.5 * float(self.model.base.stiffnesses[i]) * gap**2
         return total
 
-    def _collided(self, state: State, touching: list[int]) -> tuple[State, np.ndarray, Loss]:
-        """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss."""
-        rows = state.level.level.speed_rows[touching]
+    def _collided(
+        self, state: State, touching: Sequence[int], held: Sequence[int] = ()
+    ) -> tuple[State, np.ndarray, Loss]:
+        """Moreau's impact among contacts that touch, in a level in which they are open: state, impulses, loss.
+
+        held: those of them that keep no speed away from their stop either; their impulses come once more, behind.
+        """
+        contacts, sides = [*touching, *held], np.r_[np.ones(len(touching)), -np.ones(len(held))]
+        rows = sides[:, None] * state.level.level.speed_rows[contacts]
         free = self._free(state.level)
-        velocity, impulses = self._nearest(state.level, touching, rows, state.velocity)
+        velocity, impulses = self._nearest(state.level, contacts, rows, state.velocity)
         before, left = np.abs(state.velocity[:free]), np.abs(velocity[:free])
         stopped = left <= RESTING * before  # round-off of rest, which would bounce and rock on until it underflows
         velocity[:free][stopped | (np.linalg.norm(left) <= RESTING * np.linalg.norm(before))] = 0.0
@@ -71,6 +77,14 @@ class Passage(ContactFunctions):
         lost = state.kinetic - after.kinetic
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
         return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
+
+    def _stilled(self, state: State, touching: Sequence[int], closed: set[int]) -> tuple[State, Loss]:
+        """After an impact: contacts that stay closed lose a speed too small to be seen, and give it to no other."""
+        rows = state.level.level.speed_rows[sorted(closed)]
+        if np.all(np.abs(rows @ state.velocity) <= RESTING * self._sizes(rows, state)):
+            return state, Loss()
+        after, _, lost = self._collided(state, touching, sorted(closed))
+        return after, lost
 
     def _nearest(
         self,

@@ -18,6 +18,14 @@ __all__ = ["rest"]
 
 def rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces (d,) along the supports and configuration y (m,) at rest, motion nobody resists left out."""
+    turned, mixing = supports.orthogonal
+    forces, configuration = _rest(base, turned, load)
+    forces[supports.rigid] = np.linalg.solve(mixing, forces[supports.rigid])
+    return forces, configuration
+
+
+def _rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``rest`` where the directions of rigid contacts are orthogonal."""
     elastic, free = slice(base.modes.rigid, None), slice(base.modes.rigid)
     compliance = base.modes.omega[elastic] ** -2.0
     touching = supports.directions[elastic]

@@ -35,6 +35,7 @@ from multiphi_exudyn.truncation import adapted
 __all__ = ["simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
+UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
 
 
 def simulate(
@@ -90,7 +91,7 @@ def started(
     """
     excitation = Excitation.of(model, loads, end, finer)
     if not excitation.channels:
-        start = _start(model, displacement, velocity, *np.zeros((2, len(model.contacts))))
+        start = _start(model, displacement, velocity, excitation, end)
         return _motion(model, _rule(model, excitation.static), start, compiled)
     if compiled:
         raise MultiPhiValueError(
@@ -98,8 +99,7 @@ def started(
             "need None or False"
         )
     rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
-    moved = excitation.stops @ rule.drive.values[0]
-    return DrivenMotion(model, rule, _start(model, displacement, velocity, moved, excitation.stop_ways))
+    return DrivenMotion(model, rule, _start(model, displacement, velocity, excitation, end))
 
 
 def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
@@ -138,15 +138,18 @@ def _start(
     model: MultiPhiModel,
     displacement: np.ndarray | None,
     velocity: np.ndarray | None,
-    moved: np.ndarray,
-    ways: np.ndarray,
+    excitation: Excitation,
+    end: float,
 ) -> Start:
-    """The start as the contacts see it, whose stops have ``moved`` along h (c,) [m], of ``ways`` they go at most."""
+    """The start as the contacts see it."""
     base = model.base
     y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
+    moved = excitation.stops @ excitation.drive(0.0).values[0] if excitation.channels else 0.0
     gaps = (y @ base.directions + base.gaps - moved).tolist()
     directions, initial = base.magnitudes
-    scales = (TOUCHING * (initial + np.abs(y) @ directions + ways)).tolist()
+    ways = initial + excitation.stop_ways
+    unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, end)
+    scales = (TOUCHING * (ways + np.abs(y) @ directions) + unseen).tolist()
     penetrating, touching = list[int](), list[int]()
     for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
         if contact.rigid and gap < -scale:
@@ -159,6 +162,18 @@ def _start(
         elif gap < -scale and not _pulls(contact, gap, float(v @ base.directions[:, i])):
             penetrating.append(i)
     return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved)
+
+
+def _lengths(
+    model: MultiPhiModel, y: np.ndarray, v: np.ndarray, load: np.ndarray, ways: np.ndarray, end: float
+) -> np.ndarray:
+    """What gaps (c,) [m] could become: by y, by where v and a load (m,) take the modes, by ways (c,) of all gaps."""
+    omega = model.base.modes.omega
+    times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
+    sizes = np.linalg.norm(model.base.directions, axis=0)
+    gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
+    motion = np.linalg.norm(y) + np.linalg.norm(v * times) + np.linalg.norm(load * times**2)
+    return np.asarray(sizes * (motion + np.max(gaps, initial=0.0)))
 
 
 def _pulls(contact: Contact, gap: float, rate: float) -> bool:

@@ -6,6 +6,7 @@ K q + G, q = p.y; beside a closed rigid contact of that direction they are a con
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,23 @@ class Supports:
     def rigid(self) -> np.ndarray:
         """(d,) bool."""
         return np.isinf(self.stiffness)
+
+    @functools.cached_property
+    def orthogonal(self) -> tuple[Supports, np.ndarray]:
+        """The same with the directions of rigid contacts orthogonal to each other, Q, and R (k, k): they are Q R.
+
+        Nearly parallel ones would leave the difference of their small difference to round-off. Q keeps their unit.
+        """
+        rigid = self.rigid
+        if np.sum(rigid) < 2:
+            return self, np.eye(int(np.sum(rigid)))
+        own = self.directions[:, rigid]
+        length = float(np.max(np.linalg.norm(own, axis=0))) or 1.0
+        q, r = np.linalg.qr(own / length)
+        directions, offsets = self.directions.copy(), self.offsets.copy()
+        directions[:, rigid] = length * q
+        offsets[rigid] = np.linalg.solve(r.T, offsets[rigid])
+        return Supports(self.members, directions, self.stiffness, offsets), r
 
     @property
     def resisting(self) -> np.ndarray:

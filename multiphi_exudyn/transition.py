@@ -24,8 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.base import cleared
-from multiphi_exudyn.least_distance import least_distance
+from multiphi_exudyn.least_distance import FOLLOWING, least_distance
 from multiphi_exudyn.level import Asymptotic, Level
+from multiphi_exudyn.root_search import ZERO
 
 __all__ = ["LoadedLevel", "Transition", "mixed", "nearest_admissible"]
 
@@ -49,7 +50,9 @@ class LoadedLevel:
         rest = level.asymptotic(load)
         magnitudes, initial = level.base.magnitudes
         gaps = level.base.directions.T @ rest.configuration + level.base.gaps
-        return cls(level, rest, cleared(gaps, initial + np.abs(rest.configuration) @ magnitudes))
+        terms = initial + np.abs(rest.configuration) @ magnitudes
+        held = ~np.any(level.gap_rows, axis=1)  # by the closed contacts, of which its gap is the sum
+        return cls(level, rest, cleared(gaps, np.where(held, FOLLOWING / ZERO, 1.0) * terms))
 
     @functools.cached_property
     def driven(self) -> bool:

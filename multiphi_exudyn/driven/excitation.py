@@ -110,6 +110,12 @@ class Excitation:
         """Bound (c,) [m] of how far every stop moves."""
         return np.asarray(np.abs(self.stops) @ np.array([history.largest for history in self.histories]))
 
+    @property
+    def largest_load(self) -> np.ndarray:
+        """Bound (m,) of all loads."""
+        largest = np.array([history.largest for history in self.histories])
+        return np.asarray(np.abs(self.static) + np.abs(self.patterns) @ largest)
+
     def values(self, times: np.ndarray) -> np.ndarray:
         """w, w' (k, 2, q) at times (k,)."""
         found = [(history.at(times), history.derivative.at(times)) for history in self.histories]

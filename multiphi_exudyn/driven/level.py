@@ -22,7 +22,9 @@ import numpy as np
 
 from multiphi_exudyn.base import cleared
 from multiphi_exudyn.driven.excitation import Excitation, columns
+from multiphi_exudyn.least_distance import FOLLOWING
 from multiphi_exudyn.level import Level
+from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.transition import LoadedLevel, Transition, mixed
 
 __all__ = ["DrivenLevel", "DrivenTransition", "ExtendedLevel"]
@@ -66,9 +68,9 @@ class DrivenLevel(LoadedLevel):
         gap_columns = directions @ parts.shapes - excitation.stops
         speeds = directions @ parts.carried - excitation.stops
         held = ~np.any(own.gap_rows, axis=1)[:, None]  # what no mode moves, the channels move by round-off only
-        moved = np.abs(excitation.stops)
-        gap_columns = np.where(held, cleared(gap_columns, sizes @ parts.terms + moved), gap_columns)
-        speeds = np.where(held, cleared(speeds, sizes @ np.abs(parts.carried) + moved), speeds)
+        moved, slack = np.abs(excitation.stops), FOLLOWING / ZERO
+        gap_columns = np.where(held, cleared(gap_columns, slack * (sizes @ parts.terms + moved)), gap_columns)
+        speeds = np.where(held, cleared(speeds, slack * (sizes @ np.abs(parts.carried) + moved)), speeds)
         none = np.zeros(excitation.channels)
         level = ExtendedLevel(
             closed=own.closed,
