@@ -19,12 +19,12 @@ from multiphi_exudyn import (
 )
 
 
-@settings(derandomize=True, max_examples=40, deadline=None)
-@given(cases(law=("rigid", "mixed"), modes="all"), st.lists(st.floats(0, 1), min_size=3, max_size=3))
-def test_is_never_refused_in_contact_or_at_an_event(case, shares):
+@settings(derandomize=True, max_examples=15, deadline=None)
+@given(cases(law=("rigid", "mixed"), modes="all", damping=("none", "modal", "rayleigh")), st.floats(0, 1))
+def test_is_never_refused_in_contact_or_at_an_event(case, share):
     run = simulate(case.model, case.t_end, case.displacement, case.velocity, case.loads, compiled=False)
-    events = [event.time for event in (*run.events[:3], *run.events[-3:])]
-    for t in {run.t_end, *events, *(share * run.t_end for share in shares)}:
+    events = [event.time for event in (*run.events[:1], *run.events[-2:])]
+    for t in {run.t_end, *events, share * run.t_end}:
         again = simulate(
             case.model, 0.02 * case.t_end, run.displacement(t), run.velocity(t), case.loads, compiled=False
         )
