@@ -26,6 +26,7 @@ from multiphi_exudyn.structure import is_real, real_array
 __all__ = ["Course", "Harmonic", "Sampled", "Smooth", "Sweep", "check_course", "check_numbers"]
 
 SWEEPS = ("linear", "logarithmic")
+COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: one that is nearer to a line lies on it
 TIGHTEST = 1e-12  # tolerance of a course: below it lies the round-off of its polynomials
 
 
@@ -89,8 +90,9 @@ class Sampled:
             raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {cause}") from error
 
     def history(self, end: float, finer: float = 1.0) -> History:
-        """The course up to ``end`` [s]."""
-        return History.sampled(self.time, self.values)
+        """The course up to ``end`` [s]; samples on the line of their neighbours make no piece of their own."""
+        bends = _bends(self.time, self.values)
+        return History.sampled(self.time[bends], self.values[bends])
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,15 @@ def _check_tolerance(value: float) -> None:
 def check_course(what: str, course: Any) -> None:
     if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
         raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
+
+
+def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Places of the samples between which all others lie on straight lines, but for round-off of the largest value."""
+    widths, round_off = np.diff(time), COLLINEAR * float(np.max(np.abs(values)))
+    turns = np.abs(np.diff(np.diff(values) / widths)) > round_off * (1 / widths[1:] + 1 / widths[:-1])
+    bends = np.flatnonzero(np.concatenate([[True], turns, [True]]))
+    off = np.abs(np.interp(time, time[bends], values[bends]) - values) > round_off
+    return np.union1d(bends, np.flatnonzero(off))
 
 
 def _breaks(given: Any) -> tuple[float, ...]:

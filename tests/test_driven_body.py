@@ -30,6 +30,8 @@ CASES = {
     "swept base": (SOFT, "all", [mp.BaseMotion(np.ones(3), mp.Sweep(0.1, 0.3, 1.0, T_END))]),
     "one mode": (SOFT, 1, [DRIVEN]),
     "sweep": (SOFT, "all", [mp.SweepLoad("m1", 1.0, 0.1, 2.0, T_END)]),
+    "step": (SOFT, "all", [mp.FunctionLoad("m1", lambda t: 5 if t < 0.1 else -1)]),
+    "one-sided law": ((mp.ForceLaw("m2", ([0.0, 0.1, 0.3], [0.0, 2.0, 9.0])),), "all", [DRIVEN]),
 }
 
 

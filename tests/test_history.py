@@ -168,7 +168,7 @@ class TestFailures:
             evaluated += t.size
             return random.normal(size=t.shape)
 
-        with pytest.raises(NumericalFailure, match="not smooth enough .* need a larger tolerance, or breaks"):
+        with pytest.raises(NumericalFailure, match=r"not smooth enough .* need a larger tolerance, or breaks"):
             History.smooth(noise, 1.0, 1e-6)
         assert evaluated < 40 * MOST_PIECES
 

@@ -27,6 +27,10 @@ from multiphi_exudyn.model import MultiPhiModel
 __all__ = ["Drive", "Excitation", "columns", "static_load"]
 
 
+CARRIER_EFFORT = 10  # pieces of a polynomial for which one of a sweep stands: each of these has its own exponentials
+MOST_EFFORT = 2**20  # pieces in a run, of 3 kB and half a millisecond or more each
+
+
 @dataclass(frozen=True)
 class Drive:
     """The channels from an instant on: w(time + t) = Re sum_j exp(mu_j t) sum_d a_jd t^d up to ``until`` [s].
@@ -87,12 +91,28 @@ class Excitation:
         channels.add_static(static_load(model, loads))
         patterns = columns(channels.patterns, base.modes.count)
         stops = columns(channels.stops, len(model.contacts))
-        return cls(channels.static, patterns, stops, tuple(channels.histories), tuple(channels.rate_of))
+        found = cls(channels.static, patterns, stops, tuple(channels.histories), tuple(channels.rate_of))
+        if found.effort(end) > MOST_EFFORT:
+            raise MultiPhiValueError(
+                f"loads: got {found.pieces(end)} pieces in {end:g} s, need at most {MOST_EFFORT}, or of sweeps "
+                f"{MOST_EFFORT // CARRIER_EFFORT}: fewer samples, a larger tolerance or a shorter run"
+            )
+        return found
 
     @property
     def channels(self) -> int:
         """Number of channels q."""
         return len(self.histories)
+
+    def pieces(self, end: float) -> int:
+        """Number of pieces in which all channels together are followed up to ``end`` [s]."""
+        inner = [history.breaks[(history.breaks > 0) & (history.breaks < end)] for history in self.histories]
+        return 1 + len(np.unique(np.concatenate(inner))) if inner else 0
+
+    def effort(self, end: float) -> int:
+        """The pieces up to ``end`` [s], those of a run with changing carriers counted as often as they cost more."""
+        carriers = max((len(np.unique(history.rates)) for history in self.histories), default=0)
+        return self.pieces(end) * (CARRIER_EFFORT if carriers > 1 else 1)
 
     def drive(self, time: float) -> Drive:
         """The channels from a time on, until the first of their pieces ends."""
