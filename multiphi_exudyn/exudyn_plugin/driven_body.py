@@ -83,8 +83,9 @@ class DrivenBody(MultiPhiBody):
         x, w = self.coordinates.read(), self._channels.at(t)
         test = self._driven_test()
         armed = all(phase is Phase.ARMED for phase in self._state.phases)
-        if not (armed and test.clear(self._x, self._w, x, w) and not self._jumps(begun, t)):
-            self._repeat(mbs, begun, self._x, x)
+        jumped = self._jumps(begun, t)
+        if not (armed and test.clear(self._x, self._w, x, w) and not jumped):
+            self._repeat(mbs, begun, self._x, x, jumped)
             x = self.coordinates.read()
         self._x, self._w = x, w
 
@@ -93,8 +94,9 @@ class DrivenBody(MultiPhiBody):
         return 0.0 if math.isnan(self.time) else self.time
 
     def _jumps(self, begun: float, t: float) -> bool:
-        first = int(np.searchsorted(self._jump_times, begun))
-        return first < len(self._jump_times) and self._jump_times[first] <= t
+        """Whether a load jumps in a step, its ends included: their times are rounded, in a force as in the solver."""
+        first = int(np.searchsorted(self._jump_times, begun - self._rounding))
+        return first < len(self._jump_times) and self._jump_times[first] <= t + self._rounding
 
     def _begin(self, mbs: Any, t: float) -> None:
         """Take state and level from the system, and the loads up to the end of its run."""

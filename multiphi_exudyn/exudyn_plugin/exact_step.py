@@ -81,11 +81,11 @@ class ExactStep(ABC):
         """(p, f) of the body's own varying loads at a time, in a level."""
         return self.coordinates.no_force
 
-    def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray) -> None:
+    def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray, jumped: bool = False) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it.
 
         Forces of constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the
-        mean.
+        mean. jumped: whether an own load jumped in the step, which that rule would take for a ramp.
         """
         here, start, known = self.coordinates, self._state, len(self.events)
         own = here.stepped
@@ -96,8 +96,9 @@ class ExactStep(ABC):
         state, instant = self._travel(before, begun, force, force, own)
         if instant is None:
             self._keep(replace(start, phases=state.phases))
-            return
-        if self._alone:
+            if not jumped:
+                return
+        if self._alone or instant is None:
             self._write(mbs, state, force)
             return
         present, entered = self._present(mbs, instant, force, own), self._stepped(instant.after.closed)
