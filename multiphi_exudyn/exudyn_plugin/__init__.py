@@ -1,6 +1,7 @@
 """Exudyn side: from an Exudyn system to a linear structure with contacts, and from a reduced model to a body.
 
-On import the Create function is also bound to Exudyn's systems, as ``mbs.CreateMultiPhiBody(...)``.
+On import the Create function is also bound to Exudyn's systems, as ``mbs.CreateMultiPhiBody(...)``, and SolveDynamic
+checks what the bodies need of the solver.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
 from multiphi_exudyn.exudyn_plugin.drawing import Drawing
 from multiphi_exudyn.exudyn_plugin.fem_interface import linear_structure_from_fem
+from multiphi_exudyn.exudyn_plugin.linear_range import RangeCheck
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.reduce import Item, Reduction, reduce
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
+from multiphi_exudyn.exudyn_plugin.solving import install_checks
 
 __all__ = [
     "BodyHistories",
@@ -21,6 +24,7 @@ __all__ = [
     "Item",
     "LinearizedStructure",
     "MultiPhiBody",
+    "RangeCheck",
     "Reduction",
     "body_histories",
     "linear_structure_from",
@@ -29,3 +33,4 @@ __all__ = [
 ]
 
 bind(CreateMultiPhiBody)
+install_checks()

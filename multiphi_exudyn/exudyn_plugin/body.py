@@ -188,7 +188,7 @@ class MultiPhiBody(ExactStep):
 
     def _begin(self, mbs: Any, t: float) -> None:
         """Take state and level from the system as it stands at the start of a run."""
-        self._check_settings(mbs)
+        self.check_integration(mbs.sys["simulationSettings"], trapezoidal=False)
         here = self.coordinates
         here.attach(mbs)
         self._alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
@@ -217,14 +217,16 @@ class MultiPhiBody(ExactStep):
         self._sample()
         self.time = t
 
-    def _check_settings(self, mbs: Any) -> None:
-        integration = mbs.sys["simulationSettings"].timeIntegration.generalizedAlpha
-        if not integration.useNewmark and integration.spectralRadius != 1:
+    def check_integration(self, settings: Any, trapezoidal: bool) -> None:
+        """Raises for settings of an implicit solver that make the body wrong; TrapezoidalIndex2 has its own."""
+        integration = settings.timeIntegration.generalizedAlpha
+        if not (trapezoidal or integration.useNewmark) and integration.spectralRadius != 1:
             raise MultiPhiValueError(
-                f"spectralRadius: got {integration.spectralRadius:g}, need 1 (or TrapezoidalIndex2) "
-                f"with the Multi-Phi body {self.name!r}"
+                f"spectralRadius: got {integration.spectralRadius:g}, need 1 with the Multi-Phi body {self.name!r}: "
+                "set simulationSettings.timeIntegration.generalizedAlpha.spectralRadius = 1, or "
+                "solverType=exu.DynamicSolverType.TrapezoidalIndex2"
             )
-        if self.coordinates.interface is not None and not integration.useIndex2Constraints:
+        if self.coordinates.interface is not None and not (trapezoidal or integration.useIndex2Constraints):
             raise MultiPhiValueError(
                 f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
             )

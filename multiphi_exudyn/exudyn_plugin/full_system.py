@@ -16,14 +16,13 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
-import scipy.linalg
 
+from multiphi_exudyn.exudyn_plugin.directions import Directions
 from multiphi_exudyn.exudyn_plugin.geometric_stiffness import constraint_jacobian, generalised_forces, static_solver
 from multiphi_exudyn.exudyn_plugin.items import rough_parameters, user_function, value_key
 
 __all__ = ["FullSystem", "initial_is_current", "items_of", "smooth"]
 
-REDUNDANT = 1e-9  # of a constraint's row: what another constraint leaves of it, if it says the same
 STEP = 1e-4  # of the reach of a motion, by which C is differentiated along it: an error of 1e-8, and 1e-12 of round-off
 
 
@@ -110,11 +109,11 @@ class FullSystem:
         """The system at q, v, (n_full,), under a force besides its own; reach: the largest |q - q_0| of the motion."""
         nothing = np.zeros(len(displacement))
         self._set(displacement, self._start[1])
-        directions = _Directions(self._jacobian(), self._mass())
+        directions = Directions(self._jacobian(), self._mass())
         shift = directions.solved(nothing, self._constraints - self._residual())
         self._set(displacement + shift, velocity)
         jacobian = self._jacobian()
-        directions = _Directions(jacobian, self._mass())
+        directions = Directions(jacobian, self._mass())
         velocity = velocity + directions.solved(nothing, self._held - jacobian @ velocity)
         turning = self._turning(displacement + shift, velocity, reach)
         self._set(displacement + shift, velocity)
@@ -148,34 +147,3 @@ class FullSystem:
         count = self._solver.GetODE2size()
         self._solver.ComputeMassMatrix(self._mbs)
         return np.array(self._solver.GetSystemMassMatrix())[:count, :count]
-
-
-class _Directions:
-    """What constraints hold, by a QR decomposition of C^T, and what they leave free."""
-
-    def __init__(self, jacobian: np.ndarray, mass: np.ndarray) -> None:
-        moving = np.any(jacobian, axis=1)  # an inactive constraint has no row
-        self._used, self._mass = np.flatnonzero(moving), mass
-        held, free = np.zeros((len(mass), 0)), np.eye(len(mass))
-        self._triangle = np.zeros((0, 0))
-        if len(self._used):
-            rows = jacobian[self._used] / np.linalg.norm(jacobian[self._used], axis=1)[:, None]
-            q, r, order = scipy.linalg.qr(rows.T, pivoting=True)
-            rank = int(np.sum(np.abs(np.diag(r)) > REDUNDANT))
-            self._lengths = np.linalg.norm(jacobian[self._used], axis=1)[order[:rank]]
-            self._used, self._triangle = self._used[order[:rank]], r[:rank, :rank]
-            held, free = q[:, :rank], q[:, rank:]
-        self._held, self._free = held, free
-        self._own = free.T @ mass @ free
-
-    def size(self, vector: np.ndarray) -> float:
-        """|vector|_M."""
-        return float(np.sqrt(max(vector @ self._mass @ vector, 0.0)))
-
-    def solved(self, force: np.ndarray, held: np.ndarray) -> np.ndarray:
-        """a (n_full,) of M a = force - C^T mu, C a = held."""
-        given = np.zeros(len(force))
-        if len(self._used):
-            values = held[self._used] / self._lengths
-            given = self._held @ scipy.linalg.solve_triangular(self._triangle, values, trans="T")
-        return np.asarray(given + self._free @ np.linalg.solve(self._own, self._free.T @ (force - self._mass @ given)))

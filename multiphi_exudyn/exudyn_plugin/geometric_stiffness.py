@@ -19,6 +19,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.advancedUtilities import NumericalJacobian
 
+from multiphi_exudyn.exudyn_plugin.directions import Directions
 from multiphi_exudyn.exudyn_plugin.items import is_curved
 
 __all__ = ["constraint_jacobian", "generalised_forces", "geometric_stiffness", "static_solver"]
@@ -72,18 +73,16 @@ def _of_constraints(mbs: Any, solver: Any) -> np.ndarray:
 
 
 def constraint_jacobian(mbs: Any, solver: Any) -> np.ndarray:
-    """C (m, n_full) at the current state."""
+    """C (m, n_full) at the current state, of constraints on velocities too, of which Exudyn fills C^T only."""
     count, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()
     solver.SetSystemJacobian(np.zeros((size, size)))
     solver.ComputeJacobianAE(mbs)
-    return np.array(solver.GetSystemJacobian())[count:, :count]
+    return np.array(solver.GetSystemJacobian())[:count, count:].T
 
 
 def _carried(mass: np.ndarray, jacobian: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """mu (m,); redundant constraints share it. What is round-off of the forces is zero, and gives no stiffness."""
-    held = len(jacobian)
-    system = np.block([[mass, jacobian.T], [jacobian, np.zeros((held, held))]])
-    found = np.linalg.lstsq(system, np.concatenate([forces, np.zeros(held)]), rcond=None)[0][len(forces) :]
+    """mu (m,); what is round-off of the forces is zero, and gives no stiffness."""
+    found = Directions(jacobian, mass).carried(forces)
     pushed = np.max(np.abs(found[:, None] * jacobian), axis=1, initial=0.0)
     return np.where(pushed > ROUND_OFF * np.max(np.abs(forces), initial=0.0), found, 0.0)
 

@@ -22,6 +22,7 @@ __all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
 
 TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
 SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
+ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
 SAMPLES = 256  # times at which the largest displacement and velocity are looked for
 PROBED = 12  # lowest modes of which limits are kept: those that move far
 LARGEST, SMALLEST = 2.0**12, 2.0**-24  # amplitudes tried for a limit, of the largest distance or angle in the system
@@ -54,9 +55,10 @@ class RangeCheck:
         if self.holds:
             return ()
         found = self.times[np.argmax(self.errors > TOLERANCE)]
+        away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
         return (
-            f"linear range: left by t = {found:.3g} s, where the Exudyn system's accelerations differ by up to "
-            f"{self.error:.2g} of the largest displacement; make the motion smaller, or solve the Exudyn system itself",
+            f"linear range: the motion has left it by t = {found:.3g} s: forces of the Exudyn system that the model "
+            f"lacks move it {away} of its largest displacement away; make the motion smaller, or solve the system",
         )
 
 
@@ -94,11 +96,11 @@ class LinearRange:
         sizes, speeds = linear.size(z), linear.size(z_t)
         spread = np.linspace(0.0, trajectory.t_end, SPREAD + 1)[1:]
         times = np.unique([*spread, samples[np.argmax(sizes)], samples[np.argmax(speeds)]])
-        if not np.max(sizes) > 0:
+        reach = float(np.max(np.abs(linear.basis @ z)))
+        if not reach > ROUND_OFF * linear.largest:
             return RangeCheck(times, np.zeros(len(times)))
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
-        reach = float(np.max(np.abs(linear.basis @ z)))
         extent = Extent(reach, float(np.max(sizes)), float(np.max(speeds) / np.max(sizes)))
         known = [contact.name for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.beside(self._mbs) as compared:
@@ -137,7 +139,7 @@ class LinearRange:
         linear = self._linear
         largest = float(np.max(np.abs(linear.basis @ shape)))
         loaded = float(np.linalg.norm(linear.modes[1].T @ linear.static))
-        scale = float(np.max(np.abs(linear.displacement), initial=0.0)) or 1.0
+        scale = linear.largest or 1.0
         tried = LARGEST
         with linear.beside(self._mbs) as compared:
             while tried >= SMALLEST:
@@ -145,7 +147,7 @@ class LinearRange:
                 rate = math.sqrt(max(square, loaded / size))
                 if (
                     rate == 0.0
-                    or compared.error(size * shape, size * rate * shape, Extent(tried, size, rate)) <= TOLERANCE
+                    or compared.error(size * shape, size * rate * shape, Extent(tried * scale, size, rate)) <= TOLERANCE
                 ):
                     return size if tried < LARGEST else math.inf
                 tried /= COARSE

@@ -25,12 +25,12 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.full_system import initial_is_current
 from multiphi_exudyn.exudyn_plugin.geometric_stiffness import generalised_forces, geometric_stiffness, static_solver
 from multiphi_exudyn.exudyn_plugin.linearisation import Linearisation
+from multiphi_exudyn.exudyn_plugin.matrix_checks import checked_matrices
 from multiphi_exudyn.exudyn_plugin.point_rows import coordinate_row, default_points, given_points
 from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
 
 __all__ = ["LinearizedStructure", "linear_structure_from"]
 
-ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
@@ -153,7 +153,7 @@ def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     stiffness += basis.T @ geometric_stiffness(mbs) @ basis
     if basis.shape[1] == 0:
         raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
-    return _symmetric("mass", mass), _symmetric("stiffness", stiffness), _symmetric("damping", damping), basis
+    return (*checked_matrices(mbs, mass, stiffness, damping, basis), basis)
 
 
 def linearised(mbs: Any, time: float) -> Linearisation:
@@ -162,7 +162,8 @@ def linearised(mbs: Any, time: float) -> Linearisation:
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
     static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
-    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time)
+    largest = float(np.max(np.abs(data.GetODE2Coordinates(exu.ConfigurationType.Reference) + displacement)))
+    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest)
 
 
 def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
@@ -190,15 +191,6 @@ def _slack(mbs: Any, springs: Mapping[int, Mapping[str, Any]]) -> Iterator[None]
         for i, item in springs.items():
             for name in ("stiffness", "damping"):
                 mbs.SetObjectParameter(exu.ObjectIndex(i), name, item[name])
-
-
-def _symmetric(name: str, matrix: np.ndarray) -> np.ndarray:
-    matrix = np.asarray(matrix)
-    if np.max(np.abs(matrix - matrix.T)) > ASYMMETRY * np.max(np.abs(matrix)):
-        raise MultiPhiValueError(
-            f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), need a symmetric one"
-        )
-    return (matrix + matrix.T) / 2
 
 
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:

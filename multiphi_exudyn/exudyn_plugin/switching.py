@@ -18,7 +18,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 if TYPE_CHECKING:
     from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 
-__all__ = ["BODIES", "Switching", "bodies_of", "nothing_acts_on", "running_solver"]
+__all__ = ["BODIES", "Switching", "bodies_of", "check_solver", "nothing_acts_on", "running_solver"]
 
 BODIES = "multiPhi"  # key in mbs.variables
 
@@ -65,6 +65,11 @@ class Switching(dict[str, "MultiPhiBody"]):
             self.following = present
             mbs.SetPostStepUserFunction(self.after_step)
 
+    def installed(self, mbs: Any) -> bool:
+        """Whether these bodies switch in a run of the system."""
+        present = _user_function("PostStep", mbs.GetPostStepUserFunction())
+        return present is not None and present == self.after_step
+
     def install_before(self, mbs: Any) -> None:
         """Become the system's PreStep function, followed by the present one."""
         present = _user_function("PreStep", mbs.GetPreStepUserFunction())
@@ -89,14 +94,21 @@ def running_solver(mbs: Any, t: float) -> Any:
     """The implicit dynamic solver at work at time t, None inside SolveStatic."""
     dynamic = mbs.sys.get("dynamicSolver")
     if _at_work(dynamic, t):
-        if not isinstance(dynamic, exu.MainSolverImplicitSecondOrder):
-            raise MultiPhiValueError(
-                f"solver: got {type(dynamic).__name__}, need GeneralizedAlpha or TrapezoidalIndex2"
-            )
+        implicit = isinstance(dynamic, exu.MainSolverImplicitSecondOrder)
+        check_solver(implicit, type(dynamic).__name__, bodies_of(mbs))
         return dynamic
     if not _at_work(mbs.sys.get("staticSolver"), t):
         raise MultiPhiValueError("SolveDynamic: got a solver that is not stored, need storeSolver=True")
     return None
+
+
+def check_solver(implicit: bool, name: str, bodies: Mapping[str, Any]) -> None:
+    """Raises for a dynamic solver that has no implicit steps."""
+    if not implicit:
+        raise MultiPhiValueError(
+            f"solver: got {name}, need GeneralizedAlpha or TrapezoidalIndex2 with the Multi-Phi body "
+            f"{next(iter(bodies))!r}: set solverType=exu.DynamicSolverType.TrapezoidalIndex2"
+        )
 
 
 def nothing_acts_on(mbs: Any, node: Any, body: Any) -> bool:
