@@ -7,6 +7,7 @@ import runpy
 from pathlib import Path
 
 import exudyn as exu
+import exudyn.itemInterface as eii
 import numpy as np
 import pytest
 from exudyn.itemInterface import (
@@ -506,3 +507,34 @@ def test_what_the_body_raises_inside_a_step_comes_out_as_it_is(refused):
     model = chain([mp.UnilateralContact("stop", "m0", 0.01, 5e4)])
     start = np.array([0.5, 0.4, 0.2])
     refused(ValueError, "matchedStepSize: got 0.016 s", solve_body_alone, model, start, 0.32, 20, ())
+
+
+@pytest.mark.parametrize(
+    ("said", "given"),
+    [
+        ("spectralRadius: got 0.9, need 1 with the Multi-Phi body 'multiPhi0': set simulationSettings.timeInt", {}),
+        ("solver: got RK44, need GeneralizedAlpha or Trap", {"solverType": exu.DynamicSolverType.RK44}),
+    ],
+)
+def test_the_first_line_of_a_wrong_solver_is_what_to_set(refused, said, given):
+    model, start = rig(COMPLIANT)
+    chosen = exu.SimulationSettings()
+    chosen.solution.file.write = False
+    for solve_dynamic in (exu.MainSystem.SolveDynamic, exu.SolveDynamic):
+        container, mbs = new_system()
+        CreateMultiPhiBody(mbs, model, displacement=start)
+        mbs.Assemble()
+        refused(ValueError, said, solve_dynamic, mbs, chosen, **given)
+        del container
+
+
+def test_a_system_without_bodies_is_solved_as_before():
+    container, mbs = new_system()
+    node = mbs.AddNode(eii.NodePoint(initialVelocities=[1.0, 0.0, 0.0]))
+    mbs.AddObject(eii.ObjectMassPoint(mass=1.0, nodeNumber=node))
+    mbs.Assemble()
+    chosen = fixed_steps(0.1, 10, write_period=0.1)
+    mbs.SolveDynamic(chosen, solverType=exu.DynamicSolverType.RK44)
+    assert mbs.GetNodeOutput(node, exu.OutputVariableType.Displacement)[0] == pytest.approx(0.1, rel=1e-12)
+    assert "multiPhi" not in mbs.variables
+    del container

@@ -335,3 +335,60 @@ def test_a_hinged_bar_on_a_stop_moves_as_in_exudyn():
     assert "'hinge': constraint, its directions taken out" in reduction.report
     assert len(trajectory.contact_intervals("stop")) == 2
     np.testing.assert_allclose(trajectory.at("centre", np.minimum(own.time, 0.2)), own.of_row(row), atol=2e-6)
+
+
+def test_strict_refuses_what_would_be_left_out_and_names_it():
+    with pytest.raises(
+        mp.MultiPhiValueError, match=r"leaves out \(ObjectConnector.*Ext 'slide': friction\), need strict=F"
+    ):
+        reduce(mass_between_limit_stops(friction=1.5).mbs, strict=True)
+    assert reduce(mass_between_limit_stops().mbs, strict=True).left_out == ()
+
+
+def springs_by_user_functions(count):
+    """A mass on springs by user functions, one of which is switched off."""
+    system = Mass(displacement=0.01)
+    for i in range(count):
+        system.mbs.AddObject(
+            eii.ObjectConnectorCoordinateSpringDamper(
+                name=f"spring{i}",
+                markerNumbers=system.markers,
+                springForceUserFunction=lambda mbs, t, i, u, v, k, d, offset: 100.0 * u,
+                activeConnector=i > 0,
+            )
+        )
+    system.mbs.Assemble()
+    return system
+
+
+def test_items_left_out_for_one_reason_are_one_warning_and_one_line():
+    reduction = reduce(springs_by_user_functions(30).mbs)
+    (sentence,) = run(reduction, 0.1).warnings
+    assert sentence.startswith(
+        "left out: 29 ObjectConnectorCoordinateSpringDamper ('spring1', 'spring2', 'spring3', ...): what its user"
+    )
+    assert len(reduction.left_out) == 30
+    assert len(reduction.report.splitlines()) < 10
+
+
+def test_what_is_switched_off_is_no_reason_to_refuse_or_to_warn():
+    reduction = reduce(springs_by_user_functions(1).mbs, strict=True)
+    assert [reason for _, reason in reduction.left_out] == ["not active"]
+    assert run(reduction, 0.1).warnings == ()
+
+
+def test_a_motion_prescribed_by_velocity_makes_no_difference_to_the_check():
+    """Exudyn fills half of the Jacobian of such a constraint; the damper on the moved mass pulls the free one."""
+    system = Mass(velocity=2.0)
+    mbs = system.mbs
+    free = mbs.AddNode(eii.NodePoint())
+    mbs.AddObject(eii.ObjectMassPoint(mass=1.0, nodeNumber=free))
+    moved = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=free, coordinate=0))
+    mbs.AddObject(
+        eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=[system.markers[1], moved], stiffness=50.0, damping=3.0)
+    )
+    mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=system.markers, offset=2.0, velocityLevel=True))
+    mbs.Assemble()
+    reduction = reduce(mbs)
+    assert [item.type for item, _ in reduction.left_out] == ["ObjectConnectorCoordinate"]
+    assert reduction.check(run(reduction, 1.0)).error < 1e-6

@@ -311,3 +311,58 @@ def test_two_reductions_put_back_into_one_system_with_another_mass_move_as_all_o
         theirs = np.interp(found.time, own.time, own.coordinates[:, first + component])
         assert len(found.events) >= 2
         assert np.max(np.abs(found.points[at] - theirs)) < 0.01 * np.max(np.abs(theirs))
+
+
+def bob_on_a_link(direction, mass=2.0):
+    """A mass on a link of 1 m in a direction from ground, with its weight."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    nodes = [
+        mbs.AddNode(eii.NodePointGround()),
+        mbs.AddNode(eii.NodePoint2D(name="bob", referenceCoordinates=list(direction))),
+    ]
+    mbs.AddObject(eii.ObjectMassPoint2D(name="ball", mass=mass, nodeNumber=nodes[1]))
+    markers = [mbs.AddMarker(eii.MarkerNodePosition(nodeNumber=node)) for node in nodes]
+    mbs.AddObject(eii.ObjectConnectorDistance(markerNumbers=markers, distance=1.0))
+    mbs.AddLoad(eii.LoadForceVector(markerNumber=markers[1], loadVector=[0.0, -9.81 * mass, 0.0]))
+    mbs.Assemble()
+    return container, mbs
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_horizontal_pendulum_has_no_stiffness_and_not_one_of_round_off(sign):
+    _, mbs = bob_on_a_link([sign, 0.0])
+    np.testing.assert_array_equal(reduce(mbs).structure.stiffness, [[0.0]])
+
+
+def test_a_negative_stiffness_is_told_by_its_coordinate_and_body(refused):
+    _, mbs = bob_on_a_link([0.0, 1.0])
+    said = (
+        r"stiffness: got a negative one (omega^2 = -9.81 1/s2), mainly of coordinate 0 of node 'bob' (ObjectMassPoint2D"
+    )
+    refused(ValueError, said, reduce, mbs)
+
+
+def test_a_coordinate_without_mass_is_told(refused):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    nodes = [mbs.AddNode(eii.NodePoint2D(name=name)) for name in ("heavy", "empty")]
+    for node, mass in zip(nodes, (1.0, 0.0), strict=True):
+        mbs.AddObject(eii.ObjectMassPoint2D(mass=mass, nodeNumber=node))
+    mbs.Assemble()
+    refused(ValueError, "mass: got no mass at coordinate 0 of node 'empty' (ObjectMassPoint2D", reduce, mbs)
+
+
+def test_an_asymmetric_matrix_is_told_by_its_coordinates(refused):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    node = mbs.AddNode(eii.NodePoint2D(name="shaft"))
+    mbs.AddObject(eii.ObjectMassPoint2D(name="disc", mass=1.0, nodeNumber=node))
+    spin = np.array([[0.0, 3.0], [-3.0, 0.0]])
+    mbs.AddObject(eii.ObjectGenericODE2(name="spin", nodeNumbers=[node], dampingMatrix=spin))
+    mbs.Assemble()
+    with pytest.raises(
+        mp.MultiPhiValueError, match=r"coordinate 0 of node 'shaft' \(ObjectMassPoint2D 'disc', ObjectGen"
+    ):
+        reduce(mbs)
+    refused(ValueError, "mbs: its damping matrix is not symmetric (follower or gyroscopic", reduce, mbs)

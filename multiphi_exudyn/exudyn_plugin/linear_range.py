@@ -25,8 +25,7 @@ SPREAD = 10  # instants over the run, besides those of the largest displacement 
 ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
 SAMPLES = 256  # times at which the largest displacement and velocity are looked for
 PROBED = 12  # lowest modes of which limits are kept: those that move far
-LARGEST, SMALLEST = 2.0**12, 2.0**-24  # amplitudes tried for a limit, of the largest distance or angle in the system
-COARSE = 2.0  # ratio of two amplitudes tried
+LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of the largest coordinate of the system
 
 
 @dataclass(frozen=True)
@@ -135,23 +134,28 @@ class LinearRange:
         return rows, np.array(limits), reason
 
     def _limit(self, square: float, shape: np.ndarray) -> float:
-        """The largest amplitude of a mode of omega^2 that is found linear; infinite if even the largest tried is."""
-        linear = self._linear
-        largest = float(np.max(np.abs(linear.basis @ shape)))
-        loaded = float(np.linalg.norm(linear.modes[1].T @ linear.static))
-        scale = linear.largest or 1.0
-        tried = LARGEST
-        with linear.beside(self._mbs) as compared:
-            while tried >= SMALLEST:
-                size = tried * scale / largest
-                rate = math.sqrt(max(square, loaded / size))
-                if (
-                    rate == 0.0
-                    or compared.error(size * shape, size * rate * shape, Extent(tried * scale, size, rate)) <= TOLERANCE
-                ):
-                    return size if tried < LARGEST else math.inf
-                tried /= COARSE
-        return SMALLEST * scale / largest
+        """The largest amplitude of a mode of omega^2 found linear, by bisection; infinite if the largest tried is."""
+        unit = (self._linear.largest or 1.0) / float(np.max(np.abs(self._linear.basis @ shape)))
+        if self._is_linear(square, shape, 2.0**LARGEST * unit):
+            return math.inf
+        linear, beyond = SMALLEST, LARGEST
+        while beyond - linear > 1:
+            tried = (linear + beyond) // 2
+            if self._is_linear(square, shape, 2.0**tried * unit):
+                linear = tried
+            else:
+                beyond = tried
+        return 2.0**linear * unit
+
+    def _is_linear(self, square: float, shape: np.ndarray, size: float) -> bool:
+        """Whether a mode of omega^2 stays linear at a modal amplitude and the velocity that belongs to it."""
+        loaded = float(np.linalg.norm(self._linear.modes[1].T @ self._linear.static))
+        rate = math.sqrt(max(square, loaded / size))
+        if rate == 0.0:
+            return True  # nothing acts on it
+        extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
+        with self._linear.beside(self._mbs) as compared:
+            return compared.error(size * shape, size * rate * shape, extent) <= TOLERANCE
 
 
 class LinearLimits:
