@@ -38,10 +38,10 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     rigid_body = _rigid_body_modes(base, turned)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    squares, vectors = _turned(base, squares, vectors)
+    damping = base.resistance(closed)
+    squares, vectors = _turned(base, squares, vectors, damping)
     zero = squares == 0
     _check(base, squares, vectors, supports, accuracy)
-    damping = base.resistance(closed)
     gap_rows = cleared(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
     gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
@@ -61,10 +61,21 @@ def build_level(base: Base, indices: tuple[int, ...], modes: int | None = None) 
     )
 
 
-def _turned(base: Base, squares: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Modes of a level with signs and clusters chosen by contacts, then points, then the base's own modes."""
+def _turned(base: Base, squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Modes of a level with signs and clusters chosen by contacts, then points, then the base's own modes.
+
+    Of zero-frequency modes those that nothing damps come first: they drift for ever, the others come to rest.
+    """
     rows = np.vstack([base.directions.T, base.points])
-    return turned(squares, vectors, rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(base.modes.count)]))
+    sizes = np.concatenate([np.linalg.norm(rows, axis=1), np.ones(base.modes.count)])
+    free, squares, vectors = np.flatnonzero(squares == 0), squares.copy(), vectors.copy()
+    resisted, rotation = np.linalg.eigh(vectors[:, free].T @ damping @ vectors[:, free])
+    drifting = int(np.sum(resisted <= UNDAMPED * np.max(np.abs(damping), initial=0.0)))
+    if 0 < drifting < len(free):
+        vectors[:, free] = vectors[:, free] @ rotation
+    for part in (free[:drifting], free[drifting:], np.flatnonzero(squares)):
+        squares[part], vectors[:, part] = turned(squares[part], vectors[:, part], rows, sizes)
+    return squares, vectors
 
 
 def _force_rows(

@@ -173,10 +173,18 @@ def _coupled(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
 
 
 def _complex_modes(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
-    """Complex modes of z' = S z, z = (|omega| eta, eta'); zero-frequency modes are carried as eta itself."""
+    """Complex modes of z' = S z, z = (|omega| eta_e, eta') with the elastic modes e; zero-frequency modes follow.
+
+    Every entry of z is a velocity, whatever the units. On zero-frequency modes f nothing acts but damping:
+    eta_f(t) = eta_f(0) + Re sum_j v_fj / lambda_j c_j (exp(lambda_j t) - 1).
+    """
     r = len(squares)
-    scale = np.where(squares != 0, np.sqrt(np.abs(squares)), 1.0)
-    system = np.block([[np.zeros((r, r)), np.diag(scale)], [-np.diag(squares / scale), -damping]])
+    elastic, free = np.flatnonzero(squares), np.flatnonzero(squares == 0)
+    scale = np.sqrt(np.abs(squares[elastic]))
+    upper, lower = np.zeros((len(elastic), r)), np.zeros((r, len(elastic)))
+    upper[np.arange(len(elastic)), elastic] = scale
+    lower[elastic, np.arange(len(elastic))] = -squares[elastic] / scale
+    system = np.block([[np.zeros((len(elastic),) * 2), upper], [lower, -damping]])
     rates, vectors = (found.astype(complex) for found in np.linalg.eig(system))  # eig gives real ones where all decay
     if not np.linalg.cond(vectors) < WORST_CONDITION:
         raise NumericalFailure(
@@ -185,12 +193,18 @@ def _complex_modes(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
         )
     rates, vectors = _refined(system, rates, vectors)
     kept = rates.imag >= 0
-    maps = _real_part_inverse(vectors[:, kept], rates[kept].imag > 0)
-    basis = Exponentials(rates[kept], np.zeros(int(np.sum(kept)), int))
-    from_displacement, from_velocity = maps[:, :r] * scale, maps[:, r:]
-    none = np.zeros_like(from_velocity)
-    response = ModalResponse(basis, vectors[:r, kept] / scale[:, None], from_displacement, from_velocity, none, False)
-    return _with_drift(response, squares, damping) if np.any(squares == 0) else response
+    inverse = _real_part_inverse(vectors[:, kept], rates[kept].imag > 0)
+    count = int(np.sum(kept))
+    shapes, maps = np.zeros((r, count + len(free)), complex), np.zeros((2, count + len(free), r), complex)
+    shapes[elastic, :count] = vectors[: len(elastic), kept] / scale[:, None]
+    shapes[free, :count] = vectors[len(elastic) + free][:, kept] / rates[kept]
+    shapes[free, count + np.arange(len(free))] = 1.0
+    maps[0][:count, elastic], maps[1][:count] = inverse[:, : len(elastic)] * scale, inverse[:, len(elastic) :]
+    maps[:, count:] = -(shapes[free, :count] @ maps[:, :count]).real
+    maps[0][count + np.arange(len(free)), free] += 1.0
+    basis = Exponentials(np.concatenate([rates[kept], np.zeros(len(free))]), np.zeros(count + len(free), int))
+    response = ModalResponse(basis, shapes, maps[0], maps[1], np.zeros_like(maps[1]), False)
+    return _with_drift(response, squares, damping) if len(free) else response
 
 
 def _refined(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -208,7 +222,7 @@ def _refined(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> tupl
 
 
 def _real_part_inverse(vectors: np.ndarray, paired: np.ndarray) -> np.ndarray:
-    """c (k, 2r) of z = Re sum_j v_j c_j from the k vectors (2r, k), of which those not ``paired`` are real.
+    """c (k, s) of z = Re sum_j v_j c_j from the k vectors (s, k), of which those not ``paired`` are real.
 
     Solved as the real system it is and refined once: an inverse of the complex vectors leaves an error of
     their condition squared in z, this one of their condition.

@@ -31,28 +31,39 @@ def _rest(base: Base, supports: Supports, load: np.ndarray) -> tuple[np.ndarray,
     touching = supports.directions[elastic]
     sprung = supports.stiffness != 0  # the others push with G, whatever y is
     own = np.where(sprung, 1 / np.where(sprung, supports.stiffness, 1.0), 1.0)
-    flexibility = sprung[:, None] * (touching.T @ (compliance[:, None] * touching)) + np.diag(own)
+    bent = touching.T @ (compliance[:, None] * touching)
     carried = _range(supports.resisting[free], INDEPENDENT * supports.size)
     coupling = supports.directions[free].T @ carried
     none = np.zeros((carried.shape[1],) * 2)
-    matrix = np.block([[flexibility, sprung[:, None] * coupling], [coupling.T, none]])
+    matrix = np.block([[sprung[:, None] * bent + np.diag(own), sprung[:, None] * coupling], [coupling.T, none]])
+    sizes = _sizes(np.diagonal(bent) + sprung * np.abs(own), coupling)
     pressed = -supports.offsets - sprung * (touching.T @ (compliance * load[elastic]))
-    solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]))
+    solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]), sizes)
     forces = solution[: len(own)]
     total = cleared(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
     configuration = np.concatenate([carried @ solution[len(own) :], compliance * total])
     left = supports.offsets + own * forces + sprung * (supports.directions.T @ configuration)
-    further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]))  # what soft modes magnified
+    further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]), sizes)  # what soft modes magnified
     added = np.concatenate([carried @ further[len(own) :], compliance * (touching @ further[: len(own)])])
     return forces + further[: len(own)], configuration + added
 
 
-def _solved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:
+def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
+    """Of the unknowns (d + k,), to which rows and columns are scaled: pivots then do not hang on units."""
+    forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
+    largest = float(np.max(np.abs(forces[:, None] * coupling), initial=0.0)) or 1.0
+    return np.concatenate([forces, np.full(coupling.shape[1], 1 / largest)])
+
+
+def _solved(matrix: np.ndarray, given: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """The solution, the smallest one where the matrix is singular: springs that cancel, under a load they allow."""
+    lengths = np.max(np.abs(matrix * sizes), axis=1, initial=0.0)
+    rows = 1 / np.where(lengths > 0, lengths, 1.0)
+    scaled, right = rows[:, None] * matrix * sizes, rows * given
     try:
-        return np.linalg.solve(matrix, given)
+        return np.asarray(sizes * np.linalg.solve(scaled, right))
     except np.linalg.LinAlgError:
-        return np.linalg.lstsq(matrix, given, rcond=None)[0]
+        return np.asarray(sizes * np.linalg.lstsq(scaled, right, rcond=None)[0])
 
 
 def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:

@@ -538,3 +538,17 @@ def test_a_system_without_bodies_is_solved_as_before():
     assert mbs.GetNodeOutput(node, exu.OutputVariableType.Displacement)[0] == pytest.approx(0.1, rel=1e-12)
     assert "multiPhi" not in mbs.variables
     del container
+
+
+@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
+@pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])
+@pytest.mark.parametrize("masses", [1, 2])
+def test_a_body_without_an_oscillating_mode_falls_on_its_stop(masses, stiffness, matched):
+    structure = mp.LinearStructure(np.eye(masses), np.zeros((masses, masses)), points={"x": 0})
+    model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "x", 0.1, stiffness)], modes="all")
+    step, velocity = 1e-3, -np.ones(masses)
+    native = mp.simulate(model, 0.5, velocity=velocity)
+    body = run(model, step, 0.5, velocity=velocity, **({"matchedStepSize": step} if matched else {}))
+    assert [(e.contact, e.kind) for e in body.events] == [(e.contact, e.kind) for e in native.events]
+    assert abs(body.events[0].time - 0.1) < 1e-12
+    assert difference(body, native, ["x"]) < (1e-9 if matched or math.isinf(stiffness) else 0.2)

@@ -28,7 +28,9 @@ from multiphi_exudyn.state import Row
 __all__ = ["Lookahead", "StepTest", "energy_norm", "gains", "swell"]
 
 KNOTS = 16  # intervals a lookahead is divided into
-SPACING = 0.5  # rad, the phase of the highest mode in one of them
+SPACING = 0.5  # rad, the phase of the highest mode in one of them,
+MOST = 2**16  # steps in one of them, where no mode oscillates: a step is a small part of a run
+NEGLIGIBLE = float(np.finfo(float).eps)  # of a contact's function: what no test needs to tell from zero
 
 
 class StepTest:
@@ -69,7 +71,8 @@ class Lookahead:
     """The test for many steps of a body on which nothing acts. steps: how many."""
 
     def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
-        each = max(1, int(SPACING / (np.max(_omega(stepped)) * step)))
+        phase = float(np.max(_omega(stepped), initial=0.0)) * step
+        each = max(1, int(SPACING / max(phase, SPACING / MOST)))
         self.steps = KNOTS * each
         conditions, count = _conditions(stepped, rows, each * step, self.steps * step), len(rows)
         self._one_step = _step_matrix(stepped, step)
@@ -105,9 +108,17 @@ def _conditions(stepped: SteppedLevel, rows: list[Row], step: float, lasting: fl
 
 
 def _scales(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float) -> np.ndarray:
-    """The factors (3 c,) of max |S z'| at the start, by which the conditions are divided."""
-    scale = HERMITE * step**4 * gains(stepped, np.hstack(_padded(stepped, rows)), 3)
-    return np.tile(scale * swell(stepped, lasting) + np.finfo(float).tiny, 3)
+    """The factors (3 c,) of max |S z'| at the start, by which the conditions are divided.
+
+    Free motion has no fourth derivative: then round-off of the way that max |S z'| makes in a step, or for a contact
+    that no mode moves of its gap, stands in for it.
+    """
+    along, rate = _padded(stepped, rows)
+    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3)
+    way = step**2 * np.linalg.norm(along, axis=1) + step * np.linalg.norm(rate, axis=1)
+    constants = np.array([abs(row.constant) for row in rows]).reshape(-1)
+    least = NEGLIGIBLE * np.where(way > 0, way, np.where(constants > 0, constants, 1.0))
+    return np.tile(np.maximum(scale, least) * swell(stepped, lasting), 3)
 
 
 def _padded(stepped: SteppedLevel, rows: list[Row]) -> tuple[np.ndarray, np.ndarray]:

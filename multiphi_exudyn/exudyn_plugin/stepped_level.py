@@ -34,6 +34,7 @@ __all__ = ["SteppedLevel"]
 class SteppedLevel:
     """See the module's docstring. All matrices (s, s), s >= r the size of the body.
 
+    Coordinates beyond the level's r modes are never excited; they have the frequency of its highest one.
     loaded: the level. mass, damping, stiffness: for the solver. own_damping: Phi^T C Phi. drive: (s,).
     from_displacement, from_velocity, from_force: Q, V, G.
     """
@@ -52,7 +53,7 @@ class SteppedLevel:
     def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
         """A level matched to ``step`` [s], or plain for None."""
         level = loaded.level
-        squares, damping = np.ones(size), np.zeros((size, size))  # rad2/s2: padding is never excited
+        squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
         damping[: level.modes, : level.modes] = level.damping
         drive = np.zeros(size)

@@ -1,0 +1,134 @@
+"""Other units of time, length and mass change no status, no event and no number but by round-off."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from numpy.testing import assert_allclose
+from strategies import built, recipe_of
+from units import Units, in_units
+
+import multiphi_exudyn as mp
+
+POWERS = (
+    -40,
+    18,
+)  # of two, even: every number and its square root is scaled exactly, so that round-off is the same too
+QUANTITIES = ("time", "length", "mass")
+SAME = 1e-12  # of a run's length and of its energy
+SHORTER = 0.25  # of a case's length: enough for a few events
+PARTS = ("initial", "work_of_loads", "impact", "truncation_kinetic", "truncation_strain", "damping", "final")
+
+
+@dataclass(frozen=True)
+class Given:
+    """Arguments of ``simulate``; contacts: as given to the model."""
+
+    model: mp.MultiPhiModel
+    contacts: list
+    t_end: float
+    displacement: np.ndarray
+    velocity: np.ndarray
+    loads: list
+
+
+def drawn(number, kind):
+    """A random case: structure, damping, start and loads of a recipe, and what ``kind`` adds."""
+    random, case = np.random.default_rng([number, 7]), built(recipe_of(number))
+    contacts, loads, at = list(case.model.contacts), list(case.loads), f"m{random.integers(case.model.structure.n)}"
+    if kind == "viscous":
+        contacts = [c if c.rigid else replace(c, damping=0.05 * math.sqrt(c.stiffness)) for c in contacts]
+    elif kind == "law":
+        table = [-1.0, -0.02, 0.0, 0.03, 1.0], random.uniform(0.1, 10) * np.array([-300.0, -1.0, 0.0, 2.0, 400.0])
+        contacts.append(mp.ForceLaw(at, table))
+    elif kind == "harmonic":
+        loads.append(mp.HarmonicLoad(at, random.uniform(1, 5), random.uniform(0.15, 9) / case.t_end))
+    elif kind == "stop":
+        course = mp.Harmonic(random.uniform(0.001, 0.05), random.uniform(0.5, 4) / case.t_end, -math.pi / 2)
+        loads.append(mp.StopMotion(contacts[0].name, course))
+    modes = "all" if kind == "law" else case.model.modes
+    model = mp.MultiPhiModel(case.model.structure, contacts, modes=modes)
+    return Given(model, contacts, SHORTER * case.t_end, case.displacement, case.velocity, loads)
+
+
+def run(given, units):
+    """Status and trajectory, None where the case is refused."""
+    try:
+        trajectory = mp.simulate(**in_units(given, units), compiled=False)
+    except mp.MultiPhiError as error:
+        return type(error).__name__, None
+    return trajectory.status, trajectory
+
+
+def events(trajectory, units):
+    return [] if trajectory is None else [(e.contact, e.kind, e.time / units.time) for e in trajectory.events]
+
+
+def differences(given, units, one):
+    """What differs from the run ``one``, in words."""
+    other = run(given, units)
+    if one[0] != other[0]:
+        return f"status {one[0]}, {other[0]}"
+    before, after = events(one[1], Units()), events(other[1], units)
+    if [e[:2] for e in before] != [e[:2] for e in after]:
+        return f"{len(before)} events, {len(after)}, not the same"
+    late = max((abs(a[2] - b[2]) for a, b in zip(before, after, strict=True)), default=0.0)
+    if late > SAME * given.t_end:
+        return f"an event {late:g} s later"
+    if one[1] is None or not one[1].segments:
+        return ""
+    energies = [np.array([getattr(run.ledger, part) for part in PARTS]) for run in (one[1], other[1])]
+    off = np.max(np.abs(energies[1] / units.energy - energies[0]))
+    return "" if off <= SAME * np.max(np.abs(energies[0])) else f"energies {energies}"
+
+
+@pytest.mark.parametrize("kind", ["plain", "viscous", "law", "harmonic", "stop"])
+@pytest.mark.parametrize("number", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 60))])
+def test_change_nothing_that_happens(number, kind):
+    given = drawn(number, kind)
+    one = run(given, Units())
+    for quantity in QUANTITIES:
+        for power in POWERS:
+            assert not differences(given, Units(**{quantity: 2.0**power}), one), f"{quantity} by 2^{power}"
+
+
+class TestFreeBodiesWithADashpot:
+    @pytest.mark.parametrize("unit", [2.0**k for k in (-40, -20, 0, 20, 40)])
+    def test_come_to_move_together(self, unit):
+        """Two free masses: the velocity of one relative to the other decays with c (1/m_1 + 1/m_2)."""
+        mass, resistance = np.diag([2.0, 3.0]), 5.0 / unit
+        damping = resistance * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        structure = mp.LinearStructure(mass, np.zeros((2, 2)), damping, {"a": 0, "b": 1})
+        contacts = [mp.UnilateralContact("far", "a", 1e6)]
+        run = mp.simulate(
+            mp.MultiPhiModel(structure, contacts, modes="all"), unit, velocity=np.array([1.0, 0.0]) / unit
+        )
+        t = np.linspace(0, 1, 7)
+        rate = 5.0 * (1 / 2 + 1 / 3)
+        apart = (1 - np.exp(-rate * t)) / rate
+        assert_allclose(run.at("a", t * unit), 0.4 * t + 0.6 * apart, rtol=0, atol=1e-15)
+        assert_allclose(run.at("b", t * unit), 0.4 * t - 0.4 * apart, rtol=0, atol=1e-15)
+
+    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])
+    def test_and_springs_between_them_move_as_their_first_order_system(self, seed, unit):
+        random = np.random.default_rng(seed)
+        n = 2 + seed % 3
+        rows = [np.eye(n)[0] - np.eye(n)[1], np.eye(n)[n - 1], random.normal(size=n)]
+        mass = np.diag(random.uniform(0.5, 2, n))
+        stiffness = 40.0 * np.outer(rows[0], rows[0]) if seed % 2 else np.zeros((n, n))
+        damping = 3.0 * np.outer(rows[1 + seed % 2], rows[1 + seed % 2])
+        load = random.normal(size=n)
+        system = np.zeros((2 * n + 1, 2 * n + 1))
+        system[:n, n:-1] = np.eye(n)
+        system[n:-1] = np.linalg.solve(mass, np.column_stack([-stiffness, -damping, load]))
+        velocity = random.normal(size=n)
+        expected = (scipy.linalg.expm(system) @ np.r_[np.zeros(n), velocity, 1.0])[: 2 * n]
+        structure = mp.LinearStructure(mass, stiffness / unit**2, damping / unit, {"x": np.eye(n)[0]})
+        model = mp.MultiPhiModel(structure, [], modes="all")
+        loads = [mp.ConstantLoad(np.eye(n)[i], load[i] / unit**2) for i in range(n)]
+        run = mp.simulate(model, unit, velocity=velocity / unit, loads=loads)
+        assert_allclose(run.displacement(unit), expected[:n], rtol=0, atol=1e-12)
+        assert_allclose(run.velocity(unit) * unit, expected[n:], rtol=0, atol=1e-12)
