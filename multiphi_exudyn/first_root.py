@@ -35,6 +35,8 @@ INTERVALS = 64  # in a block
 TABLES = 8  # sample tables kept for a basis: their steps are powers of two, most events need one of a few
 TABLE_NUMBERS = 2 * (4 * INTERVALS + 2)  # floats in a sample table for an exponential
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
+PATIENCE = 1000  # blocks, less than a second, after which a search looks at how many are left,
+MOST_BLOCKS = 1_000_000  # of which it takes so many at most: minutes
 WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold no longer than twice this
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal farther from zero at another's root has its own later,
 INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes longer, unless it is round-off
@@ -76,13 +78,17 @@ class DescentFinder:
         self._eternal = basis.pure and not np.any(self._growth)
         self._window = WINDOW / float(np.max(self._growth)) if np.any(self._growth) else math.inf
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
-        fastest = float(np.max(np.abs(basis.rates), initial=0.0))
-        self._instant = INSTANT / fastest if fastest else 0.0
+        self._fastest = float(np.max(np.abs(basis.rates), initial=0.0))
+        self._instant = INSTANT / self._fastest if self._fastest else 0.0
         self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
         self._tables: dict[float, _Table] = {}
 
     def first(self, signals: Signals, horizon: float, start: float = 0.0) -> Descent | None:
-        """First descent of any of the signals in (start, horizon], None if there is none."""
+        """First descent of any of the signals in (start, horizon], None if there is none.
+
+        Raises NumericalFailure where the motion is not finite, or so fast that the search would take for ever.
+        """
+        searched = 0
         if len(signals.constants) == 0:
             return None
         constants: list[float] = signals.constants.tolist()
@@ -101,6 +107,13 @@ class DescentFinder:
             ):
                 return near if near.time <= horizon else None
             step = self._step(constants, bounds, until - start)
+            searched += 1
+            if searched > PATIENCE and horizon - start > MOST_BLOCKS * INTERVALS * step:
+                raise NumericalFailure(
+                    f"search for the next event: got motion of up to {self._fastest / (2 * math.pi):g} Hz, whose "
+                    f"samples every {step:g} s until the end, in {horizon - start:g} s, would take for ever; "
+                    "need fewer modes or a shorter run"
+                )
             found = self._search_block(signals.coefficients, constants, bounds, noise, start, step, horizon)
             if found is not None:
                 return found

@@ -132,6 +132,11 @@ class MultiPhiModel:
         return len(self._levels)
 
     @property
+    def highest_frequency(self) -> float:
+        """The highest frequency [Hz] of the levels that are kept."""
+        return max((level.highest_frequency for _, level in self._levels.items()), default=0.0)
+
+    @property
     def keeps_clusters(self) -> bool:
         """Whether one of the levels that are kept has modes beyond those asked for."""
         return any(level.kept_beyond for _, level in self._levels.items())

@@ -27,6 +27,9 @@ __all__ = ["CompiledMotion", "Motion"]
 EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
 CHATTER_WINDOW = 200  # events, for every contact
 ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
+COMPILED_PERIODS = (
+    1e9  # of the highest mode to the end: of more than that only the NumPy loop says that it takes for ever
+)
 
 
 @dataclass
@@ -211,11 +214,12 @@ class CompiledMotion(Motion):
         super().__post_init__()
 
     def _continue(self, end: float) -> None:
-        given = self.state, self.time, end, self.record, self.window, self._allowed, ACCUMULATED
-        self.state, self.time, samples, chatter = self.loop.advance(*given)
-        self._evaluations += samples
-        if chatter:
-            self._check_chatter()
+        if self.model.highest_frequency * (end - self.time) <= COMPILED_PERIODS:
+            given = self.state, self.time, end, self.record, self.window, self._allowed, ACCUMULATED
+            self.state, self.time, samples, chatter = self.loop.advance(*given)
+            self._evaluations += samples
+            if chatter:
+                self._check_chatter()
         if self.time < end:
             self._one_segment(end)
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.exponentials import Exponentials
 from multiphi_exudyn.first_root import Descent, DescentFinder, Signals
 
@@ -190,6 +191,17 @@ class TestSimultaneous:
         finder = DescentFinder(basis([3j, 5j]))
         given_signals = signals([1, 0], [0, 1], constants=[0.0, 3.0])
         assert finder.simultaneous(given_signals, Descent(np.pi / 6 + 1e-9, 0)) == [0]
+
+
+class TestMotionThatIsTooFast:
+    def test_is_refused_by_name_and_not_searched_for_ever(self):
+        """cos + cos of twice the rate is never below -1.125; the bounds, 2, cannot know that."""
+        finder, never = DescentFinder(basis([1e9j, 2e9j])), signals([1, 1], constants=[1.2])
+        assert finder.first(never, 1e-7) is None
+        with pytest.raises(
+            NumericalFailure, match=r"^search for the next event: got motion of up to 3.1831e\+08 Hz, .*"
+        ):
+            finder.first(never, 1.0)
 
 
 class TestSigns:
