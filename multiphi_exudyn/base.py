@@ -103,6 +103,11 @@ class Base:
         given = ((i, self.contacts[i]) for i in sorted(set(self.rays)))
         return {i: contact.law for i, contact in given if isinstance(contact, LawSpring)}
 
+    def label(self, contact: int) -> str:
+        """What a contact is called: its name, for a spring of a force law the law's."""
+        given = self.contacts[contact]
+        return given.law.name if isinstance(given, LawSpring) else given.name
+
     @functools.cached_property
     def preload(self) -> np.ndarray:
         """Load (m,) of the constant forces of all force laws."""

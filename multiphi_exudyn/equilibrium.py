@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.base import Base
-from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.least_distance import Infeasible, least_distance
 from multiphi_exudyn.rest import rest
 
-__all__ = ["equilibrium"]
+__all__ = ["equilibrium", "pressing"]
 
 SLACK = 1e-11  # of the sizes of a function on the path: nearer to zero it has reached it
 CHANGES = 20  # for every contact on the path: more is an exchange without end
@@ -92,3 +93,17 @@ def _path(base: Base, closed: set[int], loads: np.ndarray, lifts: np.ndarray) ->
         configurations.append(configuration)
         functions.append(states)
     return _Path(np.array(configurations), np.array(functions))
+
+
+def pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Which of the constraints rows z >= least press on the shortest z; they are independent of each other.
+
+    Raises MultiPhiValueError where no z meets all of them.
+    """
+    try:
+        _, multipliers = least_distance(rows, least, np.abs(least))
+    except Infeasible as found:
+        raise MultiPhiValueError(
+            "static equilibrium: got rigid contacts that exclude each other, need a way between"
+        ) from found
+    return np.asarray(multipliers > 0)

@@ -23,6 +23,7 @@ from multiphi_exudyn.first_root import DescentFinder
 from multiphi_exudyn.modal_response import ModalResponse, modal_response
 from multiphi_exudyn.modes import NEAR
 from multiphi_exudyn.rest import rest
+from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.structure import real_array
 from multiphi_exudyn.supports import Supports
 
@@ -124,6 +125,27 @@ class Level:
     def speed_rows(self) -> np.ndarray:
         """Gap velocities (c, r) from eta', as impacts see them."""
         return self.gap_rows
+
+    @functools.cached_property
+    def static_shares(self) -> dict[str, float]:
+        """For every closed compliant contact, the part of its flexibility h.K_l^-1 h that the kept modes leave out.
+
+        rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
+        No gap moves beside a closed rigid contact of the same direction: there is none of those.
+        """
+        supports = self.base.supports(self.indices, self.base.gaps[list(self.indices)])
+        springs = np.flatnonzero(~supports.rigid)
+        return {self.base.label(supports.members[s][0]): self._static_share(supports, s) for s in springs.tolist()}
+
+    def _static_share(self, supports: Supports, s: int) -> float:
+        """That part along the support ``s``, zero where rigid contacts leave it nothing but round-off."""
+        row, elastic = supports.directions[:, s], self.base.modes.omega > 0
+        own = float(np.sum((row[elastic] / self.base.modes.omega[elastic]) ** 2))
+        flexibility = float(row @ self.rest(row, np.zeros(len(self.indices)))[1])
+        kept = (row @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
+        left = max(0.0, flexibility - float(np.sum(kept)))
+        whole = left + float(np.sum(np.abs(kept)))
+        return left / whole if whole > ZERO * own else 0.0
 
     @functools.cached_property
     def shapes(self) -> np.ndarray:

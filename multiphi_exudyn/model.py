@@ -13,13 +13,12 @@ import numpy as np
 from multiphi_exudyn.base import BASE_MARGIN, Base, build_base, rays_of
 from multiphi_exudyn.build_level import build_level
 from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.equilibrium import equilibrium
+from multiphi_exudyn.equilibrium import equilibrium, pressing
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.first_root import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.force_law import Contact, ForceLaw, Given, LawSpring, expanded
-from multiphi_exudyn.least_distance import Infeasible, least_distance
 from multiphi_exudyn.level import Level, LevelOverride
-from multiphi_exudyn.mode_choice import Tolerance, UpTo, is_count
+from multiphi_exudyn.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.recent import Recent
 from multiphi_exudyn.structure import LinearStructure
 
@@ -38,8 +37,10 @@ class MultiPhiModel:
     structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws; kept with every law by its
     chain of springs. With c contacts there are 2^c levels, and for every law as many times that as it has segments, of
     which only those asked for are built.
-    modes: r of every level, or "all"; or ``UpTo`` a frequency; or a ``Tolerance``, from which ``simulate`` finds that
-    frequency. Levels are truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
+    modes: r of every level, all that it has where they are fewer, or "all"; or ``UpTo`` a frequency; None: chosen from
+    static responses, without a run (mode_choice.py); or a ``Tolerance``: the first run under ``simulate`` decides, once
+    for this model, and every later one has the modes of ``decided``. ``most_modes`` tells the number. Levels are
+    truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
     validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
     hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
@@ -52,11 +53,12 @@ class MultiPhiModel:
 
     structure: LinearStructure
     contacts: Sequence[Given] = ()
-    modes: int | str | UpTo | Tolerance = 6
+    modes: int | str | UpTo | Tolerance | None = None
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     rules: Recent[bytes, Any] = field(init=False, default_factory=lambda: Recent(RULES), repr=False, compare=False)
+    _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
@@ -73,21 +75,33 @@ class MultiPhiModel:
         ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
         object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
         if not self._can_share():
-            object.__setattr__(self, "_shared", {"structure": self.structure, "contacts": self.contacts})
+            object.__setattr__(self, "_shared", self._unbuilt)
 
     @functools.cached_property
     def base(self) -> Base:
         """Coordinates common to all levels, built on first use."""
-        if "base" not in self._shared:
-            self._shared["base"] = build_base(self.structure, self.contacts, self.most_modes or "all")
-        base: Base = self._shared["base"]
-        most = base.modes.count - self.directions
-        if self.most_modes is not None and self.most_modes > most:
-            raise MultiPhiValueError(
-                f"modes: got {self.most_modes}, need at most {most} "
-                f"({base.modes.count} modes less {self.directions} contacts), or 'all'"
-            )
+        base = self._shared_base()
+        if self.modes is None and not self._serves(base, self.most_modes):
+            object.__setattr__(self, "_shared", {**self._unbuilt, "chosen": self.most_modes})
+            base = self._shared_base()
         return base
+
+    def _shared_base(self) -> Base:
+        """The base of all models that share levels with this one."""
+        if "base" not in self._shared:
+            given = self._shared.get("chosen", FIRST) if self.modes is None else self.most_modes
+            self._shared["base"] = build_base(self.structure, self.contacts, given or "all")
+        base: Base = self._shared["base"]
+        return base
+
+    @property
+    def _unbuilt(self) -> dict[str, Any]:
+        return {"structure": self.structure, "contacts": self.contacts}
+
+    @staticmethod
+    def _serves(base: Base, modes: int | None) -> bool:
+        """Whether levels with so many modes may be taken from a base."""
+        return base.complete or (modes is not None and BASE_MARGIN * modes <= base.modes.count)
 
     @functools.cached_property
     def force_laws(self) -> tuple[ForceLaw, ...]:
@@ -116,10 +130,44 @@ class MultiPhiModel:
 
     @property
     def most_modes(self) -> int | None:
-        """The largest number of modes that a level is asked for; None where it has all of them."""
-        if isinstance(self.modes, (UpTo, Tolerance)):
-            return max(1, min(self.modes.most, self.structure.n - self.directions))
-        return None if isinstance(self.modes, str) else int(self.modes)
+        """The largest number of modes that a level is asked for, chosen where none was given; None: it has all of them.
+
+        Of a Tolerance that has not decided yet it is the number that its runs begin with.
+        """
+        if self.modes is None:
+            return self._chosen
+        if self.decided is not None:
+            return self.decided.most_modes
+        if isinstance(self.modes, str):
+            return None
+        most = self.modes.most if isinstance(self.modes, (UpTo, Tolerance)) else int(self.modes)
+        most = min(most, FIRST) if isinstance(self.modes, Tolerance) else most
+        return most if most < self.structure.n else None
+
+    @property
+    def _chosen(self) -> int | None:
+        """The number of modes where none was given."""
+        if self.structure.n <= SMALL:
+            return None
+        if "chosen" not in self._shared:
+            given = self.structure, self._shared_base(), self.chains, self._with_modes
+            self._shared["chosen"] = chosen_modes(*given)
+        chosen: int = self._shared["chosen"]
+        return chosen
+
+    @property
+    def whole(self) -> bool:
+        """Whether no level leaves out a mode of the structure."""
+        return self.most_modes is None and not isinstance(self.modes, UpTo) and self.base.complete
+
+    @property
+    def decided(self) -> MultiPhiModel | None:
+        """Of a model with a Tolerance: the same with the modes that its first run has decided on, None before."""
+        return self._decisions[0] if self._decisions else None
+
+    def decide(self, chosen: MultiPhiModel) -> None:
+        """Keep what the first run of a model with a Tolerance has decided on."""
+        self._decisions[:] = [chosen]
 
     @property
     def levels_built(self) -> int:
@@ -144,8 +192,11 @@ class MultiPhiModel:
     @functools.cached_property
     def most_levels(self) -> int:
         """Number of levels that are kept: what ``CACHE_BYTES`` hold, with what is kept beside them."""
-        m, c = self.base.modes.count, len(self.contacts)
-        r = self.most_modes or m
+        return self._most_kept(self.most_modes or self.base.modes.count)
+
+    def _most_kept(self, r: int) -> int:
+        """Number of levels with r modes that ``CACHE_BYTES`` hold."""
+        m, c = self._shared_base().modes.count, len(self.contacts)
         of_a_mode = m + 20 * r + 2 * c + TABLES * TABLE_NUMBERS + 2 * SIGNAL_TABLES * c
         return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
 
@@ -185,11 +236,14 @@ class MultiPhiModel:
 
     def _full(self, indices: tuple[int, ...]) -> Level:
         """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
-        base = self.base
-        shared: Recent[tuple[int, ...], Level] = self._shared.setdefault("levels", Recent(self.most_levels))
+        return self._with_modes(indices, self.most_modes or self.base.modes.count)
+
+    def _with_modes(self, indices: tuple[int, ...], modes: int) -> Level:
+        """A level with its lowest so many modes at least, or all that it has."""
+        base = self._shared_base()
+        shared: Recent[tuple[int, ...], Level] = self._shared.setdefault("levels", Recent(self._most_kept(modes)))
         most = base.modes.count - int(np.sum(np.isinf(base.stiffnesses[list(indices)])))
-        needed = most if self.most_modes is None else min(self.most_modes, most)
-        found, further = shared.find(indices), 1
+        needed, found, further = min(modes, most), shared.find(indices), 1
         while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
             wanted = needed + further
             found = shared.keep(indices, build_level(base, indices, wanted if wanted < most else None))
@@ -216,8 +270,8 @@ class MultiPhiModel:
         compliance = base.modes.omega**-2.0
         gaps = base.directions.T @ (compliance * load) + base.gaps
         bending = base.directions.T / base.modes.omega
-        pressing = _pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
-        level = build_level(base, tuple(int(i) for i in np.flatnonzero(pressing)))
+        closed = pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
+        level = build_level(base, tuple(int(i) for i in np.flatnonzero(closed)))
         return base.modes.shapes @ level.asymptotic(load).configuration
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
@@ -232,9 +286,9 @@ class MultiPhiModel:
         if self._shared.get("structure") is not self.structure or self._shared["contacts"] != self.contacts:
             return False
         base = self._shared.get("base")
-        if base is None or base.complete:
+        if base is None or self.modes is None:
             return base is not None
-        return self.most_modes is not None and BASE_MARGIN * self.most_modes <= base.modes.count
+        return self._serves(base, self.most_modes)
 
     def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
         return tuple(self.contacts[i].name for i in indices)
@@ -247,9 +301,9 @@ class MultiPhiModel:
         return min(max(1, int(np.searchsorted(full.frequencies, self.modes.frequency, side="right"))), most)
 
     def _check_modes(self) -> None:
-        if isinstance(self.modes, (UpTo, Tolerance)) or (isinstance(self.modes, str) and self.modes == "all"):
+        if self.modes is None or isinstance(self.modes, (UpTo, Tolerance)) or str(self.modes) == "all":
             return
-        needed = "need an integer >= 1, 'all', UpTo or Tolerance"
+        needed = "need an integer >= 1, 'all', UpTo, Tolerance or None"
         if not is_count(self.modes):
             raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
         if int(self.modes) < 1:
@@ -275,17 +329,3 @@ def _check_overrides(given: Any) -> None:
     for key, value in given.items():
         if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
             raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")
-
-
-def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """Which of the constraints rows z >= least press on the shortest z; they are independent of each other.
-
-    Raises MultiPhiValueError where no z meets all of them.
-    """
-    try:
-        _, multipliers = least_distance(rows, least, np.abs(least))
-    except Infeasible as found:
-        raise MultiPhiValueError(
-            "static equilibrium: got rigid contacts that exclude each other, need a way between"
-        ) from found
-    return np.asarray(multipliers > 0)

@@ -2,32 +2,124 @@
 
 Every warning is one plain sentence with its number. It begins with its kind and a colon; many runs group them by kind:
 
-    "linear range: ..."   what the model's own validity check says
-    "cluster: ..."        levels that keep more modes than asked for, so that no modes of one frequency are parted
-    "load pieces: ..."    loads of so many samples or pieces that the run takes long
+    "truncated contact: ..."  static flexibility that a closed compliant level's modes leave out (level.py): peak
+                              contact forces are off; known before any run
+    "lost energy: ..."        what truncation took of the largest energy of the run
+    "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
+    "undamped modes: ..."     modes for which a list of modal ratios has none
+    "damping ratios: ..."     ratios that look like per cent
+    "linear range: ..."       what the model's own validity check says
+    "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
+    "load pieces: ..."        loads of so many samples or pieces that the run takes long
+
+The thresholds are calibrated on random truncated models judged by the same with all modes: tests/truncation_study.py.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from multiphi_exudyn.defects import DefectHistory
 from multiphi_exudyn.driven.level import DrivenLevel
+from multiphi_exudyn.level import Level
+from multiphi_exudyn.mode_choice import CONTACT_SHARE, Tolerance
+from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.structure import ModalDamping
 from multiphi_exudyn.trajectory import Trajectory
 
-__all__ = ["warnings_of"]
+__all__ = ["damping_warnings", "static_warnings", "warnings_of"]
+
+ENERGY_SHARE = 0.01  # of the largest energy of a run
+INDICATOR = 0.05  # of the motion, where every closed contact is compliant
+RIGID_INDICATOR = 0.06  # where a rigid one was struck: the defects of its many impacts partly cancel each other
+PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
+REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
 MANY_PIECES = 2**16  # of loads in a run: half a minute of computing and 200 MB
 PIECE_SECONDS = 5e-4  # that a piece of a load takes in a small model
 PIECE_BYTES = 3000  # that it takes there
 
 
-def warnings_of(trajectory: Trajectory) -> tuple[str, ...]:
-    """What a user must not miss of a run, one sentence each."""
+def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
+    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    found = _clusters(trajectory)
-    if trajectory.model.validity is not None:
-        found.extend(trajectory.model.validity(trajectory))
+    model = trajectory.model
+    found = list(damping_warnings(model))
+    if not model.whole:
+        history = DefectHistory.of(trajectory)
+        found.extend(static_warnings([part.level.level for part in history.parts]))
+        found.extend(_lost_energy(trajectory, history))
+        found.extend(_truncation(trajectory, history, tolerance))
+    found.extend(_clusters(trajectory))
+    if model.validity is not None:
+        found.extend(model.validity(trajectory))
     found.extend(_load_pieces(trajectory))
     return tuple(found)
+
+
+def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
+    """Of the contact of which the modes of these levels leave out most of the static flexibility."""
+    shares = [(share, name, level.modes) for level in levels for name, share in level.static_shares.items()]
+    share, name, modes = max(shares, default=(0.0, "", 0))
+    if share >= CONTACT_SHARE:
+        others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
+        also = f" (and at {others} more)" if others else ""
+        yield (
+            f"truncated contact: at {name!r}{also} {modes} modes leave out {_per_cent(share)} of the static "
+            f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
+        )
+
+
+def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
+    """Of modal ratios that end before the modes do, or look like per cent."""
+    damping = model.structure.damping
+    if not isinstance(damping, ModalDamping):
+        return
+    listed, kept = damping.listed, model.level_at(()).modes
+    if damping.beyond is None and 0 < len(listed) < kept:
+        yield (
+            f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
+            f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
+        )
+    if len(listed) and np.max(listed) >= PER_CENT:
+        yield (
+            f"damping ratios: {np.max(listed):g} is {100 * np.max(listed):g} % of critical damping, which looks like a "
+            "ratio in per cent; write 0.01 for 1 %"
+        )
+
+
+def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str]:
+    """Of the energy that truncation took, whatever its sign at an instant."""
+    start, base = trajectory.start, trajectory.model.base
+    at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
+    lost = abs(at_start) + float(np.sum(np.abs(history.table[:, 3])))
+    given = 0.5 * float(start.velocity @ start.velocity) + base.strain(start.displacement, start.penetrating)
+    if lost <= ENERGY_SHARE * abs(given):
+        return
+    largest = history.largest_energy(trajectory.t_end)
+    if lost > ENERGY_SHARE * largest:
+        yield f"lost energy: truncation took {_per_cent(lost / largest)} of the largest energy of the run; {REMEDY}"
+
+
+def _truncation(trajectory: Trajectory, history: DefectHistory, tolerance: Tolerance | None) -> Iterator[str]:
+    """Of the estimated error."""
+    limit = RIGID_INDICATOR if np.any(history.table[:, 2] > 0) else INDICATOR
+    error = history.indicator(trajectory.t_end)
+    if tolerance is not None and error > tolerance.error:
+        kept = trajectory.model.level_at(()).modes
+        yield (
+            f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
+            "give the tolerance a larger number of most modes, or a run of its own to decide by"
+        )
+    elif error > limit:
+        yield f"truncation: displacements are estimated to be off by {_per_cent(error)} of the motion; {REMEDY}"
+
+
+def _per_cent(share: float) -> str:
+    return f"{100 * share:.2g} %"
 
 
 def _clusters(trajectory: Trajectory) -> list[str]:

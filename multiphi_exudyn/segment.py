@@ -8,6 +8,7 @@ Gaps, contact forces, energies and their integrals follow in closed form.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from multiphi_exudyn.exponentials import Exponentials
 from multiphi_exudyn.state import Phase
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["Segment"]
+__all__ = ["Batch", "Segment", "batched", "batches"]
 
 MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
 
@@ -48,9 +49,19 @@ class Segment:
         return self.level.level.response.basis
 
     @property
+    def shapes(self) -> np.ndarray:
+        """V (r, p)."""
+        return self.level.level.response.shapes
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """c (p,) of the exponentials ``basis``."""
+        return self.coefficients
+
+    @property
     def rows(self) -> np.ndarray:
         """eta = Re rows phi(t - start), (r, p)."""
-        return self.level.level.response.shapes * self.coefficients
+        return self.shapes * self.amplitudes
 
     def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
         """Gap (k,) [m] of a contact at times (k,)."""
@@ -99,3 +110,46 @@ class Segment:
         end = self.start + self.armed_at if waiting == 1 and self.armed_at > 0 else self.end
         periods = self.level.level.highest_frequency * (end - self.start)
         return np.linspace(self.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """k segments with the same level and exponentials, in arrays.
+
+    places: (k,) among all segments. starts, ends: (k,) [s]. basis, shapes: phi (p,) and V (r, p). coefficients: (k, p).
+    """
+
+    level: LoadedLevel
+    places: np.ndarray
+    starts: np.ndarray
+    ends: np.ndarray
+    basis: Exponentials
+    shapes: np.ndarray
+    coefficients: np.ndarray
+
+    def states(self, rows: np.ndarray | slice, after: np.ndarray) -> np.ndarray:
+        """eta and eta' (2, j, r) of the segments ``rows`` (j,), times ``after`` (j,) [s] their starts."""
+        c, phi = self.coefficients[rows], self.basis.at(after)
+        both = np.concatenate([c * phi, self.basis.derivative(c) * phi]) @ self.shapes.T
+        return both.real.reshape(2, len(phi), len(self.shapes))
+
+
+def batches(segments: Sequence[Segment]) -> list[Batch]:
+    """Segments by level and exponentials; some are kept in arrays (compiled/record.py)."""
+    kept = getattr(segments, "batches", None)
+    return batched(dict(enumerate(segments))) if kept is None else kept()
+
+
+def batched(segments: Mapping[int, Segment]) -> list[Batch]:
+    """Segments, by their places, by level and exponentials."""
+    alike: dict[int, list[int]] = {}
+    for place, segment in segments.items():
+        alike.setdefault(id(segment.basis), []).append(place)
+    return [_batch(places, [segments[place] for place in places]) for places in alike.values()]
+
+
+def _batch(places: list[int], segments: list[Segment]) -> Batch:
+    first = segments[0]
+    starts, ends = np.array([(segment.start, segment.end) for segment in segments]).T
+    coefficients = np.array([segment.amplitudes for segment in segments])
+    return Batch(first.level, np.array(places), starts, ends, first.basis, first.shapes, coefficients)

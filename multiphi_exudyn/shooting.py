@@ -22,7 +22,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.simulate import quiet
 from multiphi_exudyn.trajectory import Trajectory
 
 __all__ = ["ATTRACTS", "PeriodMap", "Shooting"]
@@ -47,7 +47,7 @@ class PeriodMap:
 
     def run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
         """From x, x' (n,) over some periods."""
-        return simulate(self.model, periods * self.period, x, v, self.loads)
+        return quiet(self.model, periods * self.period, x, v, self.loads)
 
     def states(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
         """q (2 m, k) of x, x' (n, k)."""

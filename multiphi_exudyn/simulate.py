@@ -7,6 +7,7 @@ analytic segments. A failure on the way ends the trajectory early, with a status
 
 from __future__ import annotations
 
+import functools
 import importlib
 import math
 import warnings
@@ -32,7 +33,7 @@ from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Start, Trajectory
 from multiphi_exudyn.truncation import adapted
 
-__all__ = ["simulate", "started"]
+__all__ = ["quiet", "simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -51,29 +52,57 @@ def simulate(
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
     compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
     Force laws, viscous contacts and loads that vary in time are not for the compiled loop.
-    A model with a Tolerance is run until its modes suffice; they are those of the trajectory's model.
+    The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
+    model, and of every later run of the same model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
-    that is ok says where a Tolerance, or that of a smooth load, could not be reached.
+    that is ok says where the tolerance of a smooth load could not be reached. What else to distrust is in its warnings,
+    each of which is issued as a MultiPhiWarning too.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
     if not isinstance(model, MultiPhiModel):
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
-    if isinstance(model.modes, Tolerance):
-        return adapted(model, lambda chosen: simulate(chosen, t_end, displacement, velocity, loads, compiled))
+    trajectory = quiet(model, t_end, displacement, velocity, loads, compiled)
+    tolerance = model.modes if isinstance(model.modes, Tolerance) else None
+    trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
+    for sentence in trajectory.warnings:
+        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    return trajectory
+
+
+def quiet(
+    model: MultiPhiModel,
+    t_end: float,
+    displacement: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    loads: Sequence[Load] = (),
+    compiled: bool | None = None,
+) -> Trajectory:
+    """``simulate`` without warnings: for runs that are one of many of an answer."""
     end = _time("t_end", t_end)
+    if isinstance(model.modes, Tolerance):
+        if model.decided is not None:
+            return quiet(model.decided, end, displacement, velocity, loads, compiled)
+        trajectory = adapted(model, lambda chosen: quiet(chosen, end, displacement, velocity, loads, compiled))
+        if trajectory.status == "ok":
+            model.decide(trajectory.model)
+        return trajectory
 
     def run(finer: float) -> Trajectory:
         motion = started(model, end, displacement, velocity, loads, compiled, finer)
         motion.advance(end)
         return motion.trajectory(end)
 
-    trajectory = to_tolerance(run, loads)
-    trajectory = replace(trajectory, warnings=warnings_of(trajectory))
-    for sentence in trajectory.warnings:
-        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
-    return trajectory
+    return replace(to_tolerance(run, loads), again=functools.partial(_again, model, end, loads, compiled))
+
+
+def _again(
+    model: MultiPhiModel, end: float, loads: Sequence[Load], compiled: bool | None, y: np.ndarray, v: np.ndarray
+) -> Trajectory:
+    """The run from y, y' (m,) in base coordinates."""
+    shapes = model.base.modes.shapes
+    return quiet(model, end, shapes @ y, shapes @ v, loads, compiled)
 
 
 def started(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -14,7 +14,7 @@ from multiphi_exudyn.first_root import DescentFinder, Signals
 from multiphi_exudyn.root_search import ZERO
 from multiphi_exudyn.transition import LoadedLevel
 
-__all__ = ["Change", "Event", "Loss", "Phase", "Row", "Rows", "SignalTable", "State", "sign_of"]
+__all__ = ["Change", "Event", "Loss", "Phase", "Row", "Rows", "SignalTable", "State", "event_table", "sign_of"]
 
 CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
 
@@ -159,6 +159,18 @@ class Event:
     def energy_loss(self) -> float:
         """Total energy lost [J]."""
         return self.loss.total
+
+
+def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndarray:
+    """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4).
+
+    Some events are kept in arrays (compiled/record.py).
+    """
+    kept = getattr(events, "table", None)
+    if kept is not None:
+        return np.asarray(kept())
+    lost = ((e.loss.truncation_kinetic + e.loss.truncation_strain, e) for e in events)
+    return np.array([(e.time, index(e.contact), e.impulse, energy) for energy, e in lost]).reshape(-1, 4)
 
 
 @dataclass(frozen=True)

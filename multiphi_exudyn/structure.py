@@ -46,24 +46,36 @@ class ModalDamping:
     Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are
     those that it does not see.
 
-    ratios: fractions of critical damping (0.01 is 1 %), one per mode from the lowest.
-    beyond: the ratio of every mode that is not listed.
+    ratios: fractions of critical damping (0.01 is 1 %), one per mode from the lowest, or a single number for all modes.
+    beyond: the ratio of every mode that is not listed; None: not said, they are undamped and a run that has such modes
+    warns of it.
     """
 
-    ratios: Sequence[float]
-    beyond: float = 0.0
+    ratios: Sequence[float] | float
+    beyond: float | None = None
 
     def __post_init__(self) -> None:
-        values = real_array("ratios", self.ratios, "a list of ratios")
+        if is_real(self.ratios):
+            if self.beyond is not None:
+                raise MultiPhiValueError(f"ratios: got {self.ratios!r} and beyond, need a list of ratios beside beyond")
+            object.__setattr__(self, "beyond", self.ratios)
+            object.__setattr__(self, "ratios", (self.ratios,))
+        values = real_array("ratios", self.ratios, "a ratio or a list of ratios")
         if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values < 0):
-            raise MultiPhiValueError(f"ratios: got {self.ratios!r}, need a list of finite ratios >= 0")
+            raise MultiPhiValueError(f"ratios: got {self.ratios!r}, need a finite ratio >= 0 or a list of them")
         object.__setattr__(self, "ratios", tuple(values.tolist()))
-        _check_not_negative("beyond", self.beyond)
+        if self.beyond is not None:
+            _check_not_negative("beyond", self.beyond)
+
+    @property
+    def listed(self) -> np.ndarray:
+        """The ratios that were given, one per mode from the lowest, (k,)."""
+        return np.asarray(self.ratios, dtype=float)
 
     def of(self, count: int) -> np.ndarray:
         """Ratios of the lowest ``count`` modes, (count,)."""
-        ratios = np.full(count, float(self.beyond))
-        listed = np.asarray(self.ratios, dtype=float)[:count]
+        ratios = np.full(count, self.beyond or 0.0)
+        listed = self.listed[:count]
         ratios[: len(listed)] = listed
         return ratios
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,9 +18,12 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, Numeri
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.segment import Segment
 from multiphi_exudyn.state import Event, Loss, Phase, State
-from multiphi_exudyn.structure import At
+from multiphi_exudyn.structure import At, is_real
 
 __all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
+
+NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
+INSTANTS = 1001  # at which a nudged run is compared, beside the events
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class Trajectory:
 
     status: "ok" | "failed"; message: the cause. warnings: what to distrust in this answer, and what to do about it, a
     sentence each that begins with its kind and a colon (reliability.py). t_end [s]: how far it goes. events: in order
-    of time.
+    of time. again: the same run from other y, y' (m,), without warnings.
     Times are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or "left".
     """
 
@@ -96,6 +99,7 @@ class Trajectory:
     load: np.ndarray
     stats: Statistics
     warnings: tuple[str, ...] = ()
+    again: Callable[[np.ndarray, np.ndarray], Trajectory] | None = field(default=None, repr=False, compare=False)
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
         """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""
@@ -190,6 +194,37 @@ class Trajectory:
                 depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))
         return depth
 
+    def horizon(self, tolerance: float = 0.01) -> float:
+        """Sensitivity horizon [s]: until when runs nudged at their start stay within ``tolerance`` of this one.
+
+        The nudges are +-NUDGE of the speeds y' that the run has where it is fastest, added to those it starts with. The
+        distance is that of y, in the norm of the mass matrix, relative to the largest |y| of the run. t_end where it
+        never exceeds the tolerance. A nudged run that fails tells nothing beyond its end. No answer beyond the horizon
+        is to be compared point by point: round-off would change it as much. Costs two more runs.
+        """
+        if not (is_real(tolerance) and 0 < tolerance < 1):
+            raise MultiPhiValueError(f"tolerance: got {tolerance!r}, need a number between 0 and 1")
+        if not self.segments or self.again is None:
+            raise NumericalFailure(f"horizon: got a run without motion ({self.message}), need one that has started")
+        times = self._instants
+        own, speeds = self._configurations(times), self.model.base.coordinates(self.velocity(times))
+        nudge = NUDGE * speeds[:, int(np.argmax(np.linalg.norm(speeds, axis=0)))]
+        start = self.start
+        runs = [self.again(start.displacement, start.velocity + sign * nudge) for sign in (1, -1)]
+        limit = tolerance * float(np.max(np.linalg.norm(own, axis=0)))
+        whole = [run for run in runs if run.status == self.status] or runs
+        return min(_parted(run, times, own, limit) for run in whole)
+
+    @property
+    def _instants(self) -> np.ndarray:
+        """Times (k,) [s] at which runs are compared: evenly spaced, and the events."""
+        even = np.linspace(0.0, self.t_end, INSTANTS)
+        return np.union1d(even, [event.time for event in self.events])
+
+    def _configurations(self, times: np.ndarray) -> np.ndarray:
+        """y (m, k)."""
+        return self.model.base.coordinates(self.displacement(times))
+
     # ------------------------------------------------------------------ evaluation
 
     def _of_row(self, segment: Segment, row: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -247,3 +282,11 @@ class Trajectory:
             raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
         found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
         return np.maximum(found, 0)
+
+
+def _parted(run: Trajectory, times: np.ndarray, expected: np.ndarray, limit: float) -> float:
+    """First of the times (k,) [s] at which a run is over ``limit`` from y (m, k), or has ended; else the last."""
+    reached = int(np.sum(times <= run.t_end))
+    apart = np.linalg.norm(run._configurations(times[:reached]) - expected[:, :reached], axis=0)
+    first = int(np.argmax(apart > limit)) if np.any(apart > limit) else min(reached, len(times) - 1)
+    return float(times[first])

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,11 @@ class LoadedLevel:
         terms = initial + np.abs(rest.configuration) @ magnitudes
         held = ~np.any(level.gap_rows, axis=1)  # by the closed contacts, of which its gap is the sum
         return cls(level, rest, cleared(gaps, np.where(held, FOLLOWING / ZERO, 1.0) * terms))
+
+    @functools.cached_property
+    def entries(self) -> dict[Any, Any]:
+        """What is kept of the ways into this level, by what distinguishes them (truncation.py)."""
+        return {}
 
     @functools.cached_property
     def driven(self) -> bool:

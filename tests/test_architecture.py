@@ -45,6 +45,7 @@ FLOORS = (
         "event_rule",
         "segment",
         "trajectory",
+        "defects",
         "truncation",
         "reliability",
         "motion",

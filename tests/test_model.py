@@ -35,8 +35,12 @@ class TestMultiPhiModel:
         given_arguments = {"structure": chain(4), "contacts": [stop()], "modes": 2} | changes
         refused(kind, begins, MultiPhiModel, **given_arguments)
 
-    def test_refuses_more_modes_than_a_closed_level_has(self, refused):
-        refused(ValueError, "modes: got 4", MultiPhiModel(chain(4), [stop()], modes=4).level, ())
+    @pytest.mark.parametrize("modes", [4, 6])
+    def test_more_modes_than_a_level_has_are_all_of_them(self, modes):
+        m, every = (MultiPhiModel(chain(4), [stop()], modes=r) for r in (modes, "all"))
+        assert [m.level(closed).modes for closed in ((), ("stop",))] == [4, 3]
+        assert np.array_equal(m.level(("stop",)).squares, every.level(("stop",)).squares)
+        assert m.whole
 
     def test_a_single_name_is_no_set_of_contacts(self, refused):
         refused(TypeError, "closed: got 'stop'", MultiPhiModel(chain(4), [stop()], modes=2).level, "stop")

@@ -25,7 +25,7 @@ from multiphi_exudyn.compiled.pack import Levels
 from multiphi_exudyn.compiled.search import FOUND, UNDECIDED, first_descent, meets_another
 from multiphi_exudyn.compiled.waves import BOUNDS, cached, copy, exponentials, inlined, jit
 
-__all__ = ["CHATTER", "CLOSE", "DONE", "FULL", "LEFT", "run"]
+__all__ = ["CHATTER", "CLOSE", "DONE", "FULL", "LEFT", "OPEN", "run"]
 
 DONE, LEFT, FULL, CHATTER = 0, 1, 2, 3
 CLOSE, OPEN = 0, 1

@@ -7,14 +7,15 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from multiphi_exudyn.compiled.kernel import CLOSE
+from multiphi_exudyn.compiled.kernel import CLOSE, OPEN
 from multiphi_exudyn.compiled.pack import Pack
-from multiphi_exudyn.segment import Segment
+from multiphi_exudyn.segment import Batch, Segment, batched
 from multiphi_exudyn.state import Event, Loss, Phase
 
 __all__ = ["NUMBERS", "PHASES", "Record"]
 
 ROWS = 128  # at first
+UNPACKED = -1  # in place of a level: a segment of the NumPy loop, which is kept as it is
 PHASES = tuple(Phase)
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
@@ -52,6 +53,31 @@ class Made(Sequence[T], Generic[T]):
         return repr(tuple(self))
 
 
+class Segments(Made[Segment]):
+    """The segments of a record."""
+
+    def __init__(self, record: Record) -> None:
+        super().__init__(record.segment, record.count, record.made)
+        self._record = record
+
+    def batches(self) -> list[Batch]:
+        """By level and exponentials, in arrays."""
+        return self._record.batches(len(self))
+
+
+class Events(Made[Event]):
+    """The events of a record."""
+
+    def __init__(self, record: Record) -> None:
+        super().__init__(record.event, record.happened, record.known)
+        self._record = record
+
+    def table(self) -> np.ndarray:
+        """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
+        time, _, kinetic, strain, impulse = self._record.amounts[: len(self)].T
+        return np.column_stack([time, self._record.kinds[: len(self), 0], impulse, kinetic + strain])
+
+
 class Record:
     """Segments and events of a run, in rows as kernel.run writes them; those of the NumPy loop stand among them."""
 
@@ -66,29 +92,47 @@ class Record:
         self.standings = np.empty((ROWS, len(contacts)), np.int8)
         self.amounts = np.empty((ROWS, 5))
         self.kinds = np.empty((ROWS, 2), np.int64)
-        self._segments: dict[int, Segment] = {}
-        self._events: dict[int, Event] = {}
+        self.made: dict[int, Segment] = {}
+        self.known: dict[int, Event] = {}
 
     @property
-    def segments(self) -> Made[Segment]:
+    def segments(self) -> Segments:
         """All segments so far."""
-        return Made(self._segment, self.count, self._segments)
+        return Segments(self)
+
+    def batches(self, count: int) -> list[Batch]:
+        """The first ``count`` segments by level and exponentials."""
+        levels = self.levels[:count]
+        packed = [self._batch(k, np.flatnonzero(levels == k)) for k in sorted(set(levels.tolist()) - {UNPACKED})]
+        return packed + batched({i: self.made[i] for i in np.flatnonzero(levels == UNPACKED).tolist()})
+
+    def _batch(self, level: int, places: np.ndarray) -> Batch:
+        loaded = self._pack.loaded[level]
+        response, spans = loaded.level.response, self.spans[places]
+        re, im = self.coefficients[places, :, : len(response.basis.rates)].swapaxes(0, 1)
+        return Batch(loaded, places, spans[:, 0], spans[:, 1], response.basis, response.shapes, re + 1j * im)
 
     @property
-    def events(self) -> Made[Event]:
+    def events(self) -> Events:
         """All events so far."""
-        return Made(self._event, self.happened, self._events)
+        return Events(self)
 
     def add(self, segment: Segment) -> None:
         """A segment of the NumPy loop."""
         self.make_room()
         self.spans[self.count] = segment.start, segment.end, segment.armed_at, segment.level.level.highest_frequency
-        self._segments[self.count] = segment
+        self.levels[self.count] = UNPACKED
+        self.made[self.count] = segment
         self.count += 1
 
     def add_event(self, event: Event) -> None:
         """An event of the NumPy loop."""
-        self._events[self.happened] = event
+        self.make_room()
+        loss, contact = event.loss, self._names.index(event.contact)
+        row = event.time, loss.impact, loss.truncation_kinetic, loss.truncation_strain, event.impulse
+        self.amounts[self.happened] = row
+        self.kinds[self.happened] = contact, CLOSE if event.kind == "close" else OPEN
+        self.known[self.happened] = event
         self.happened += 1
 
     def recent(self, count: int) -> list[tuple[float, float]]:
@@ -107,13 +151,15 @@ class Record:
         if missing:
             self.coefficients = np.pad(self.coefficients, ((0, 0), (0, 0), (0, missing)))
 
-    def _segment(self, i: int) -> Segment:
+    def segment(self, i: int) -> Segment:
+        """The i-th segment, of those that the kernel has written."""
         start, end, armed_at, _ = self.spans[i].tolist()
         level = self._pack.loaded[self.levels[i]]
         re, im = self.coefficients[i, :, : len(level.level.response.basis.rates)]
         return Segment(start, end, level, re + 1j * im, tuple(PHASES[k] for k in self.standings[i].tolist()), armed_at)
 
-    def _event(self, i: int) -> Event:
+    def event(self, i: int) -> Event:
+        """The i-th event, of those that the kernel has written."""
         time, impact, kinetic, strain, impulse = self.amounts[i].tolist()
         contact, kind = self.kinds[i].tolist()
         loss = Loss(impact, kinetic, strain)

@@ -41,9 +41,14 @@ class DrivenSegment(Segment):
         return self.flow.basis
 
     @property
-    def rows(self) -> np.ndarray:
-        """xi = Re rows phi(t - start), (r + q, p)."""
-        return self.flow.rows
+    def shapes(self) -> np.ndarray:
+        """V (r + q, p)."""
+        return self.flow.shapes
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """c (p,) of the exponentials ``basis``."""
+        return self.flow.coefficients
 
     def force_integral(self, contact: int, start: float, end: float) -> float:
         """Integral of the force of a closed contact [N s]."""

@@ -90,7 +90,7 @@ class ModalDampingSpec(Table):
     """Damping ratios of the open level's modes, lowest first, as fractions."""
 
     modal_ratios: tuple[NotNegative, ...]
-    beyond: NotNegative = 0.0
+    beyond: NotNegative | None = None
 
 
 class RayleighDampingSpec(Table):

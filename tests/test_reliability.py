@@ -1,0 +1,219 @@
+"""Warnings of an answer: each kind where it is due, with its number, once, and silence where nothing is wrong."""
+
+import dataclasses
+import functools
+import math
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+from small_structures import chain, stop
+
+import multiphi_exudyn as mp
+from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+
+END = 0.3
+CALM = np.linspace(0, 1e-2, 18)
+
+
+@functools.cache
+def rig(stiffness):
+    structure = mp.planar_beam(rig_beam(), elements=57, damping=rig_damping())
+    model = mp.MultiPhiModel(structure, [rig_contact(stiffness)], modes="all")
+    bent = model.static_equilibrium({"node3": 1.0})
+    return model, bent * initial_displacement() / float(structure.row("node3") @ bent)
+
+
+def kinds(run):
+    return [sentence.split(":")[0] for sentence in run.warnings]
+
+
+def long_chain(modes):
+    """18 masses, a contact far stiffer than the chain at the last one: its mode lies above all others."""
+    structure = chain(18, mass=0.5, stiffness=2e4)
+    return mp.MultiPhiModel(structure, [stop("m17", 5e-3, 1e6)], modes=modes)
+
+
+def released(model, **given):
+    return mp.simulate(model, 0.5, displacement=3e-3 * np.arange(18.0), velocity=np.zeros(18), **given)
+
+
+class TestTruncatedContact:
+    @pytest.mark.parametrize(
+        ("modes", "share"), [(4, 0.8648), (6, 0.3693), (8, 0.2426), (10, 0.0718), (12, 0.0521), (20, 0.01126)]
+    )
+    def test_the_share_of_the_rig_is_that_of_its_spectrum(self, modes, share):
+        """Against the compliance of the full matrices."""
+        model, _ = rig(1e6)
+        structure = model.structure
+        row = structure.row("node2")
+        stiffness = structure.stiffness + 1e6 * np.outer(row, row)
+        level = dataclasses.replace(model, modes=modes).level(("support",))
+        kept = np.sum((row @ level.shapes / level.omega) ** 2)
+        expected = 1 - kept / (row @ np.linalg.solve(stiffness, row))
+        assert level.static_shares == {"support": pytest.approx(expected, rel=1e-8)}
+        assert expected == pytest.approx(share, abs=1e-4)
+
+    def test_nothing_is_missing_with_all_modes(self):
+        assert rig(1e6)[0].level(("support",)).static_shares["support"] < 1e-10
+
+    def test_a_rigid_contact_does_not_move_and_a_compliant_one_beside_it_is_held(self):
+        contacts = [stop("m3", 0.1, name="rigid"), stop("m1", 0.1, 5.0, name="soft")]
+        model = mp.MultiPhiModel(chain(4), contacts, modes=1)
+        rows = np.delete(chain(4).stiffness + 5.0 * np.outer(np.eye(4)[1], np.eye(4)[1]), 3, 0)
+        held = np.delete(rows, 3, 1)
+        flexibility = np.linalg.inv(held)[1, 1]
+        level = model.level(("rigid", "soft"))
+        kept = float(level.gap_rows[1] @ (level.gap_rows[1] / level.squares))
+        assert level.static_shares == {"soft": pytest.approx(1 - kept / flexibility, rel=1e-9)}
+
+    def test_a_contact_that_a_rigid_one_holds_has_no_share(self):
+        contacts = [stop("m0", 0.1, name="rigid"), stop("m0", 0.05, 5.0, name="soft")]
+        assert mp.MultiPhiModel(chain(4), contacts, modes=2).level(("rigid", "soft")).static_shares == {}
+
+    def test_a_law_has_one_share_under_its_own_name_also_where_it_softens(self):
+        law = mp.ForceLaw("m0", ([-1.0, 0.0, 1.0, 2.0], [-1.0, 0.0, 2.0, 1.5]), name="snap")
+        model = mp.MultiPhiModel(chain(4), [law], modes=2)
+        closed = tuple(contact.name for contact in model.contacts if contact.side > 0)
+        (share,) = model.level(closed).static_shares.items()
+        assert share[0] == "snap"
+        assert 0 <= share[1] <= 1
+
+    def test_a_free_structure_has_the_share_of_what_the_contact_holds(self):
+        model = mp.MultiPhiModel(chain(5, ends=0), [stop("m0", 0.1, 30.0)], modes=3)
+        full = chain(5, ends=0).stiffness + 30.0 * np.outer(np.eye(5)[0], np.eye(5)[0])
+        level = model.level(("stop",))
+        kept = float(level.gap_rows[0] @ (level.gap_rows[0] / level.squares))
+        assert level.static_shares["stop"] == pytest.approx(1 - kept / np.linalg.inv(full)[0, 0], rel=1e-9)
+
+    def test_a_run_says_which_contact_and_how_much(self):
+        run = released(long_chain(17))
+        (told,) = (sentence for sentence in run.warnings if sentence.startswith("truncated contact: "))
+        assert "'stop' 17 modes leave out 98 %" in told
+        assert "truncated contact" not in kinds(released(long_chain("all")))
+
+    def test_a_contact_that_never_closes_is_no_reason_to_warn(self):
+        run = mp.simulate(long_chain(17), 0.05, displacement=1e-4 * np.arange(18.0))
+        assert not run.events
+        assert run.warnings == ()
+
+
+class TestTruncation:
+    def test_energy_that_truncation_took_is_said_from_one_per_cent(self):
+        model, start = rig(1e6)
+        few, many = (mp.simulate(dataclasses.replace(model, modes=r), END, displacement=start) for r in (6, 12))
+        lost = sum(e.loss.truncation_kinetic + e.loss.truncation_strain for e in few.events)
+        (told,) = (sentence for sentence in few.warnings if sentence.startswith("lost energy: "))
+        assert float(told.split("took ")[1].split(" %")[0]) == pytest.approx(100 * lost / few.ledger.initial, rel=0.1)
+        assert many.warnings == ()
+
+    def test_a_start_that_the_modes_do_not_hold_is_said(self):
+        run = mp.simulate(mp.MultiPhiModel(chain(40), modes=2), 1.0, displacement=np.eye(40)[20])
+        assert kinds(run) == ["lost energy", "truncation"]
+
+    def test_nothing_is_said_of_a_structure_at_rest(self):
+        assert mp.simulate(mp.MultiPhiModel(chain(40), [stop("m3", 0.0, 10.0)], modes=2), 1.0).warnings == ()
+
+    @pytest.mark.parametrize("stiffness", [1e4, math.inf])
+    def test_nothing_is_said_where_no_mode_is_left_out(self, stiffness):
+        model = mp.MultiPhiModel(chain(4), [stop("m1", 0.1, stiffness)], modes="all")
+        run = mp.simulate(model, 40.0, displacement=np.array([0.5, 1.0, 0.3, 0.2]))
+        assert len(run.events) > 5
+        assert run.warnings == ()
+
+    def test_an_impact_from_which_the_contact_rebounds_at_once_counts(self):
+        """No level is entered: what the modes left out would have made of the impact is missing all the same."""
+        model = mp.MultiPhiModel(chain(20, ends=0), [stop("m0", 0.5)], modes=4)
+        run = mp.simulate(model, 3.0, velocity=-np.ones(20))
+        assert run.events
+        assert "truncation" in kinds(run)
+
+    def test_both_loops_warn_alike(self):
+        model, start = rig(math.inf)
+        model = dataclasses.replace(model, modes=8)
+        first, second = (mp.simulate(model, END, displacement=start, compiled=c) for c in (False, None))
+        assert first.warnings == second.warnings != ()
+        assert mp.truncation_indicator(first) == pytest.approx(mp.truncation_indicator(second), rel=1e-6)
+
+    def test_loads_that_vary_in_time_are_judged_too(self):
+        model = mp.MultiPhiModel(chain(40), [stop("m39", 0.1, 1e3)], modes=3)
+        run = mp.simulate(model, 60.0, loads=[mp.HarmonicLoad("m39", 0.5, 0.01)])
+        assert run.events
+        assert "truncated contact" in kinds(run)
+
+
+class TestDamping:
+    def test_modes_for_which_a_list_has_no_ratio_are_named(self):
+        model = mp.MultiPhiModel(chain(12, damping=mp.ModalDamping([0.01, 0.005])), modes=12)
+        (told,) = mp.simulate(model, 1.0, velocity=np.ones(12)).warnings
+        assert told.startswith(
+            "undamped modes: ModalDamping lists 2 ratios and 12 modes are kept, so modes 3 to 12 are"
+        )
+
+    @pytest.mark.parametrize(
+        "damping", [mp.ModalDamping([0.01], beyond=0.0), mp.ModalDamping([0.01] * 12), mp.ModalDamping(0.02)]
+    )
+    def test_nothing_is_said_where_the_ratios_of_all_modes_were_given(self, damping):
+        model = mp.MultiPhiModel(chain(12, damping=damping), modes=12)
+        assert mp.simulate(model, 1.0, velocity=np.ones(12)).warnings == ()
+
+    @pytest.mark.parametrize("ratios", [2.0, [0.5], [0.01, 1.0]])
+    def test_ratios_that_look_like_per_cent_are_named(self, ratios):
+        model = mp.MultiPhiModel(chain(2, damping=mp.ModalDamping(ratios)), modes=2)
+        assert "damping ratios" in kinds(mp.simulate(model, 1.0, velocity=np.ones(2)))
+
+    def test_a_single_ratio_is_that_of_all_modes(self):
+        level = mp.MultiPhiModel(chain(6, damping=mp.ModalDamping(0.02)), modes="all").level(())
+        assert level.ratios == pytest.approx(0.02 * np.ones(6))
+
+
+class TestIssued:
+    def test_each_is_issued_once_at_the_line_of_the_user(self):
+        with pytest.warns(mp.MultiPhiWarning) as issued:
+            run = released(long_chain(8))
+        assert [str(one.message) for one in issued] == list(run.warnings)
+        assert {one.filename for one in issued} == {__file__}
+
+    def test_a_tolerance_warns_of_its_last_run_alone(self):
+        with pytest.warns(mp.MultiPhiWarning) as issued:
+            run = released(long_chain(mp.Tolerance(1e-9, most=12)))
+        assert [str(one.message) for one in issued] == list(run.warnings)
+        assert "truncation" in kinds(run)
+
+    def test_the_horizon_warns_of_nothing(self):
+        run = released(long_chain(8))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            run.horizon(0.01)
+
+    def test_a_failed_start_has_no_warnings(self):
+        model = mp.MultiPhiModel(chain(2), [stop()], "all", {(): mp.LevelOverride([math.nan])})
+        run = mp.simulate(model, 1.0, velocity=np.ones(2))
+        assert (run.status, run.warnings) == ("failed", ())
+
+
+class TestHorizon:
+    def test_a_motion_without_contact_has_none(self):
+        run = mp.simulate(mp.MultiPhiModel(chain(3), modes="all"), 20.0, velocity=np.ones(3))
+        assert run.horizon(1e-3) == run.t_end
+
+    def test_a_motion_at_rest_has_none(self):
+        assert mp.simulate(mp.MultiPhiModel(chain(3), [stop()], modes="all"), 2.0).horizon() == 2.0
+
+    def test_sensitive_motion_parts_the_later_the_larger_the_tolerance(self):
+        walls = [stop("m0", 0.05, 1e4, name="below"), mp.UnilateralContact("above", {"m2": -1.0}, 0.05, 1e4)]
+        run = mp.simulate(mp.MultiPhiModel(chain(3), walls, modes="all"), 400.0, velocity=np.array([1.0, -0.3, 0.7]))
+        early, late = run.horizon(1e-6), run.horizon(1e-1)
+        assert 0 < early < late <= 400.0
+        assert early < 400.0
+
+    @pytest.mark.parametrize("tolerance", [0.0, 1.0, math.nan, "small"])
+    def test_a_tolerance_is_a_number_between_0_and_1(self, tolerance):
+        with pytest.raises(mp.MultiPhiValueError, match="tolerance: got"):
+            mp.simulate(mp.MultiPhiModel(chain(1)), 1.0).horizon(tolerance)
+
+    def test_it_is_the_same_for_a_pickled_run_and_for_loads(self):
+        model = mp.MultiPhiModel(chain(3), [stop("m0", 0.1, 30.0)], modes="all")
+        run = mp.simulate(model, 30.0, loads=[mp.ConstantLoad("m2", -1.0)])
+        assert pickle.loads(pickle.dumps(run)).horizon(1e-3) == run.horizon(1e-3)
