@@ -100,10 +100,9 @@ class Smooth:
     """u(t) = function(t), a function of time [s] that takes (k,) times or single ones, smooth but for single instants.
 
     tolerance: of the response, relative to its largest value; see simulate.
-    breaks: instants [s] at which the function or a derivative jumps. Jumps and kinks are found without them, unless
-    they are as close as 2e-5 of a run's length.
-    A function is known by samples: what is shorter than 2.5e-5 of a run's length may not be seen (1.1e-4 where it takes
-    single times only, which a function of arrays avoids), unless ``breaks`` enclose it.
+    breaks: instants [s] at which the function or a derivative jumps; jumps and kinks that are seen are found without.
+    A function is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a
+    function of single times, unless ``breaks`` enclose it.
     """
 
     function: Callable[[Any], Any]
