@@ -47,7 +47,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         self._evaluations, self._transitions = 0, self.rule.transitions
-        self._decided, self._last_decision = deque[tuple[float, float]](maxlen=self.window), 0.0
+        self._decided, self._last_decision = deque[tuple[float, float]](maxlen=self.window + 1), 0.0
         with self._failing():
             self._begin()
 
@@ -119,11 +119,11 @@ class Motion:
         self.events.append(event)
 
     def _recent(self) -> Sequence[tuple[float, float]]:
-        """(since when [s], highest frequency [Hz] before it) of the last decisions, at most of a ``window``.
+        """(since when [s], highest frequency [Hz] before it) of a ``window`` of decisions, none before there are more.
 
         Pieces of a load are no decisions.
         """
-        return self._decided
+        return list(self._decided)[1:] if len(self._decided) > self.window else ()
 
     def _one_segment(self, end: float) -> None:
         """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""

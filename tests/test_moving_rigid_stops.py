@@ -137,15 +137,18 @@ def test_squeezed_between_a_moving_and_a_fixed_stop_the_run_ends_where_they_meet
 @pytest.mark.parametrize("shaken", [False, True])
 @pytest.mark.parametrize("first", range(0, 200, 50))
 def test_motion_is_that_of_small_steps(first, shaken):
-    """First order steps: the difference halves with the step, where no impact is missed by a hair."""
-    near = 0
+    """Steps of first order: within 1 %, or nearer with shorter ones, but for impacts that are missed by a hair."""
+    far = []
     for seed in range(first, first + 50):
         scene = Scene(seed, shaken=shaken)
         run = scene.run()
-        if run.t_end == 0:
-            near += 1
-            continue
-        t, x = scene.stepped(40000)
-        t, x = t[t <= run.t_end], x[t <= run.t_end]
-        near += np.max(np.abs(run.displacement(t)[0] - x)) < 0.01 * np.max(np.abs(x))
-    assert near >= 48
+        if run.t_end > 0 and not (away(scene, run, 40000) < 0.01 or away(scene, run, 160000) < 0.01):
+            far.append(seed)
+    assert len(far) <= 1, far
+
+
+def away(scene, run, steps):
+    """The largest difference to the stepped motion, of its largest displacement."""
+    t, x = scene.stepped(steps)
+    t, x = t[t <= run.t_end], x[t <= run.t_end]
+    return np.max(np.abs(run.displacement(t)[0] - x)) / (np.max(np.abs(x)) or 1.0)
