@@ -237,16 +237,21 @@ def _check_mass(mass: Any) -> None:
 
 
 def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, factor: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The ``count`` lowest omega^2, ascending, and their shapes; factor: of K + shift M."""
+    """The ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
+
+    factor: of K + shift M.
+    """
     n = stiffness.shape[0]
     start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
     operator = scipy.sparse.linalg.LinearOperator((n, n), factor.solve)
     try:
-        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=-shift, OPinv=operator, v0=start)
+        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count + 1, mass, sigma=-shift, OPinv=operator, v0=start)
     except scipy.sparse.linalg.ArpackError as error:
         raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
     order = np.argsort(values)
-    return values[order], vectors[:, order]
+    apart = np.flatnonzero(np.diff(values[order]) > NEAR * np.abs(values[order][1:]))
+    kept = order[: apart[-1] + 1] if apart.size else order[:count]
+    return values[kept], vectors[:, kept]
 
 
 def _residual_shapes(

@@ -137,6 +137,13 @@ class TestACutCluster:
             assert not [sentence for sentence in three.warnings if "(open)" in sentence]
 
 
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_the_basis_of_a_large_structure_leaves_a_cluster_out_that_its_number_of_modes_would_part(count):
+    structure = square(9, sparse=True)
+    found = modes.lowest_modes(structure.mass, structure.stiffness, count, np.zeros((0, 81)))
+    assert found.count == {2: 1, 3: 3, 4: 4}[count]
+
+
 class TestModalRatiosOfACluster:
     RATIOS = (0.01, 0.02, 0.3, 0.05)
 
