@@ -17,7 +17,7 @@ POWERS = (
     18,
 )  # of two, even: every number and its square root is scaled exactly, so that round-off is the same too
 QUANTITIES = ("time", "length", "mass")
-SAME = 1e-12  # of a run's length and of its energy
+SAME = 1e-9  # of a run's length and of its energy
 SHORTER = 0.25  # of a case's length: enough for a few events
 PARTS = ("initial", "work_of_loads", "impact", "truncation_kinetic", "truncation_strain", "damping", "final")
 
