@@ -26,9 +26,12 @@ STEP = 0.35  # times the fastest rate of any level: a step
 NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
 TERMS = 16  # of the exponential's series inside a step
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
+TOUCH = 1e-10  # of the same: a signal has fallen below zero, above what constraints drift by in a run
+SOON = 1e-5  # of a step: after which a signal that an instant has left at zero has a sign
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
-BLOCK = 64  # steps between two looks at the signs
+LEAST, BLOCK = 8, 64  # steps between two looks at the signs
 MOST_EVENTS = 600  # more are given up
+ROCKING, SLOW = 6, 1e-5  # instants close together, of speeds below a share of the scene's: an end of endless impacts
 FINE = 17  # places in two steps at which a dip is looked for
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
@@ -39,7 +42,7 @@ class NoAnswer(Exception):
 
 @dataclass(frozen=True)
 class Course:
-    """u(t), u'(t), u''(t) of (k,) times; fine: (t0, t1, step) where steps are shorter; breaks: where u is not smooth."""
+    """u(t), u'(t), u''(t) of (k,) times; fine: (t0, t1, step) of shorter steps; breaks: where u is not smooth."""
 
     value: Callable
     rate: Callable | None = None
@@ -113,7 +116,9 @@ class _Level:
         """exp(A h), and what the inputs at the nodes of a step add, (y, nodes w)."""
         key = float(f"{h:.11e}")
         if key not in self.steps:
-            parts = [h * b * expm(self.matrix * (h * (1 - c))) @ self.inputs for b, c in zip(WEIGHTS, NODES, strict=True)]
+            parts = [
+                h * b * expm(self.matrix * (h * (1 - c))) @ self.inputs for b, c in zip(WEIGHTS, NODES, strict=True)
+            ]
             self.steps[key] = expm(self.matrix * h), np.hstack(parts)
         return self.steps[key]
 
@@ -278,15 +283,21 @@ class _Integration:
         y, t, k = np.concatenate([displacement, velocity, np.zeros(self.c)]), 0.0, 0
         answer = Answer(*np.zeros((2, self.n, len(self.times))))
         state, y = self._settled(self._lowest(), y, 0.0, answer)
-        shown = 0
+        shown, instants, block, rocking, before = 0, 0, LEAST, 0, 0.0
         while k < len(self.nodes) - 1:
             level = self.level(state)
-            found = self._piece(level, y, t, k)
+            found = self._piece(level, y, t, k, block)
+            block = LEAST if found.event else min(2 * block, BLOCK)
             shown = self._show(answer, level, found, shown)
             y, t, k = found.y, found.t, found.k
             if found.event:
-                if len(answer.events) > MOST_EVENTS:
+                instants += 1
+                if instants > MOST_EVENTS:
                     raise NoAnswer("too many events")
+                rocking = rocking + 1 if t - before <= 100 * self._moment(t) else 0
+                before = t
+                if rocking > ROCKING:
+                    y = self._at_rest(y, t)
                 state, y = self._settled(state, y, t, answer)
         if shown < len(self.times):
             answer.displacement[:, shown:], answer.velocity[:, shown:] = y[: self.n, None], y[self.n : 2 * self.n, None]
@@ -296,14 +307,14 @@ class _Integration:
     def _lowest(self):
         return ("open",) * self.c + (0,) * len(self.system.laws)
 
-    def _piece(self, level, y, t, k):
-        """Up to BLOCK steps from (y, t) in the interval k, no further than a first event."""
+    def _piece(self, level, y, t, k, block):
+        """Up to ``block`` steps from (y, t) in the interval k, no further than a first event."""
         nodes, states, k0 = self.nodes, [y], k
         first = self.nodes[k + 1] - t
         if t > nodes[k]:
             states.append(self._inside(level, y, t)(first))
             k += 1
-        last = min(len(nodes) - 1, k + BLOCK)
+        last = min(len(nodes) - 1, k + block)
         while k < last:
             e, g = level.step(nodes[k + 1] - nodes[k])
             states.append(e @ states[-1] + g @ self.inside[k])
@@ -322,20 +333,25 @@ class _Integration:
         return _Piece(times[: j + 1], states[: j + 1], y_event, t_event, k_event, True)
 
     def _inside(self, level, y, t):
-        """y(tau) after (y, t), within a step."""
-        vectors = [y]
-        for i in range(1, TERMS + 1):
+        """y(tau) after (y, t), within a step: (y,) of one tau, (y, k) of (k,)."""
+        vectors = [y, level.matrix @ y + level.inputs[:, 0]]
+        for i in range(2, TERMS + 1):
             vectors.append(level.matrix @ vectors[-1] / i)
-        series = np.array(vectors).T
+        series, powers, varying = np.array(vectors).T, np.arange(TERMS + 1), level.inputs[:, 1:]
 
         def at(tau):
-            moved = series @ tau ** np.arange(TERMS + 1)
-            part = level.inputs @ (self._inputs(t + tau * NODES) * (tau * WEIGHTS)[:, None]).T
-            left = tau * (1 - NODES)
-            for i in range(1, TERMS + 1):
-                moved = moved + part.sum(axis=1)
-                part = level.matrix @ part * (left / i)
-            return moved
+            taus = np.atleast_1d(tau)
+            moved = series @ taus ** powers[:, None]
+            if varying.size:
+                times = taus[:, None] * NODES
+                part = varying @ (self._inputs((t + times).ravel())[:, 1:] * (taus[:, None] * WEIGHTS).reshape(-1, 1)).T
+                left = (taus[:, None] - times).ravel()
+                total = part.copy()
+                for i in range(1, TERMS + 1):
+                    part = level.matrix @ part * (left / i)
+                    total += part
+                moved = moved + total.reshape(len(y), len(taus), len(NODES)).sum(axis=2)
+            return moved if np.ndim(tau) else moved[:, 0]
 
         return at
 
@@ -346,7 +362,8 @@ class _Integration:
         inputs = self._inputs(times)
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
         allowed = ZERO * (np.abs(states) @ np.abs(level.signals).T + np.abs(inputs) @ np.abs(level.signal_inputs).T)
-        allowed = np.maximum.accumulate(allowed, axis=0)
+        largest = np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.c])
+        allowed = np.maximum.accumulate(allowed + TOUCH * (np.abs(level.signals) @ largest), axis=0)
         below = s[1:] < -allowed[1:]
         curved = np.zeros_like(below)
         if len(s) > 2:
@@ -355,7 +372,9 @@ class _Integration:
             curved[1:] |= low
         curved[0] |= s[0] < 4 * np.abs(s[1] - s[0])
         for j in np.flatnonzero(np.any(below | curved, axis=1)):
-            roots = [self._root(level, i, times, states, j, allowed[j + 1, i]) for i in np.flatnonzero(below[j] | curved[j])]
+            roots = [
+                self._root(level, i, times, states, j, allowed[j + 1, i]) for i in np.flatnonzero(below[j] | curved[j])
+            ]
             roots = [root for root in roots if root is not None]
             if roots:
                 return j, min(roots)
@@ -365,22 +384,22 @@ class _Integration:
         width, at = times[j + 1] - times[j], self._inside(level, states[j], times[j])
 
         def s(tau):
-            return float(level.signals[i] @ at(tau) + level.signal_inputs[i] @ self._inputs(np.array([times[j] + tau]))[0])
+            taus = np.atleast_1d(tau)
+            values = level.signals[i] @ at(taus) + self._inputs(times[j] + taus) @ level.signal_inputs[i]
+            return values if np.ndim(tau) else float(values[0])
 
-        first = MOMENT * width if j == 0 else 0.0
-        places = first + (width - first) * np.linspace(0, 1, FINE)
-        if s(places[0]) <= 0 and j > 0 or j == 0 and s(places[0]) < -allowed:
-            return places[0]
-        before = places[0]
-        ends = places[-1:] if s(width) < -allowed else places[1:]
-        for place in ends:
-            value = s(place)
-            if value < -allowed:
-                if s(before) <= 0:
-                    return before
-                return brentq(s, before, place, xtol=1e-15 * max(times[-1], width), rtol=1e-14)
-            before = place
-        return None
+        moment = SOON * min(width, STEP / self._rate_of_all)
+        at_zero = j == 0 and abs(s(0.0)) <= 100 * allowed  # where an instant has left it: a moment later it has a sign
+        first = min(moment, width) if at_zero else 0.0
+        places = first + (width - first) * (np.linspace(0, 1, FINE) ** 2)
+        values = s(places)
+        below = np.flatnonzero(values < -allowed)
+        if not len(below):
+            return None
+        above = int(np.flatnonzero(values[: below[0]] > 0)[-1]) if np.any(values[: below[0]] > 0) else -1
+        if above < below[0] - 1:  # round-off of zero before it falls
+            return places[max(above + 1, 0)]
+        return brentq(s, places[above], places[above + 1], xtol=1e-15 * times[-1], rtol=1e-14)
 
     def _show(self, answer, level, piece, shown):
         """Fills in the times asked for that lie in the piece."""
@@ -417,10 +436,22 @@ class _Integration:
                 answer.events.append((t, i, new))
         return best, y
 
+    def _at_rest(self, y, t):
+        """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
+        w = self._inputs(np.array([t]))[0]
+        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= SLOW * self.speed]
+        if not slow:
+            return y
+        rows, u = self.rows[slow], np.array([self._rate(i, y, w) for i in slow])
+        impulses = -np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ u
+        y = y.copy()
+        y[self.n : 2 * self.n] += self.inverse @ rows.T @ impulses
+        return y
+
     def _touching(self, y, w):
         gaps = self.rows @ y[: self.n] + [s.gap for s in self.system.stops]
         gaps -= [0.0 if k is None else w[k] for k in self.ways]
-        near = [i for i in self.rigid if gaps[i] <= 100 * ZERO * self.length]
+        near = [i for i in self.rigid if gaps[i] <= 10 * TOUCH * self.length]
         if any(gaps[i] < -1e-6 * self.length for i in near):
             raise NoAnswer("inside a rigid stop")
         return near
@@ -460,8 +491,12 @@ class _Integration:
         y[2 * self.n :][touching] += best[1]
         return y
 
-    def _moment(self):
-        return MOMENT * min(STEP / self._rate_of_all, np.min(np.diff(self.nodes)))
+    def _moment(self, t):
+        """A short time [s]: of the fastest motion, less where loads change within a step."""
+        k = min(int(np.searchsorted(self.nodes, t, side="right")), len(self.nodes) - 1)
+        return (
+            MOMENT * STEP / self._rate_of_all * float(np.clip(100 * (self.nodes[k] - t) * self._rate_of_all, 0.02, 1))
+        )
 
     @property
     def _rate_of_all(self):
@@ -475,7 +510,7 @@ class _Integration:
         for i in self.rigid:
             state[i] = "closed" if i in held else "open"
         for _ in range(6):
-            level, tau = self.level(tuple(state)), self._moment()
+            level, tau = self.level(tuple(state)), self._moment(t)
             later, known = self._inside(level, y, t)(tau), tuple(state)
             now, then = self._inputs(np.array([t, t + tau]))
             for i, stop in enumerate(self.system.stops):
@@ -508,7 +543,7 @@ class _Integration:
         """By how much the motion of a state leaves what is admissible a moment later, of what it could."""
         if not resting:
             return 0.0
-        level, tau = self.level(state), self._moment()
+        level, tau = self.level(state), self._moment(t)
         at = self._inside(level, y, t)
         worst = 0.0
         for share in (0.5, 1.0):

@@ -1,4 +1,4 @@
-"""Random scenes of what users bring, one kind each: loads, moving stops and bases, dampers, force laws, free bodies, ...
+"""Random scenes of what users bring, one kind each: loads, moving stops and bases, dampers, force laws, free bodies.
 
 ``scene_of(kind, number)`` draws a scene from its kind and number alone; a new kind does not change what others draw.
 A scene holds the arguments of ``simulate`` and the same system in plain numbers for brute force (brute_force.py). Each
@@ -111,6 +111,8 @@ class _Parts:
             for stop in self.stops:
                 if np.isfinite(stop.stiffness):
                     stiff += stop.stiffness * np.outer(stop.row, stop.row)
+            for _, law in self.laws:
+                stiff += 0.3 * np.max(np.abs(np.diff(law.forces) / np.diff(law.knots))) * np.outer(law.row, law.row)
             omega = np.sqrt(np.maximum(scipy.linalg.eigh(stiff, self.mass, eigvals_only=True), 0))
             own = np.sqrt(np.maximum(scipy.linalg.eigh(self.stiffness, self.mass, eigvals_only=True), 0))
             slow = np.min(own[own > 1e-3], initial=2.0)
@@ -300,11 +302,7 @@ def _sampled_load(parts):
     time, values = _samples(parts, parts.end)
     values = size * values
     course = bf.Course(lambda t: np.interp(t, time, values, left=0.0, right=0.0), breaks=tuple(time))
-    parts.load(row, mp.SampledLoad(row, time, values), _nudged_off_breaks(course))
-
-
-def _nudged_off_breaks(course):
-    return course  # values are taken inside steps, never on a break
+    parts.load(row, mp.SampledLoad(row, time, values), course)
 
 
 def _function_load(parts):
@@ -393,8 +391,7 @@ def _way(parts, amplitude, *, whole=True):
         lambda t: amplitude * np.sin(a * t) * np.cos(b * t),
         lambda t: amplitude * (a * np.cos(a * t) * np.cos(b * t) - b * np.sin(a * t) * np.sin(b * t)),
         lambda t: (
-            -amplitude
-            * ((a**2 + b**2) * np.sin(a * t) * np.cos(b * t) + 2 * a * b * np.cos(a * t) * np.sin(b * t))
+            -amplitude * ((a**2 + b**2) * np.sin(a * t) * np.cos(b * t) + 2 * a * b * np.cos(a * t) * np.sin(b * t))
         ),
         step=1 / (a + b),
     )
@@ -525,7 +522,7 @@ def _laws(random):
     """Functions; brute force follows the same straight segments, which the judge compares with the function."""
     parts = _parts(random)
     row, kind = _rows(parts, 1)[0], str(random.choice(["cubic", "softening", "tanh", "one-sided", "bistable"]))
-    k, q0 = 10.0 ** random.uniform(0.5, 1.5), float(random.uniform(0.1, 0.5))
+    k, q0 = 10.0 ** random.uniform(0.5, 1.5), float(random.uniform(0.3, 1.0))
     functions = {
         "cubic": lambda q: k * q + k * q**3 / q0**2,
         "softening": lambda q: k * q - 0.2 * k * q**3 / (q0**2 + q**2),
@@ -533,7 +530,7 @@ def _laws(random):
         "one-sided": lambda q: k * np.maximum(q, 0.0) ** 1.5 / q0**0.5,
         "bistable": lambda q: -0.2 * k * q + k * q**3 / q0**2,
     }
-    span = (0.0, 2.0) if kind == "one-sided" and random.random() < 0.5 else (-2.0, 2.0)
+    span = (0.0, 1.0) if kind == "one-sided" and random.random() < 0.5 else (-1.0, 1.0)
     law = mp.ForceLaw(row, functions[kind], segments=int(random.integers(4, 16)), span=span)
     parts.laws.append((law, bf.Law(row, np.array(law.knots), np.array(law.forces))))
     if random.random() < 0.4:
@@ -561,7 +558,7 @@ def _truncated(random):
     _contacts(parts, str(random.choice(["compliant", "rigid", "mixed"])))
     if random.random() < 0.3:
         _harmonic_load(parts)
-    modes = int(random.integers(1, n - len(parts.contacts) + 1))
+    modes = int(random.integers(1, max(1, n - len(parts.contacts)) + 1))
     return replace(parts.scene(velocity=_moving(parts), modes=modes), system=None)
 
 
@@ -578,10 +575,11 @@ def _alike(random):
         elif kind == "parallel":
             rows.append(row + 10.0 ** random.uniform(-7, -1) * random.normal(size=parts.n))
         else:
-            rows.append(row + other if kind == "sum" and row @ other >= 0 else other)
+            rows.append(row + other if kind == "sum" else other)
+    rows = [r for r in rows if r @ row > 0.1 * np.linalg.norm(r) * np.linalg.norm(row)]  # no two of them a clamp
     gap = float(random.choice([0.0, 0.05]))
-    for row in rows:
-        parts.contact(row, gap if random.random() < 0.6 else float(random.uniform(0.0, 0.1)))
+    for r in rows:
+        parts.contact(r, gap if random.random() < 0.6 else float(random.uniform(0.0, 0.1)))
     return parts
 
 
@@ -627,7 +625,9 @@ def _assembled(random):
     tie = total > 3 and random.random() < 0.5
     ties = [{"a.m0": 1.0, "b.m0": -1.0 if random.random() < 0.5 else -0.7}] if tie else []
     whole = mp.assemble(dict(zip("ab", structures, strict=True)), ties)
-    full = [scipy.linalg.block_diag(*(m(p) for p in pair)) for m in (lambda p: p.mass, _matrix_of, lambda p: p.stiffness)]
+    full = [
+        scipy.linalg.block_diag(*(m(p) for p in pair)) for m in (lambda p: p.mass, _matrix_of, lambda p: p.stiffness)
+    ]
     frame = np.eye(total)
     if tie:
         held = np.zeros((1, total))
@@ -687,7 +687,11 @@ def _clamps(random):
 def _mirror(random):
     """A structure that is its own mirror image: two stops are struck together."""
     mass, k, between = float(random.uniform(0.5, 2)), *(float(v) for v in random.uniform(5, 50, 2))
-    parts = _Parts(random, np.diag([mass, 1.0, mass]), np.array([[k + between, -between, 0.0], [-between, 2 * between, -between], [0.0, -between, k + between]]))
+    parts = _Parts(
+        random,
+        np.diag([mass, 1.0, mass]),
+        np.array([[k + between, -between, 0.0], [-between, 2 * between, -between], [0.0, -between, k + between]]),
+    )
     stiffness = math.inf if random.random() < 0.6 else 200.0
     gap, speed = float(random.choice([0.0, 0.05])), float(random.uniform(-2, 2))
     for at in (0, 2):
@@ -755,7 +759,7 @@ def _in_units(scene, time, length, mass):
         damping = mp.RayleighDamping(damping.alpha / time, damping.beta * time)
     elif isinstance(damping, np.ndarray):
         damping = damping * (mass / time)
-    points = {name: row for name, row in old.points.items()}
+    points = dict(old.points)
     structure = mp.LinearStructure(old.mass * mass, old.stiffness * stiff, damping, points)
     contacts = []
     for item in _items(model):

@@ -29,8 +29,8 @@ EXPECTED_FAILURES = ("not independent of each other", "are defective")  # causes
 def complaints(run, samples=24.0, most=60, *, joule=1.0, metre=1.0, varying=False):
     """Everything that is wrong with a run.
 
-    samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time, whose
-    work only the ledger knows.
+    samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time,
+    whose work only the ledger knows.
     """
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
