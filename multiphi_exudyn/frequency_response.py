@@ -7,16 +7,17 @@ different curves. Without contact both are the linear response, amplitude = |p.(
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.loads import StaticLoad
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.steady_state import PeriodicLoad, SteadyState, at_frequency, steady_state
+from multiphi_exudyn.warning_groups import grouped, kept_back
+from multiphi_exudyn.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
 from multiphi_exudyn.structure import At
 
 __all__ = ["FrequencyResponse", "frequency_response"]
@@ -33,6 +34,12 @@ class FrequencyResponse:
     def orders(self) -> np.ndarray:
         """Periods of the load in one of the response (k,), 0 where it is not periodic."""
         return np.array([state.order for state in self.states])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to distrust in the states, a sentence for each kind with the frequencies that have it."""
+        found = grouped((f"{hz:g} Hz", state.warnings) for hz, state in zip(self.frequencies, self.states, strict=True))
+        return tuple(group.told(len(self.states)) for group in found)
 
     @property
     def last(self) -> SteadyState:
@@ -62,17 +69,21 @@ def frequency_response(
     """Steady states at ``frequencies`` [Hz] in the order given, each from the one before; the first from x, x' (n,).
 
     load: whose frequency is replaced. The other arguments: see ``steady_state``. A frequency at which the run fails
-    is a state with that status; the next one starts where the failed one did.
+    is a state with that status; the next one starts where the failed one did. Issues a MultiPhiWarning for each kind of
+    warning that states have, not one for each state.
     """
     states = list[SteadyState]()
     x, v = displacement, velocity
-    for hz in _frequencies(frequencies):
-        given: dict[str, Any] = {"displacement": x, "velocity": v, "other_loads": other_loads}
-        state = steady_state(model, at_frequency(load, hz), periods=periods, tolerance=tolerance, **given)
-        states.append(state)
-        if state.status != "failed":
-            x, v = state.displacement, state.velocity
-    return FrequencyResponse(np.array(frequencies, dtype=float), tuple(states))
+    with kept_back():
+        for hz in _frequencies(frequencies):
+            state = settled(model, at_frequency(load, hz), x, v, other_loads, periods, tolerance)
+            states.append(state)
+            if state.status != "failed":
+                x, v = state.displacement, state.velocity
+    response = FrequencyResponse(np.array(frequencies, dtype=float), tuple(states))
+    for sentence in response.warnings:
+        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    return response
 
 
 def _frequencies(given: Sequence[float] | np.ndarray) -> list[float]:

@@ -18,6 +18,7 @@ The thresholds are calibrated on random truncated models judged by the same with
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,10 +27,11 @@ from multiphi_exudyn.driven.level import DrivenLevel
 from multiphi_exudyn.level import Level
 from multiphi_exudyn.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.state import Loss
 from multiphi_exudyn.structure import ModalDamping
 from multiphi_exudyn.trajectory import Trajectory
 
-__all__ = ["damping_warnings", "static_warnings", "warnings_of"]
+__all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 INDICATOR = 0.05  # of the motion, where every closed contact is compliant
@@ -57,6 +59,28 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if model.validity is not None:
         found.extend(model.validity(trajectory))
     found.extend(_load_pieces(trajectory))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a body in Exudyn, which keeps no segments, knows of its run.
+
+    levels: it has been in, each once. lost: at its start and at all events. energy: the largest of the run [J], kinetic
+    and strain, as far as it was seen.
+    """
+
+    levels: Sequence[Level]
+    lost: Loss
+    energy: float
+
+
+def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
+    """What a user must not miss of a run in Exudyn, as far as levels and losses tell."""
+    found = list(damping_warnings(model))
+    if not model.whole:
+        found.extend(static_warnings(run.levels))
+        found.extend(_energy_warning(abs(run.lost.truncation_kinetic + run.lost.truncation_strain), run.energy))
     return tuple(found)
 
 
@@ -99,7 +123,10 @@ def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str
     given = 0.5 * float(start.velocity @ start.velocity) + base.strain(start.displacement, start.penetrating)
     if lost <= ENERGY_SHARE * abs(given):
         return
-    largest = history.largest_energy(trajectory.t_end)
+    yield from _energy_warning(lost, history.largest_energy(trajectory.t_end))
+
+
+def _energy_warning(lost: float, largest: float) -> Iterator[str]:
     if lost > ENERGY_SHARE * largest:
         yield f"lost energy: truncation took {_per_cent(lost / largest)} of the largest energy of the run; {REMEDY}"
 

@@ -14,22 +14,24 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from multiphi_exudyn.courses import Harmonic
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.mode_choice import Tolerance
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.warning_groups import grouped, kept_back
 from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real
 from multiphi_exudyn.trajectory import Trajectory
 
-__all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "steady_state"]
+__all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "settled", "steady_state"]
 
 HIGHEST_ORDER = 8  # of a sub-harmonic response that is looked for
 CHUNK = 2 * HIGHEST_ORDER  # periods run at a time: every order is seen to repeat
@@ -55,6 +57,7 @@ class SteadyState:
     settled by itself. periods: of the load run one after the other.
     trajectory: one period of the response, or the last CHUNK periods of the load where it is not periodic; a failed
     run ends early. displacement, velocity: (n,), at the end of the run: another one can go on from there.
+    warnings: what to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
     """
 
     status: str
@@ -67,6 +70,7 @@ class SteadyState:
     trajectory: Trajectory
     displacement: np.ndarray
     velocity: np.ndarray
+    warnings: tuple[str, ...] = ()
 
     def amplitude(self, point: At) -> float:
         """Half the difference between the largest and the smallest displacement [m] of a point; NaN where failed."""
@@ -104,8 +108,25 @@ def steady_state(
     load: HarmonicLoad, or BaseMotion with a Harmonic course. other_loads: constant ones. periods: of the load, after
     which a run that has not settled ends. tolerance: relative to the size of the motion, to which states repeat.
     A response that attracts slowly is found by Newton's method from where the run is; which response, where several
-    attract, follows from the start.
+    attract, follows from the start. Issues a MultiPhiWarning for each kind of its warnings.
     """
+    with kept_back():
+        state = settled(model, load, displacement, velocity, other_loads, periods, tolerance)
+    for sentence in state.warnings:
+        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    return state
+
+
+def settled(
+    model: MultiPhiModel,
+    load: PeriodicLoad,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    other_loads: Sequence[StaticLoad],
+    periods: int,
+    tolerance: float,
+) -> SteadyState:
+    """What ``steady_state`` gives, without its MultiPhiWarning."""
     _check(model, load, other_loads, periods, tolerance)
     n = model.structure.n
     x = np.zeros(n) if displacement is None else model.structure.vector("displacement", displacement)
@@ -157,17 +178,19 @@ class _Chunk:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search under way; see the module's docstring."""
+    """A search under way; see the module's docstring. warned: warnings of the chunks that were run."""
 
     map: PeriodMap
     load: PeriodicLoad
     tolerance: float
+    warned: list[tuple[str, ...]] = field(default_factory=list)
 
     def settle(self, x: np.ndarray, v: np.ndarray, periods: int) -> SteadyState:
         """Chunks until states repeat, Newton's method in between."""
         done, multiplier = 0, math.nan
         while True:
             trajectory = self.map.run(x, v, CHUNK)
+            self.warned.append(trajectory.warnings)
             if trajectory.status != "ok":
                 return self._failed(trajectory, done)
             chunk, done = self._chunk(trajectory), done + CHUNK
@@ -202,20 +225,30 @@ class _Search:
         residual = chunk.drifts[order - 1] / chunk.size if chunk.size else 0.0
         x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
         shown = self.map.run(x, v, order)
-        return SteadyState("periodic", "", self.load, order, float(residual), multiplier, done, shown, x, v)
+        told = self._told(shown)
+        return SteadyState("periodic", "", self.load, order, float(residual), multiplier, done, shown, x, v, told)
 
     def _lost(self, chunk: _Chunk, done: int) -> SteadyState:
         order, residual = int(np.argmin(chunk.drifts)) + 1, float(np.min(chunk.drifts) / chunk.size)
         message = f"states {order} periods apart still differ by {residual:.2g} of the motion after {done} periods"
         x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
-        return SteadyState("not settled", message, self.load, 0, residual, math.nan, done, chunk.trajectory, x, v)
+        run, told = chunk.trajectory, self._told(chunk.trajectory)
+        return SteadyState("not settled", message, self.load, 0, residual, math.nan, done, run, x, v, told)
 
     def _failed(self, trajectory: Trajectory, done: int) -> SteadyState:
         reached = done + int(trajectory.t_end / self.map.period)
         message = f"after {reached} periods: {trajectory.message}"
         shapes, start = self.map.model.base.modes.shapes, trajectory.start
         x, v = shapes @ start.displacement, shapes @ start.velocity
-        return SteadyState("failed", message, self.load, 0, math.nan, math.nan, reached, trajectory, x, v)
+        told = self._told(trajectory)
+        return SteadyState("failed", message, self.load, 0, math.nan, math.nan, reached, trajectory, x, v, told)
+
+    def _told(self, shown: Trajectory) -> tuple[str, ...]:
+        """Warnings of the trajectory that is shown, and kinds that only runs before it had."""
+        own = {sentence.partition(": ")[0] for sentence in shown.warnings}
+        before = grouped(("", sentences) for sentences in self.warned)
+        earlier = [f"{group.kind}: before it settled, {group.example}" for group in before if group.kind not in own]
+        return (*shown.warnings, *earlier)
 
 
 def _half_range(trajectory: Trajectory, point: At, start: float, end: float) -> float:

@@ -48,6 +48,7 @@ FLOORS = (
         "defects",
         "truncation",
         "reliability",
+        "warning_groups",
         "motion",
         "driven",
         "simulate",

@@ -19,6 +19,7 @@ from multiphi_exudyn.study.scene.workbench import prepare
 KEYS = [
     "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "first_contact",
     "contact_count", "closed_time", "intervals", "impulse", "inner_losses", "energy_end", "ledger", "frequencies",
+    "horizon_s", "warnings",
 ]  # fmt: skip
 RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
 
@@ -127,7 +128,8 @@ def test_a_failed_run_has_its_label_and_no_numbers(bench, reference):
     assert list(found) == KEYS
     assert found["label"] == "full beam"
     assert found["energy_end"] is None
-    assert all(found[name] == {} for name in KEYS[4:] if name != "energy_end")
+    assert found["warnings"] == []
+    assert all(found[name] == {} for name in KEYS[4:] if name not in ("energy_end", "warnings"))
 
 
 def test_a_run_that_never_touches_has_no_first_contact(bench, reference):

@@ -8,6 +8,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.comparison.animation import frame_count, frames, gif
 from multiphi_exudyn.study.comparison.film import film_of, run_stage, stage_of
 from multiphi_exudyn.study.running.files import results_folder, write_whole
@@ -31,6 +32,8 @@ def run_animate(
         print(f"{name}: failed, {message}")
     if failed:
         return False
+    for group in grouped((name, run.warnings) for name, run in runs.items()):
+        print(f"warning: {group.told(len(runs))}")
     film = film_of(stage, runs)
     count = frame_count(film)
     with tqdm(frames(film), total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as images:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.comparison.plots import png
@@ -36,6 +37,9 @@ def _tell(values: dict[str, Any]) -> None:
     for name, rung in values["rungs"].items():
         if rung["status"] != "ok":
             print(f"{name}: {rung['status']}, {rung['message']}")
+    rungs = values["rungs"]
+    for group in grouped((name, rung["warnings"]) for name, rung in rungs.items()):
+        print(f"warning: {group.told(len(rungs))}")
     for window, ladders in values["windows"].items():
         for ladder, groups in ladders.items():
             found = groups["all"]

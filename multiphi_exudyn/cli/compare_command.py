@@ -16,6 +16,7 @@ from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.files import results_folder, write_whole
@@ -65,4 +66,7 @@ def _tell(comparison: Comparison, folder: Path) -> None:
         error = percent(comparison.worst_error(run, until)) if name in comparison.measured else "the reference"
         line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
         print(f"{name:{width}}  {run.status:6}  {line}")
-    print(f"\n{findings(comparison).outcome}\n{folder / 'report.html'}")
+    print(f"\n{findings(comparison).outcome}")
+    for sentence in warned(comparison):
+        print(f"warning: {sentence}")
+    print(folder / "report.html")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tqdm import tqdm
 
+from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.running.needs import needs_of, needs_table
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 
@@ -17,4 +18,6 @@ def run_needs(sources: Sequence[str]) -> bool:
     scenes = [load_scene(source) for source in sources or shipped_scenes()]
     found = [needs_of(scene) for scene in tqdm(scenes, disable=None, unit="scene")]
     print(needs_table(found))
+    for group in grouped((needs.scene, needs.warnings) for needs in found):
+        print(f"warning: {group.told(len(found))}")
     return all(needs.status == "ok" for needs in found)

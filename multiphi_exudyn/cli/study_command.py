@@ -11,6 +11,7 @@ from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.accuracy.study_csv import csv_text
 from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.files import results_folder, write_whole
 from multiphi_exudyn.study.sweep.executors import open_executor
@@ -59,4 +60,6 @@ def _tell(result: StudyResult, folder: Path) -> None:
             print(f"  {name:32}  {line}  {words(setting.setting)}")
     rows = result.rows + result.budgets
     failed = sum(row.status != "ok" for row in rows)
+    for sentence in warned(result):
+        print(f"warning: {sentence}")
     print(f"\n{len(rows)} runs, {failed} without an answer\n{folder / 'report.html'}")

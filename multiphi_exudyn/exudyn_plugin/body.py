@@ -27,12 +27,14 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.exudyn_plugin.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.exact_step import ExactStep
+from multiphi_exudyn.exudyn_plugin.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.step_test import Lookahead, StepTest
 from multiphi_exudyn.exudyn_plugin.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.switching import bodies_of, nothing_acts_on, running_solver
 from multiphi_exudyn.motion import Motion
 from multiphi_exudyn.recent import Recent
-from multiphi_exudyn.state import Phase, State
+from multiphi_exudyn.reliability import warnings_of_body
+from multiphi_exudyn.state import Loss, Phase, State
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["MultiPhiBody"]
@@ -65,6 +67,7 @@ class MultiPhiBody(ExactStep):
         self._step = self._rounding = self._ahead = self._speed = math.nan
         self._alone, self._clear, self._wait = False, 0, 0
         self._x = np.zeros(0)
+        self._record = RunRecord(self._state, motion.start_loss)
         stepped, state = self._stepped(self._state.closed), self._state
         self.coordinates = Coordinates(self.items, stepped)
         self._given = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
@@ -79,6 +82,11 @@ class MultiPhiBody(ExactStep):
     def start(self) -> tuple[np.ndarray, np.ndarray]:
         """Initial coordinates and velocities (s,) of the node."""
         return self._given[0], self._given[1]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
+        return warnings_of_body(self.model, self._record.of(self.events))
 
     def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
         """The level of closed contacts as the solver has it."""
@@ -211,11 +219,13 @@ class MultiPhiBody(ExactStep):
         here.write(here.views)
         r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
+        self._record = RunRecord(self._state, self._motion.start_loss if fresh else Loss())
         self._most = 0.0
         self._x = here.read()
         self._take_step(mbs.sys["dynamicSolver"].it.currentStepSize)
         self._sample()
         self.time = t
+        bodies_of(mbs).end = float(mbs.sys["simulationSettings"].timeIntegration.endTime) - self._rounding
 
     def check_integration(self, settings: Any, trapezoidal: bool) -> None:
         """Raises for settings of an implicit solver that make the body wrong; TrapezoidalIndex2 has its own."""
@@ -291,6 +301,7 @@ class MultiPhiBody(ExactStep):
 
     def _keep(self, state: State) -> None:
         self._state = state
+        self._record.see(state)
         self._choose_test()
         self.coordinates.store(state)
 

@@ -59,7 +59,8 @@ def CreateMultiPhiBody(
     Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, one coordinate each, and
     {name: SensorIndex}, the force on it), nGenericODE2, oGenericODE2, nGenericData (not without contacts),
     sCoordinates, sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into
-    displacements and forces; ``mbs.variables['multiPhi'][name].events`` holds the events with times inside steps.
+    displacements and forces; ``mbs.variables['multiPhi'][name]`` has the ``events`` with times inside steps, and the
+    ``warnings``: what to distrust in the run so far; at its end a MultiPhiWarning is issued for each of them.
     """
     if not isinstance(mbs, exu.MainSystem):
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an Exudyn MainSystem")

@@ -38,7 +38,7 @@ class BodyHistories:
 
     time (k,) [s]; points: name -> displacement (k,) [m]; velocities: name -> (k,) [m/s]; gaps: contact -> (k,) [m];
     contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> [(closed at, opened at), ...] [s];
-    closed: contact -> (k,) bool; events as in a Trajectory.
+    closed: contact -> (k,) bool; events and warnings as in a Trajectory.
     """
 
     time: np.ndarray
@@ -49,6 +49,7 @@ class BodyHistories:
     contact_intervals: Mapping[str, list[tuple[float, float]]]
     closed: Mapping[str, np.ndarray]
     events: tuple[Event, ...]
+    warnings: tuple[str, ...]
 
 
 def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:
@@ -110,6 +111,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
         },
         closed=dict(zip(contacts, flags.T, strict=True)),
         events=tuple(body.events),
+        warnings=body.warnings,
     )
 
 

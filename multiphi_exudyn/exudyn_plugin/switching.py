@@ -8,12 +8,14 @@ replaces this one; the level sensor of a body finds out (``check_called``).
 from __future__ import annotations
 
 import itertools
+import math
+import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import exudyn as exu
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 
 if TYPE_CHECKING:
     from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
@@ -29,12 +31,13 @@ class Switching(dict[str, "MultiPhiBody"]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
     preceding, following: the user's own PreStep and PostStep functions, or None. disturbed: whether an event of one
-    body has just moved what hangs on it, maybe another.
+    body has just moved what hangs on it, maybe another. end: of the run [s], infinite once its warnings are issued.
     """
 
     preceding: StepFunction | None = None
     following: StepFunction | None = None
     disturbed: bool = False
+    end: float = math.inf
 
     def add(self, body: MultiPhiBody) -> None:
         """Take a body in; those with rigid contacts come last, so that what they strike has had its own events."""
@@ -56,7 +59,16 @@ class Switching(dict[str, "MultiPhiBody"]):
             self.disturbed = False
             for body in self.values():
                 body.look_again()
+        if t >= self.end:
+            self.end = math.inf
+            self._warn()
         return self.following is None or self.following(mbs, t)
+
+    def _warn(self) -> None:
+        """Issue what the bodies have to say of the run that ends."""
+        for body in self.values():
+            for sentence in body.warnings:
+                warnings.warn(f"{sentence} (body {body.name!r})", MultiPhiWarning, stacklevel=3)
 
     def install(self, mbs: Any) -> None:
         """Become the system's PostStep function, followed by the present one."""

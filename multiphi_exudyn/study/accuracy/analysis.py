@@ -30,6 +30,8 @@ __all__ = [
     "front",
     "full_methods",
     "is_number",
+    "longest",
+    "named",
     "names_of",
     "points",
     "pointwise_until",
@@ -208,6 +210,17 @@ def pointwise_until(result: StudyResult, at: Mapping[str, Any], tolerance: float
 def words(fields: Mapping[str, Any]) -> str:
     """Fields of a setting or of a point as an engineer would say them: "r = 8, step 70 µs"."""
     return ", ".join(_word(field, value) for field, value in fields.items())
+
+
+def named(setting: Setting) -> str:
+    """A setting in words: "multiphi (r = 8)"."""
+    fields = words(setting.setting)
+    return f"{setting.method} ({fields})" if fields else setting.method
+
+
+def longest(result: StudyResult) -> float:
+    """The longest window [s] that errors are known for: the whole run."""
+    return max((float(w) for row in result.rows for w in row.values.get("nrmse", {})), default=0.0)
 
 
 def error_of(result: StudyResult, row: Row) -> float | None:

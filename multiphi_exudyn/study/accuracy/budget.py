@@ -296,4 +296,4 @@ def _described(rung: Rung) -> dict[str, Any]:
     run = rung.run
     failed = [f"{cause}: {o.message}" for cause, runs in rung.uncertainty_runs.items() for o in runs if not o.ok]
     known = {"label": rung.label, "status": run.status, "message": run.message, "dofs": run.dofs, "steps": run.steps}
-    return known | {"online_s": run.online_s, "failed_uncertainty_runs": failed}
+    return known | {"online_s": run.online_s, "failed_uncertainty_runs": failed, "warnings": list(run.warnings)}

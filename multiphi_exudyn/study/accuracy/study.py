@@ -1,7 +1,9 @@
 """A study from beginning to end: references, error pass, error budgets, timing pass, maps.
 
-The error pass runs wherever the executor has workers. The timing pass is another one: each setting again, one at a
-time, in this process, with nothing else of the study running, a first run and its repeats. Every run is kept in the
+The error pass runs wherever the executor has workers. At the first point of the scene's axes every setting itself, not
+its nearby ones, is run once more, nudged, for its sensitivity horizon: one number per model is enough, and the other
+points cost what they did. Warnings are kept with every run. The timing pass is another one: each setting again, one at
+a time, in this process, with nothing else of the study running, a first run and its repeats. Every run is kept in the
 store as it ends, so a study that was stopped goes on where it was; maps are made anew with every report.
 """
 
@@ -47,7 +49,8 @@ class MeasuredRun:
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """The run's measures, and the run itself as arrays."""
         bench = replace(_bench(self.study, parameters), repeats=0)
-        run = run_model(bench, self.study.model_name(parameters), progress=False)
+        nudged = parameters["at"] == self.study.points[0] and not parameters["nearby"]
+        run = run_model(bench, self.study.model_name(parameters), progress=False, horizon=nudged)
         indicator = run.indicators.get(f"{_window(self.study, bench):g}")
         values = measures(bench, run, self.reference) | {"indicator": indicator}
         return Outcome(values | self._shown(bench, run), to_arrays(run), run.status, run.message)

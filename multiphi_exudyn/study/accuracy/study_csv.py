@@ -1,4 +1,4 @@
-"""All numbers of a study as one CSV table, one line per run."""
+"""All numbers of a study as one CSV table, one line per run; column ``warnings``: its sentences as a JSON list."""
 
 from __future__ import annotations
 

@@ -13,6 +13,8 @@ from multiphi_exudyn.study.accuracy.analysis import (
     StudyResult,
     cheapest,
     full_methods,
+    longest,
+    named,
     names_of,
     points,
     pointwise_until,
@@ -25,7 +27,8 @@ from multiphi_exudyn.study.accuracy.analysis import (
 )
 from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
 from multiphi_exudyn.study.accuracy.frequency_findings import frequency_asked, frequency_outcome
-from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.accuracy.study_warnings import warned
+from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence, times
 
 __all__ = [
     "Choice",
@@ -154,7 +157,7 @@ def _outcome_at(result: StudyResult, at: Mapping[str, Any]) -> Iterable[str]:
         yield from (_cheapest_words(result, at, tolerance) for tolerance in result.study.tolerances)
     best = min(most_accurate(result, at), key=_error, default=None)
     if best is not None:
-        yield f"The most accurate is {_named(best)}: {error_words(best.error, uncertainty(result, at))}."
+        yield f"The most accurate is {named(best)}: {error_words(best.error, uncertainty(result, at))}."
 
 
 def _cheapest_words(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> str:
@@ -169,7 +172,7 @@ def _cheapest_words(result: StudyResult, at: Mapping[str, Any], tolerance: float
             f", {times(best.faster)} faster than the cheapest full model that does{_lastingly(result, at, tolerance)}"
         )
     online = seconds(best.setting.online_s)
-    return f"The cheapest that reaches {share(tolerance)} is {_named(best.setting)}: {online}{faster}."
+    return f"The cheapest that reaches {share(tolerance)} is {named(best.setting)}: {online}{faster}."
 
 
 def _lastingly(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> str:
@@ -183,6 +186,7 @@ def _lastingly(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> 
 def _distrust(result: StudyResult) -> Iterable[str]:
     if result.quick:
         yield "This is the study's short form: few settings. It shows that everything runs, no more."
+    yield from map(sentence, warned(result))
     for at in shown_points(result):
         yield _own_uncertainty(result, at)
     yield from _failures(result)
@@ -209,7 +213,7 @@ def _pointwise(result: StudyResult, at: Mapping[str, Any]) -> str:
     """Until when the reference and its coarser copy agree, where that is not the whole run."""
     until = {tolerance: pointwise_until(result, at, tolerance) for tolerance in result.study.tolerances}
     early = [
-        f"to {share(x)} until {end:.3g} s" for x, end in until.items() if end is not None and end < _longest(result)
+        f"to {share(x)} until {end:.3g} s" for x, end in until.items() if end is not None and end < longest(result)
     ]
     after = "after that compare contact times and energies, not curves."
     return f" The two agree {', '.join(early)}; {after}" if early else ""
@@ -234,7 +238,7 @@ def _times(result: StudyResult) -> Iterable[str]:
     spreads = [(s.spread[1] / s.spread[0], s) for s in settings(result) if s.spread and s.spread[0] > 0]
     if spreads:
         ratio, setting = max(spreads, key=lambda pair: pair[0])
-        most = f" The repeats of {_named(setting)} differ most: {ratio:.2g} to 1." if ratio > UNSTEADY else ""
+        most = f" The repeats of {named(setting)} differ most: {ratio:.2g} to 1." if ratio > UNSTEADY else ""
         yield f"Run times are wall clock on one machine: ratios count.{most}"
     load = max(_loads(result), default=0.0)
     if load > BUSY:
@@ -253,16 +257,6 @@ def _loads(result: StudyResult) -> list[float]:
     late = [row for row, at in zip(result.timings, ended, strict=True) if at - min(ended) > FORGOTTEN]
     given = [row.values["load_average"] for row in late if row.status == "ok"]
     return [load for load in given if load is not None]
-
-
-def _named(setting: Setting) -> str:
-    fields = words(setting.setting)
-    return f"{setting.method} ({fields})" if fields else setting.method
-
-
-def _longest(result: StudyResult) -> float:
-    """The longest window [s] that errors are known for: the whole run."""
-    return max((float(w) for row in result.rows for w in row.values.get("nrmse", {})), default=0.0)
 
 
 def _time(setting: Setting | None) -> float:

@@ -53,6 +53,20 @@ class Comparison:
         return {name: run for name, run in self.runs.items() if run.ok and run is not self.reference}
 
     @property
+    def warnings(self) -> dict[str, list[str]]:
+        """Every sentence that a model warns with, and the names of the models that do, in the scene's order."""
+        found: dict[str, list[str]] = {}
+        for name, run in self.runs.items():
+            for sentence in run.warnings:
+                found.setdefault(sentence, []).append(name)
+        return found
+
+    @property
+    def nudged(self) -> tuple[str, ...]:
+        """Tolerances for which runs know their sensitivity horizon."""
+        return tuple(dict.fromkeys(tolerance for run in self.runs.values() for tolerance in run.horizon_s))
+
+    @property
     def headline_window(self) -> float:
         """The window the headline figures speak of: the longest the scene names that fits into the run."""
         end = self.bench.t_end
@@ -125,7 +139,7 @@ def compare(
     runs = {}
     for name in bench.scene.models:
         started(name)
-        runs[name] = run_model(bench, name, progress, retry=True)
+        runs[name] = run_model(bench, name, progress, retry=True, horizon=True)
     return Comparison(bench, runs, environment)
 
 
@@ -208,6 +222,8 @@ def _row(comparison: Comparison, run: ModelRun) -> dict[str, Any]:
         "first_contact_s": {name: metrics.first_contact(given) for name, given in run.contact_intervals.items()},
         "inner_lift_offs_m": {name: comparison.lift_offs(run, name) for name in run.contact_intervals},
         "impulse_Ns": dict(run.impulse),
+        "warnings": list(run.warnings),
+        "horizon_s": dict(run.horizon_s),
     }
 
 

@@ -13,7 +13,8 @@ from multiphi_exudyn.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
+from multiphi_exudyn.study.comparison.warned import warned
+from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, times
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
@@ -154,6 +155,7 @@ def _most_accurate(comparison: Comparison) -> Iterable[str]:
 
 
 def _distrust(comparison: Comparison) -> Iterable[str]:
+    yield from map(sentence, warned(comparison))
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
     yield from _truncation(comparison)
@@ -297,8 +299,4 @@ def _error(comparison: Comparison, run: ModelRun) -> str:
 
 def _judged(comparison: Comparison) -> str:
     points = comparison.bench.judged_points
-    return f"{', worst' if len(points) > 1 else ''} of {_listed(points)}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
+    return f"{', worst' if len(points) > 1 else ''} of {listed(points)}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
@@ -80,7 +81,8 @@ def _counts(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> tuple[
     end = min(bench.t_end, bench.longest_period)
     counts: list[int | None] = []
     for factor in FACTORS:
-        trajectory = simulate(model, end, displacement=factor * start, compiled=False)
+        with kept_back():
+            trajectory = simulate(model, end, displacement=factor * start, compiled=False)
         intervals = np.array(trajectory.contact_intervals(model.contacts[0].name)).reshape(-1, 2)
         ok = trajectory.status == "ok"
         counts.append(metrics.inner_losses(intervals, bench.longest_period) if ok else None)

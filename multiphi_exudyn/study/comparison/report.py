@@ -17,12 +17,13 @@ from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from reference_models.rig import rig
 
 __all__ = ["render"]
 
 TEMPLATE = "report.html.j2"
-DEFINED = ("nrmse", "horizon", "first_contact", "inner_losses", "closed_time", "impulse", "ledger")  # on the page
+ON_THE_PAGE = ("nrmse", "horizon", "horizon_s", "first_contact", "inner_losses", "closed_time", "impulse", "ledger")
 HISTORY = (
     "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
@@ -46,7 +47,9 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
     environment = Environment(
         loader=PackageLoader("multiphi_exudyn.study.comparison"), autoescape=True, undefined=StrictUndefined
     )
-    environment.filters |= {"percent": percent, "seconds": seconds, "times": times}
+    end = ROUND_OFF * comparison.bench.t_end
+    until = {"until": lambda given: "whole run" if given >= end else f"{given:.3f} s"}
+    environment.filters |= {"percent": percent, "seconds": seconds, "times": times} | until
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,
         bench=comparison.bench,
@@ -55,7 +58,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
         levels=levels,
         losses=losses,
         metrics=metrics,
-        definitions=[metrics.METRICS[name] for name in DEFINED],
+        definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
         pictures=list(_pictures(comparison, levels)),
         totals=_totals(comparison),
         contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",

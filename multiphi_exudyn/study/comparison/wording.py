@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-__all__ = ["engineering", "percent", "seconds", "times"]
+__all__ = ["engineering", "listed", "percent", "seconds", "sentence", "times"]
 
 
 def percent(value: float | None) -> str:
@@ -40,3 +41,13 @@ def engineering(value: float) -> str:
         if value >= scale:
             return f"{value / scale:g} {prefix}"
     return f"{value:g} "
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names as in a sentence: "a, b and c"."""
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
+
+
+def sentence(told: str) -> str:
+    """The same with a capital and one full stop."""
+    return f"{told[:1].upper()}{told[1:].removesuffix('.')}."

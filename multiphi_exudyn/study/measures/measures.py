@@ -39,6 +39,8 @@ def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dic
         "energy_end": _number(run.energy[-1]) if len(run.energy) else None,
         "ledger": {row: _number(value) for row, value in run.ledger.items()},
         "frequencies": level_frequencies(run, [contact.name for contact in bench.mechanics.contacts]) if run.ok else {},
+        "horizon_s": {tolerance: _number(end) for tolerance, end in run.horizon_s.items()},
+        "warnings": list(run.warnings),
     }
 
 

@@ -66,6 +66,19 @@ METRICS = {
         "tolerance; the end of the run where that never happens. ||ref|| counts as a hundredth of that of the whole "
         "run while it is less: a point that is still at rest says nothing.",
     ),
+    "horizon_s": Metric(
+        "sensitivity horizon",
+        "s",
+        "the first time at which a reduced run and the same one with its start nudged by 1e-12 differ by more than the "
+        "tolerance, relative to their displacements; the end of the run where that never happens. It takes no "
+        "reference. No processor, and no other code, agrees with a run much beyond it.",
+    ),
+    "warnings": Metric(
+        "warnings",
+        "text",
+        "what a reduced model says is to be distrusted in its own answer, and what to do about it, one sentence each; "
+        "it begins with its kind and a colon.",
+    ),
     "pointwise_until": Metric(
         "pointwise until",
         "s",

@@ -46,6 +46,7 @@ def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> Mode
         first_s=first,
         repeats_s=repeats,
         sampling_s=sampling,
+        warnings=recorded.warnings,
         **histories,
     )
 

@@ -35,7 +35,7 @@ class Needs:
 
     levels_built of levels_possible; dofs_carried: coordinates of the largest level visited, those of varying loads
     among them, of dofs_given. modules: of this package, packages: others beside the standard library, that the run
-    imported. memory: its peak [bytes], M and K themselves not counted.
+    imported. memory: its peak [bytes], M and K themselves not counted. warnings: what to distrust in its answer.
     """
 
     scene: str
@@ -48,6 +48,7 @@ class Needs:
     modules: int
     packages: tuple[str, ...]
     memory: int
+    warnings: tuple[str, ...]
 
 
 def needs_of(scene: Scene) -> Needs:
@@ -67,7 +68,8 @@ def needs_of(scene: Scene) -> Needs:
         t_end=bench.t_end,
     )
     told = json.loads(_in_a_process(pickle.dumps(task)))
-    return Needs(scene=scene.name, model=spec.name, **told | {"packages": tuple(told["packages"])})
+    tuples = {name: tuple(told[name]) for name in ("packages", "warnings")}
+    return Needs(scene=scene.name, model=spec.name, **told | tuples)
 
 
 def needs_table(found: Sequence[Needs]) -> str:

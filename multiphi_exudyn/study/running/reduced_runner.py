@@ -23,18 +23,19 @@ from reference_models.global_basis import global_basis
 __all__ = ["ENERGY_INTERVAL", "run_global_basis", "run_reduced"]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
+APART = 0.01  # of the motion, by which a run and a nudged one differ at the end of its horizon: what a reader sees
 
 
-def run_reduced(bench: Workbench, spec: ReducedModel, label: str) -> ModelRun:
-    """The model of a scene's entry from the scene's start."""
+def run_reduced(bench: Workbench, spec: ReducedModel, label: str, horizon: bool = False) -> ModelRun:
+    """The model of a scene's entry from the scene's start; horizon: whether it is run once more, nudged."""
     (model, start), building = timed(lambda: _reduced_start(bench, spec))
-    return _run(bench, spec, label, model, start, building)
+    return _run(bench, spec, label, model, start, building, horizon)
 
 
-def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str) -> ModelRun:
+def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str, horizon: bool = False) -> ModelRun:
     """The structure projected on one basis, from its own static equilibrium; with all its modes exact in time."""
     (model, start), building = timed(lambda: _global_start(bench, spec))
-    return _run(bench, spec, label, model, start, building)
+    return _run(bench, spec, label, model, start, building, horizon)
 
 
 def _run(
@@ -44,6 +45,7 @@ def _run(
     model: MultiPhiModel,
     start: np.ndarray,
     building: float,
+    horizon: bool,
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
     compiled = spec.loop == "compiled"
@@ -63,11 +65,13 @@ def _run(
         offline_s=bench.structure_s + building,
         first_s=first,
         repeats_s=repeats,
+        warnings=trajectory.warnings,
     )
     if not run.ok:
         return run
     indicators = _indicators(bench, trajectory) if isinstance(spec, ReducedModel) else {}
-    return replace(run, **_sampled(bench, trajectory), indicators=indicators)
+    until = {f"{APART:g}": trajectory.horizon(APART)} if horizon else {}
+    return replace(run, **_sampled(bench, trajectory), indicators=indicators, horizon_s=until)
 
 
 def _indicators(bench: Workbench, trajectory: Trajectory) -> dict[str, float]:

@@ -20,6 +20,7 @@ import numpy as np
 
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.structure import LinearStructure
 
@@ -45,7 +46,8 @@ def run_alone(task: Task) -> dict[str, Any]:
     """What the run took, as ``needs.Needs`` names it; memory counted from before its model is made."""
     tracemalloc.start()
     model = MultiPhiModel(task.structure, task.contacts, modes=task.modes, overrides=task.overrides)
-    run = simulate(model, task.t_end, displacement=task.start, loads=task.loads, compiled=False)
+    with kept_back():
+        run = simulate(model, task.t_end, displacement=task.start, loads=task.loads, compiled=False)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]
@@ -59,6 +61,7 @@ def run_alone(task: Task) -> dict[str, Any]:
         "modules": imported.count(OURS),
         "packages": sorted(others & set(imported)),
         "memory": peak,
+        "warnings": list(run.warnings),
     }
 
 

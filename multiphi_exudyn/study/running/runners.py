@@ -7,6 +7,7 @@ start. Online is the solver alone, from the start to the end of the run.
 from __future__ import annotations
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.study.running.body_runner import run_user_object
 from multiphi_exudyn.study.running.craig_bampton_runner import run_craig_bampton
 from multiphi_exudyn.study.running.full_runner import run_full
@@ -27,11 +28,19 @@ from multiphi_exudyn.study.scene.workbench import Workbench
 __all__ = ["label_of", "run_model"]
 
 
-def run_model(bench: Workbench, name: str, progress: bool = True, retry: bool = False) -> ModelRun:
+def run_model(
+    bench: Workbench, name: str, progress: bool = True, retry: bool = False, horizon: bool = False
+) -> ModelRun:
     """Run the scene's model ``name``; a failed run has status "failed" and its cause.
 
     retry: a full beam that fails is tried again at gentler settings; not for a study that judges the settings.
+    horizon: a reduced model is run once more, nudged. Its warnings are those of the run, and not issued here.
     """
+    with kept_back():
+        return _run(bench, name, progress, retry, horizon)
+
+
+def _run(bench: Workbench, name: str, progress: bool, retry: bool, horizon: bool) -> ModelRun:
     spec = bench.scene.models[name]
     label = label_of(bench, spec)
     try:
@@ -44,8 +53,8 @@ def run_model(bench: Workbench, name: str, progress: bool = True, retry: bool = 
         if isinstance(spec, StepwiseModel):
             return run_stepwise(bench, spec, label)
         if isinstance(spec, GlobalBasisModel):
-            return run_global_basis(bench, spec, label)
-        return run_reduced(bench, spec, label)
+            return run_global_basis(bench, spec, label, horizon)
+        return run_reduced(bench, spec, label, horizon)
     except (MultiPhiError, ArithmeticError, RuntimeError, ValueError) as error:
         cause = " ".join(str(error).split())
         return ModelRun(name, spec.kind, label, status="failed", message=cause)

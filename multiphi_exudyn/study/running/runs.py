@@ -24,6 +24,8 @@ class ModelRun:
     offline_s: building, linearising, static start. first_s: the solver alone, from the start to the end, the
     first time; repeats_s: the same again. sampling_s: the histories put on the common grid afterwards.
     indicators: end of the window [s] -> the model's own estimate of its truncation error; none of other models.
+    warnings: what to distrust in a reduced model's answer (``Trajectory.warnings``). horizon_s: tolerance -> until when
+    [s] the model, nudged, stays as near to itself (``Trajectory.horizon``); only of reduced models that were asked.
     """
 
     name: str
@@ -47,6 +49,8 @@ class ModelRun:
     repeats_s: tuple[float, ...] = ()
     sampling_s: float = 0.0
     indicators: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    horizon_s: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -86,4 +90,4 @@ def from_arrays(arrays: Mapping[str, np.ndarray]) -> ModelRun:
             given.setdefault(name, {})[entry] = value
         else:
             given[name] = value
-    return ModelRun(**given | {"repeats_s": tuple(given["repeats_s"].tolist())})
+    return ModelRun(**given | {name: tuple(given[name].tolist()) for name in ("repeats_s", "warnings")})

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.catalogue import CATALOGUE
@@ -63,11 +64,17 @@ def warm_up() -> None:
     """Compile the loop, where numba is installed and has not kept it from an earlier run: half a minute, once."""
     if importlib.util.find_spec("numba") is not None:
         problem = chosen_cases("zero-gap-rigid", quick=True)[0].build(True)
-        simulate(problem.model(), problem.t_end, problem.displacement, compiled=True)
+        with kept_back():
+            simulate(problem.model(), problem.t_end, problem.displacement, compiled=True)
 
 
 def run_case(case: Case, limits: Limits) -> CaseResult:
     """Every model in one case; whatever is not the NumPy loop is compared with the first native answer."""
+    with kept_back():
+        return _run_case(case, limits)
+
+
+def _run_case(case: Case, limits: Limits) -> CaseResult:
     problem = case.build(limits.quick)
     natives = list(_natives(case, problem, limits))
     answers = [native.trajectory for native in natives if native.trajectory is not None]

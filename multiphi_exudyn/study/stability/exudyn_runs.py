@@ -58,7 +58,8 @@ def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit
         )
         remark = "" if matched else f"{steps} steps allowed, {wanted} needed to match its modes: plain trapezoidal rule"
         outcome = Outcome(USER_OBJECT, message=remark, events=len(found.events), steps=steps, time_s=time_s)
-        return _compared(outcome, problem, native, found.time, found.gaps)
+        told = replace(outcome, warnings=found.warnings)
+        return _compared(told, problem, native, found.time, found.gaps)
 
     return _guarded(USER_OBJECT, solve)
 

@@ -68,6 +68,7 @@ def _judged(case: Case, problem: Problem, name: str, trajectory: Trajectory, tim
         beyond=(found.unexcused if found.truncated else found.beyond) / problem.metre,
         excused=found.beyond / problem.metre if found.truncated else None,
         reported=found.reported / problem.metre if found.truncated else None,
+        warnings=trajectory.warnings,
     )
 
 

@@ -19,6 +19,7 @@ class Outcome:
     excused what truncation leaves. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
     difference: to the native answer, ||y - native|| / ||native|| of the contacts' travel, the worst of them;
     agrees_until: the share of the run up to the first difference above AGREEMENT of the largest travel.
+    warnings: what a reduced model says is to be distrusted in its answer.
     steps: of an Exudyn model. samples, covered: of the brute force. time_s: of the run alone [s].
     """
 
@@ -39,6 +40,7 @@ class Outcome:
     samples: int | None = None
     covered: float | None = None
     time_s: float | None = None
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

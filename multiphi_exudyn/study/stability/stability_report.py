@@ -7,10 +7,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from multiphi_exudyn.study.comparison.wording import percent, seconds
+from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence
 from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
 from multiphi_exudyn.study.stability.outcome import CaseResult
-from multiphi_exudyn.study.stability.summary import failures, headline, summaries
+from multiphi_exudyn.study.stability.summary import failures, headline, summaries, warned
 from multiphi_exudyn.study.stability.text_table import figure
 
 __all__ = ["render_stability"]
@@ -27,6 +27,7 @@ def render_stability(results: Sequence[CaseResult], environment: dict[str, Any],
     return page.get_template(TEMPLATE).render(
         results=results,
         headline=headline(results),
+        warned=[sentence(told) for told in warned(results)],
         summaries=summaries(results),
         failures=failures(results),
         quick=quick,

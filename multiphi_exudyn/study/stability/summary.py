@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.stability.judgement import BEYOND, RESIDUAL
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
 
-__all__ = ["ModelSummary", "contents", "failures", "headline", "summaries"]
+__all__ = ["ModelSummary", "contents", "failures", "headline", "summaries", "warned"]
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,12 @@ def _summary(name: str, cases: Mapping[str, Outcome]) -> ModelSummary:
         energy_case=where(lambda o: o.energy),
         difference_case=where(lambda o: o.difference),
     )
+
+
+def warned(results: Sequence[CaseResult]) -> list[str]:
+    """What the reduced models warn of, a sentence for each kind."""
+    ran = [(f"{result.name}, {o.model}", o.warnings) for result in results for o in result.outcomes if o.status == OK]
+    return [group.told(len(ran)) for group in grouped(ran)]
 
 
 def headline(results: Sequence[CaseResult]) -> str:

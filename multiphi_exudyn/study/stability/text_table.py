@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
-from multiphi_exudyn.study.stability.summary import headline
+from multiphi_exudyn.study.stability.summary import headline, warned
 
 __all__ = ["figure", "text_table"]
 
@@ -15,11 +15,11 @@ WIDTHS = (7, 8, 8, 7, 6, 8, 8, 8)
 
 
 def text_table(results: Sequence[CaseResult]) -> str:
-    """All cases, then the outcome in one sentence."""
+    """All cases, then what models warn of, and the outcome in one sentence."""
     width = max(len(outcome.model) for result in results for outcome in result.outcomes)
     heads = "  ".join(f"{head:>{size}}" for head, size in zip(HEADS, WIDTHS, strict=True))
     lines = [f"  {'':{width}}  {heads}", *(line for result in results for line in _case(result, width))]
-    return "\n".join([*lines, "", headline(results)])
+    return "\n".join([*lines, "", *(f"warning: {sentence}" for sentence in warned(results)), headline(results)])
 
 
 def figure(value: float | None) -> str:

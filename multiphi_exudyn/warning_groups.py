@@ -1,0 +1,49 @@
+"""Warnings of many runs, grouped by kind: the text before a sentence's first colon (reliability.py)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from multiphi_exudyn.errors import MultiPhiWarning
+
+__all__ = ["WarningGroup", "grouped", "kept_back"]
+
+NAMED = 5  # runs of a group that its sentence names
+
+
+@dataclass(frozen=True)
+class WarningGroup:
+    """Warnings of one kind in many runs; runs: names of those that have it, in order; example: of the first one."""
+
+    kind: str
+    runs: tuple[str, ...]
+    example: str
+
+    def told(self, of: int) -> str:
+        """The group as one sentence that begins with its kind; of: how many runs there are."""
+        names, more = ", ".join(self.runs[:NAMED]), len(self.runs) - NAMED
+        listed = f"{names} and {more} more" if more > 0 else names
+        if of == 1:
+            return f"{self.kind}: {self.example}"
+        return f"{self.kind}: {len(self.runs)} of {of} runs ({listed}); {self.runs[0]}: {self.example}"
+
+
+def grouped(runs: Iterable[tuple[str, Sequence[str]]]) -> tuple[WarningGroup, ...]:
+    """(name of a run, its warnings) of many runs, by kind in the order of their first appearance."""
+    groups = dict[str, WarningGroup]()
+    for run, sentences in runs:
+        for kind, _, rest in (sentence.partition(": ") for sentence in sentences):
+            group = groups.setdefault(kind, WarningGroup(kind, (), rest))
+            groups[kind] = WarningGroup(kind, tuple(dict.fromkeys((*group.runs, run))), group.example)
+    return tuple(groups.values())
+
+
+@contextmanager
+def kept_back() -> Iterator[None]:
+    """No MultiPhiWarning is issued in here: who makes many runs takes the sentences from them and tells the groups."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MultiPhiWarning)
+        yield
