@@ -24,7 +24,6 @@ from multiphi_exudyn.study.scene.scene_loads import described_loads
 __all__ = ["Findings", "findings"]
 
 GONE = 0.05  # NRMSE above which a pointwise comparison says little
-MUCH = 0.02  # of the initial energy lost to truncation: worth a word
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,6 @@ def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from map(sentence, warned(comparison))
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
-    yield from _truncation(comparison)
     yield from _contact_law(comparison)
     yield from _force_laws(comparison)
     if comparison.bench.overrides:
@@ -198,20 +196,6 @@ def _sensitivity(comparison: Comparison) -> Iterable[str]:
         yield (
             f"Contact makes nearby runs separate. Curve by curve the comparison holds to 5 % until: {listed}; "
             "after that compare contact times and energies, not curves."
-        )
-
-
-def _truncation(comparison: Comparison) -> Iterable[str]:
-    shares = {
-        run.name: (run.ledger["truncation_kinetic"] + run.ledger["truncation_strain"]) / comparison.energy_scale(run)
-        for run in comparison.measured.values()
-        if run.kind == "reduced" and comparison.energy_scale(run) and "truncation_kinetic" in run.ledger
-    }
-    if any(share > MUCH for share in shares.values()):
-        listed = ", ".join(f"{name} {percent(share)}" for name, share in shares.items())
-        yield (
-            "At every transition a reduced model drops what the next level's modes cannot hold. Of the "
-            f"{comparison.energy_scale_name} that is: {listed}. Where it is much, take more modes."
         )
 
 
