@@ -3,13 +3,15 @@
 import contextlib
 import json
 import math
+import re
 import sqlite3
 import threading
+import warnings
 
 import numpy as np
 import pytest
 
-from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.study.sweep import Row, Store
 from multiphi_exudyn.study.sweep.store import pack
 
@@ -179,6 +181,54 @@ def test_a_store_overwritten_at_random_is_refused_or_gives_every_run(tmp_path, s
     assert all(sentence.startswith(f"path: {tmp_path}") and "\n" not in sentence for sentence in said)
 
 
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """A store and its log as a killed process leaves them, and its rows, all in the log."""
+    path = tmp_path_factory.mktemp("killed") / "runs.db"
+    with Store(path) as store:
+        for x in range(40):
+            store.add("pass", {"x": x}, row({"x": x}))
+        return path.read_bytes(), path.with_name("runs.db-wal").read_bytes(), store.rows("pass")
+
+
+def opened(folder, store, log):
+    """The rows of a store with this log, None where it is refused, and the warnings it gives."""
+    path = folder / "runs.db"
+    path.write_bytes(store)
+    path.with_name("runs.db-wal").write_bytes(log)
+    path.with_name("runs.db-shm").unlink(missing_ok=True)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", MultiPhiWarning)
+        try:
+            with Store(path) as again:
+                return again.rows("pass"), [str(each.message) for each in said]
+        except MultiPhiValueError:
+            return None, []
+
+
+def test_a_log_that_a_killed_process_left_is_read_without_a_word(tmp_path, killed):
+    store, log, rows = killed
+    assert opened(tmp_path, store, log) == (rows, [])
+    assert opened(tmp_path, store, log[:-1])[0] == rows[:-1]  # its last frame was being written: never committed
+
+
+@pytest.mark.parametrize("kind", ["bytes", "stretch", "nothing"])
+def test_runs_lost_with_a_damaged_log_are_told(tmp_path, killed, kind):
+    store, log, rows = killed
+    lost = 0
+    for seed in range(30):
+        damaged = overwritten(log, kind, seed) if seed else bytes(32) + log[32:]
+        found, said = opened(tmp_path, store, damaged)
+        missing = 0 if found is None else len(rows) - len(found)
+        last_alone = found == rows[:-1] and damaged[-PAGE - 24 :] != log[-PAGE - 24 :]
+        assert found is None or found == rows[: len(found)], f"seed {seed}"
+        assert not missing or last_alone or re.match(r"lost runs: up to \d+ runs at the end of the log", said[0]), (
+            f"seed {seed}"
+        )
+        lost += missing > 1
+    assert lost >= 15
+
+
 def test_a_run_with_another_value_in_its_place_is_refused(tmp_path, sound, refused):
     changed = sound[0].replace(b'{"y": 150.0}', b'{"y": 151.0}')
     assert changed != sound[0]
@@ -221,10 +271,12 @@ def test_many_open_a_new_file_at_once_and_write_into_it(tmp_path):
             )
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MultiPhiWarning)  # none of them takes what another one writes for lost
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
     with Store(path) as store:
         assert sorted(found.parameters["x"] for found in store.rows("pass")) == list(range(20))
     assert (len(added), sum(added)) == (160, 20)

@@ -10,7 +10,8 @@ not concerned, they hand their rows back).
 A file that was damaged is refused, never read in part: SQLite's own check of all pages and indices and the numbers of
 the runs, which have no gaps, are looked at when it is opened and when all runs are asked for; what a run is read from
 has to have the sha256 that was stored with it. Nothing is repaired: what a damaged file still holds cannot be told
-from what it has lost.
+from what it has lost. Runs at the end of the log that cannot be read are lost as after a power failure; a
+MultiPhiWarning says how many.
 
 A run's key is (name, sha256 of its parameters' canonical JSON): sorted, without blanks, 1 and 1.0 being different.
 A new file is made under a temporary name and linked to its own, so that nobody ever sees a part of it.
@@ -26,6 +27,7 @@ import math
 import os
 import sqlite3
 import tempfile
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -35,7 +37,8 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.study.sweep.log import Log, read_log
 
 __all__ = ["STATUSES", "Row", "Store", "checked", "key_of", "pack", "plain"]
 
@@ -238,6 +241,18 @@ def _check(connection: sqlite3.Connection) -> None:
         raise _Damaged(f"{count} runs where the last one has the number {last}")
 
 
+def _tell_lost(path: Path, log: Log, connection: sqlite3.Connection) -> None:
+    """Warn of transactions of a log, as it was before the file was opened, that SQLite has not taken."""
+    _, read, _ = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+    page = connection.execute("PRAGMA page_size").fetchone()[0]
+    if read >= 0 and log.commits and read_log(path, page).salt == log.salt and (lost := log.lost(read)):
+        told = (
+            f"lost runs: up to {lost} runs at the end of the log of {path} cannot be read (power failure or damage); "
+            "a sweep computes them again, or take a copy of the file and of its log"
+        )
+        warnings.warn(told, MultiPhiWarning, stacklevel=4)
+
+
 def _unusable(path: Path, cause: str) -> MultiPhiValueError:
     return MultiPhiValueError(
         f"path: {path}: {cause}; need a sound file of this library's sweeps (a copy of it), or a new name, under which "
@@ -267,6 +282,7 @@ def _opened(path: Path) -> sqlite3.Connection:
         raise _unusable(path, f"cannot be read ({error.strerror})") from error
     if head[68:] != MARK.to_bytes(4, "big"):
         raise _unusable(path, "is no store of runs")
+    log = read_log(path, int.from_bytes(head[16:18], "big") or 1)
     try:
         connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
         try:
@@ -276,6 +292,7 @@ def _opened(path: Path) -> sqlite3.Connection:
                 versions = ", ".join(str(version) for (version,) in found)
                 raise _unusable(path, f"has format {versions or 'none'}, this version reads {FORMAT}")
             _check(connection)
+            _tell_lost(path, log, connection)
         except BaseException:
             connection.close()
             raise
