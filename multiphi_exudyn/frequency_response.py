@@ -16,9 +16,9 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.loads import StaticLoad
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.warning_groups import grouped, kept_back
 from multiphi_exudyn.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
 from multiphi_exudyn.structure import At
+from multiphi_exudyn.warning_groups import grouped, kept_back
 
 __all__ = ["FrequencyResponse", "frequency_response"]
 

@@ -26,10 +26,11 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiP
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.mode_choice import Tolerance
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.warning_groups import grouped, kept_back
+from multiphi_exudyn.reliability import warnings_of
 from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real
 from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.warning_groups import grouped, kept_back
 
 __all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "settled", "steady_state"]
 
@@ -189,7 +190,7 @@ class _Search:
         """Chunks until states repeat, Newton's method in between."""
         done, multiplier = 0, math.nan
         while True:
-            trajectory = self.map.run(x, v, CHUNK)
+            trajectory = self._run(x, v, CHUNK)
             self.warned.append(trajectory.warnings)
             if trajectory.status != "ok":
                 return self._failed(trajectory, done)
@@ -200,6 +201,10 @@ class _Search:
             if done >= periods:
                 return self._lost(chunk, done)
             x, v, multiplier = self._shot(chunk)
+
+    def _run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
+        trajectory = self.map.run(x, v, periods)
+        return replace(trajectory, warnings=warnings_of(trajectory))
 
     def _chunk(self, trajectory: Trajectory) -> _Chunk:
         whole = np.minimum(np.arange(CHUNK + 1) * self.map.period, trajectory.t_end)
@@ -224,7 +229,7 @@ class _Search:
     def _found(self, chunk: _Chunk, order: int, done: int, multiplier: float) -> SteadyState:
         residual = chunk.drifts[order - 1] / chunk.size if chunk.size else 0.0
         x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
-        shown = self.map.run(x, v, order)
+        shown = self._run(x, v, order)
         told = self._told(shown)
         return SteadyState("periodic", "", self.load, order, float(residual), multiplier, done, shown, x, v, told)
 

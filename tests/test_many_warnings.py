@@ -16,7 +16,6 @@ from small_study import ENVIRONMENT, METHODS, result_of, row
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.accuracy import study_report
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.accuracy.study_warnings import warned as warned_of_study
@@ -32,6 +31,7 @@ from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.text_table import text_table
 from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.warning_groups import grouped
 from reference_models.solver_settings import fixed_steps
 
 LINEAR = "linear range: moments differ by 30 % at the largest rotation; take a nonlinear model"
@@ -41,7 +41,7 @@ SHARE = "static share: contact stop lacks 86 % of its flexibility; take more mod
 @pytest.fixture
 def warning_runs(monkeypatch):
     """Every run warns twice, and is determined until half its time."""
-    monkeypatch.setattr(sys.modules["multiphi_exudyn.simulate"], "warnings_of", lambda trajectory: (LINEAR, SHARE))
+    monkeypatch.setattr(sys.modules["multiphi_exudyn.simulate"], "warnings_of", lambda *given: (LINEAR, SHARE))
     monkeypatch.setattr(Trajectory, "horizon", lambda self, tolerance: 0.5 * self.t_end)
 
 
@@ -114,7 +114,7 @@ def test_a_comparison_shows_what_its_models_warn_of_first(warning_runs, scene_fi
 
 
 def test_a_model_that_warns_of_nothing_is_shown_without_a_word(scene_file, monkeypatch):
-    monkeypatch.setattr(sys.modules["multiphi_exudyn.simulate"], "warnings_of", lambda trajectory: ())
+    monkeypatch.setattr(sys.modules["multiphi_exudyn.simulate"], "warnings_of", lambda *given: ())
     monkeypatch.setattr(Trajectory, "horizon", lambda self, tolerance: self.t_end)
     comparison = compare(bench_of(scene_file), ENVIRONMENT, progress=False)
     assert warned(comparison) == []

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.comparison.plots import png
@@ -16,6 +15,7 @@ from multiphi_exudyn.study.running.files import results_folder, write_whole
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.warning_groups import grouped
 
 __all__ = ["run_budget"]
 

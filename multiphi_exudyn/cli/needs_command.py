@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from tqdm import tqdm
 
-from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.running.needs import needs_of, needs_table
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.warning_groups import grouped
 
 __all__ = ["run_needs"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from multiphi_exudyn.warning_groups import grouped
 from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, longest, named, settings, words
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from multiphi_exudyn.study.sweep.store import Row
+from multiphi_exudyn.warning_groups import grouped
 
 __all__ = ["warned"]
 

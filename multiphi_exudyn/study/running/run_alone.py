@@ -20,9 +20,9 @@ import numpy as np
 
 from multiphi_exudyn.loads import Load
 from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.warning_groups import kept_back
 
 __all__ = ["Task", "run_alone"]
 

@@ -7,7 +7,6 @@ start. Online is the solver alone, from the start to the end of the run.
 from __future__ import annotations
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.warning_groups import kept_back
 from multiphi_exudyn.study.running.body_runner import run_user_object
 from multiphi_exudyn.study.running.craig_bampton_runner import run_craig_bampton
 from multiphi_exudyn.study.running.full_runner import run_full
@@ -24,6 +23,7 @@ from multiphi_exudyn.study.scene.scene_file import (
 )
 from multiphi_exudyn.study.scene.scenes import ModelSpec
 from multiphi_exudyn.study.scene.workbench import Workbench
+from multiphi_exudyn.warning_groups import kept_back
 
 __all__ = ["label_of", "run_model"]
 
