@@ -30,6 +30,9 @@ __all__ = [
 ]
 
 INACTIVE = "not active"
+HELD_GAP = "constraints hold its gap"
+HELD_GAPS = "constraints hold the gaps of its limit stops"
+IDLE = (INACTIVE, HELD_GAP, HELD_GAPS)  # reasons for which leaving an item out changes no motion
 NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"
@@ -135,8 +138,8 @@ def _members(kind: str, names: Sequence[str]) -> str:
 
 
 def missing_parts(left_out: Iterable[tuple[Item, str]]) -> list[str]:
-    """What a run of the model lacks, grouped; an item that is switched off acts in no run."""
-    return grouped((item, reason) for item, reason in left_out if reason != INACTIVE)
+    """What a run of the model lacks, grouped; what is switched off or held acts in no run."""
+    return grouped((item, reason) for item, reason in left_out if reason not in IDLE)
 
 
 def load_item(index: int, load: Mapping[str, Any], became: str = "") -> Item:
@@ -174,9 +177,9 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
     if not _is_active(item):
         return INACTIVE
     if _is_contact(item) and item["name"] not in contacts:
-        return _refusal(item) or "constraints hold its gap"
+        return _refusal(item) or HELD_GAP
     if has_stops(item) and not _stops(item, contacts):
-        return "constraints hold the gaps of its limit stops"
+        return HELD_GAPS
     if item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION):
         return "friction"
     if item["objectType"] in _ONE_SIDED:
