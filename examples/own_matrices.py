@@ -30,7 +30,7 @@ def main() -> mp.Trajectory:
         mp.UnilateralContact("stop", direction="end", gap=5e-3),  # rigid, below the end
         mp.UnilateralContact("buffer", direction={"middle": -1.0}, gap=8e-3, stiffness=1e5),  # above the middle
     ]
-    model = mp.MultiPhiModel(chain(), contacts, modes=8)
+    model = mp.MultiPhiModel(chain(), contacts)  # with all modes: there are few of them
     pulled = model.static_equilibrium({"end": 60.0})
     trajectory = mp.simulate(model, t_end=2.0, displacement=pulled)
     print(f"status {trajectory.status}; levels built: {trajectory.stats.levels_built} of 4")
@@ -42,6 +42,8 @@ def main() -> mp.Trajectory:
     print(f"energy [J]: start {ledger.initial:.6f}, impacts {ledger.impact:.6f}, damping {ledger.damping:.6f}, ")
     print(f"  truncation {ledger.truncation_kinetic + ledger.truncation_strain:.6f}, end {ledger.final:.6f}, ")
     print(f"  unaccounted for {ledger.residual:.1e}")
+    print("to distrust: " + ("; ".join(trajectory.warnings) or "nothing"))
+    print(f"sensitivity horizon (1 %): {trajectory.horizon(0.01):.2f} s of {trajectory.t_end:.2f} s")
     return trajectory
 
 

@@ -7,18 +7,17 @@ different curves. Without contact both are the linear response, amplitude = |p.(
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.loads import StaticLoad
 from multiphi_exudyn.model import MultiPhiModel
 from multiphi_exudyn.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
 from multiphi_exudyn.structure import At
-from multiphi_exudyn.warning_groups import grouped, kept_back
+from multiphi_exudyn.warning_groups import grouped, issue, kept_back
 
 __all__ = ["FrequencyResponse", "frequency_response"]
 
@@ -49,6 +48,11 @@ class FrequencyResponse:
     def amplitude(self, point: At) -> np.ndarray:
         """Half the range (k,) [m] of a point in a period of the load, the mean over those kept; NaN where failed."""
         return np.array([np.mean(state.amplitudes(point)) for state in self.states])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to distrust, one sentence of each kind."""
+        return grouped([state.warnings for state in self.states])
 
     def duty(self, contact: str) -> np.ndarray:
         """Part of the time (k,) that a contact is closed; NaN where failed."""
@@ -81,8 +85,7 @@ def frequency_response(
             if state.status != "failed":
                 x, v = state.displacement, state.velocity
     response = FrequencyResponse(np.array(frequencies, dtype=float), tuple(states))
-    for sentence in response.warnings:
-        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    issue(response.warnings)
     return response
 
 

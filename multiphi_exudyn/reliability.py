@@ -34,8 +34,8 @@ from multiphi_exudyn.trajectory import Trajectory
 __all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
-INDICATOR = 0.05  # of the motion, where every closed contact is compliant
-RIGID_INDICATOR = 0.06  # where a rigid one was struck: the defects of its many impacts partly cancel each other
+INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
+RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator more than the error
 PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,7 +20,7 @@ from multiphi_exudyn.driven.excitation import Excitation
 from multiphi_exudyn.driven.motion import DrivenMotion
 from multiphi_exudyn.driven.refinement import to_tolerance
 from multiphi_exudyn.driven.rule import DrivenRule
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.event_rule import EventRule
 from multiphi_exudyn.force_law import Contact
 from multiphi_exudyn.loads import Load
@@ -32,6 +31,7 @@ from multiphi_exudyn.reliability import warnings_of
 from multiphi_exudyn.structure import is_real
 from multiphi_exudyn.trajectory import Start, Trajectory
 from multiphi_exudyn.truncation import adapted
+from multiphi_exudyn.warning_groups import issue
 
 __all__ = ["quiet", "simulate", "started"]
 
@@ -66,8 +66,7 @@ def simulate(
     trajectory = quiet(model, t_end, displacement, velocity, loads, compiled)
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
-    for sentence in trajectory.warnings:
-        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    issue(trajectory.warnings)
     return trajectory
 
 

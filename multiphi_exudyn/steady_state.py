@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -22,7 +21,7 @@ from typing import TypeAlias
 import numpy as np
 
 from multiphi_exudyn.courses import Harmonic
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.mode_choice import Tolerance
 from multiphi_exudyn.model import MultiPhiModel
@@ -30,7 +29,7 @@ from multiphi_exudyn.reliability import warnings_of
 from multiphi_exudyn.shooting import PeriodMap, Shooting
 from multiphi_exudyn.structure import At, is_real
 from multiphi_exudyn.trajectory import Trajectory
-from multiphi_exudyn.warning_groups import grouped, kept_back
+from multiphi_exudyn.warning_groups import grouped, issue, kept_back
 
 __all__ = ["PeriodicLoad", "SteadyState", "at_frequency", "settled", "steady_state"]
 
@@ -109,12 +108,12 @@ def steady_state(
     load: HarmonicLoad, or BaseMotion with a Harmonic course. other_loads: constant ones. periods: of the load, after
     which a run that has not settled ends. tolerance: relative to the size of the motion, to which states repeat.
     A response that attracts slowly is found by Newton's method from where the run is; which response, where several
-    attract, follows from the start. Issues a MultiPhiWarning for each kind of its warnings.
+    attract, follows from the start. Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
+    has to be decided, by a run of ``simulate``.
     """
     with kept_back():
         state = settled(model, load, displacement, velocity, other_loads, periods, tolerance)
-    for sentence in state.warnings:
-        warnings.warn(sentence, MultiPhiWarning, stacklevel=2)
+    issue(state.warnings)
     return state
 
 
@@ -129,10 +128,12 @@ def settled(
 ) -> SteadyState:
     """What ``steady_state`` gives, without its MultiPhiWarning."""
     _check(model, load, other_loads, periods, tolerance)
+    model = model.decided or model
     n = model.structure.n
     x = np.zeros(n) if displacement is None else model.structure.vector("displacement", displacement)
     v = np.zeros(n) if velocity is None else model.structure.vector("velocity", velocity)
-    return _Search(PeriodMap(model, (load, *other_loads), 1.0 / frequency(load)), load, tolerance).settle(x, v, periods)
+    search = _Search(PeriodMap(model, (load, *other_loads), 1.0 / frequency(load)), load, tolerance)
+    return search.settle(x, v, periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
@@ -292,8 +293,10 @@ def _course(load: PeriodicLoad) -> Harmonic:
 def _check(
     model: MultiPhiModel, load: PeriodicLoad, other_loads: Sequence[StaticLoad], periods: int, tolerance: float
 ) -> None:
-    if isinstance(model.modes, Tolerance):
-        raise MultiPhiValueError("model modes: got a Tolerance, need a number of modes, 'all' or UpTo")
+    if isinstance(model.modes, Tolerance) and model.decided is None:
+        raise MultiPhiValueError(
+            "model modes: got a Tolerance that has not decided yet, need a run of simulate first, a number or 'all'"
+        )
     if not isinstance(load, (HarmonicLoad, BaseMotion)):
         raise MultiPhiTypeError(f"load: got {type(load).__name__}, need HarmonicLoad or BaseMotion")
     if frequency(load) == 0:

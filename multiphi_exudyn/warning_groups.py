@@ -1,4 +1,7 @@
-"""Warnings of many runs, grouped by kind: the text before a sentence's first colon (reliability.py)."""
+"""Warnings as they reach a user: issued once, those of many runs grouped by kind.
+
+A kind is the text before a sentence's first colon (reliability.py).
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiWarning
 
-__all__ = ["WarningGroup", "grouped", "kept_back"]
+__all__ = ["WarningGroup", "grouped", "issue", "kept_back"]
 
 NAMED = 5  # runs of a group that its sentence names
 
@@ -39,6 +42,12 @@ def grouped(runs: Iterable[tuple[str, Sequence[str]]]) -> tuple[WarningGroup, ..
             group = groups.setdefault(kind, WarningGroup(kind, (), rest))
             groups[kind] = WarningGroup(kind, tuple(dict.fromkeys((*group.runs, run))), group.example)
     return tuple(groups.values())
+
+
+def issue(sentences: Iterable[str]) -> None:
+    """Each as a MultiPhiWarning, at the line that has called the function which calls this one."""
+    for sentence in sentences:
+        warnings.warn(sentence, MultiPhiWarning, stacklevel=3)
 
 
 @contextmanager

@@ -126,6 +126,8 @@ NUMBERS = {
 }
 ALLOWED = {
     ("stiffness", "infinite"),  # rigid
+    ("modes", "none"),  # chosen
+    ("beyond", "none"),  # undamped, with a warning
     ("time of a gap", "array"),
     ("time of a gap", "list"),
     ("time of a gap", "truth"),

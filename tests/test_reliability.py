@@ -193,6 +193,39 @@ class TestIssued:
         assert (run.status, run.warnings) == ("failed", ())
 
 
+class TestSteadyState:
+    def load(self):
+        return mp.HarmonicLoad("m17", 20.0, 8.0)
+
+    def test_a_steady_state_tells_and_issues_its_own_once(self):
+        model = mp.MultiPhiModel(
+            chain(18, mass=0.5, stiffness=2e4, damping=mp.RayleighDamping(beta=1e-3)), [stop("m17", 1e-3, 1e6)], modes=8
+        )
+        with pytest.warns(mp.MultiPhiWarning) as issued:
+            found = mp.steady_state(model, self.load(), periods=32)
+        assert [str(one.message) for one in issued] == list(found.warnings)
+        assert {one.filename for one in issued} == {__file__}
+        assert "truncated contact" in kinds(found)
+
+    def test_a_frequency_response_issues_one_of_each_kind(self):
+        model = mp.MultiPhiModel(
+            chain(18, mass=0.5, stiffness=2e4, damping=mp.RayleighDamping(beta=1e-3)), [stop("m17", 1e-3, 1e6)], modes=8
+        )
+        with pytest.warns(mp.MultiPhiWarning) as issued:
+            found = mp.frequency_response(model, self.load(), [8.0, 8.1], periods=32)
+        assert [str(one.message) for one in issued] == list(found.warnings)
+        assert len(set(kinds(found))) == len(found.warnings)
+        assert "(one of 2 in 2 runs)" in next(s for s in found.warnings if s.startswith("truncated contact"))
+
+    def test_a_tolerance_that_has_decided_is_taken(self):
+        model = mp.MultiPhiModel(chain(3, damping=mp.ModalDamping(0.1)), modes=mp.Tolerance(0.01))
+        load = mp.HarmonicLoad("m2", 1.0, 0.1)
+        with pytest.raises(mp.MultiPhiValueError, match="a Tolerance that has not decided yet"):
+            mp.steady_state(model, load)
+        mp.simulate(model, 1.0, velocity=np.ones(3))
+        assert mp.steady_state(model, load).trajectory.model is model.decided
+
+
 class TestHorizon:
     def test_a_motion_without_contact_has_none(self):
         run = mp.simulate(mp.MultiPhiModel(chain(3), modes="all"), 20.0, velocity=np.ones(3))
