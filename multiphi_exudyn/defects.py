@@ -19,6 +19,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from multiphi_exudyn.trajectory import Trajectory
 from multiphi_exudyn.transition import LoadedLevel
 
 __all__ = ["Defect", "DefectHistory", "defects"]
+
+Sample: TypeAlias = tuple[LoadedLevel, np.ndarray, np.ndarray]
 
 SAMPLES = 100  # of the motion, for its mean square
 
@@ -54,15 +57,18 @@ class DefectHistory:
     """The defects of a run in arrays.
 
     parts: the run's segments. table: its events, as ``event_table`` has them. starts: (s,) [s], levels: of every
-    segment. places: of the segments that begin with a defect. squares: (s,) its |.|^2 [m2 kg], else zero.
+    segment. places: of the segments that begin with a defect. squares: (s,) its |.|^2 [m2 kg], else zero. samples:
+    level, eta and eta' (r, k) at times evenly spaced over [0, end].
     """
 
+    end: float
     parts: list[Batch]
     table: np.ndarray
     starts: np.ndarray
     levels: list[LoadedLevel]
     places: list[int]
     squares: np.ndarray
+    samples: list[Sample]
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> DefectHistory:
@@ -75,9 +81,15 @@ class DefectHistory:
             starts[part.places] = part.starts
             for place in part.places.tolist():
                 levels[place] = part.level
-            k, r = len(part.places), len(part.shapes)
-            both = part.states(np.tile(np.arange(k), 2), np.concatenate([np.zeros(k), part.ends - part.starts]))
-            first[:, part.places, :r], last[:, part.places, :r] = both[:, :k], both[:, k:]
+        times = np.linspace(0.0, trajectory.t_end, SAMPLES)
+        owners, samples = np.searchsorted(starts, times, side="right") - 1, list[Sample]()
+        for part in parts:
+            k, r, (rows, own) = len(part.places), len(part.shapes), _rows(part, owners)
+            every = np.arange(k)
+            after = np.concatenate([np.zeros(k), part.ends - part.starts, times[own] - part.starts[rows]])
+            states = part.states(np.concatenate([every, every, rows]), after)
+            first[:, part.places, :r], last[:, part.places, :r] = states[:, :k], states[:, k : 2 * k]
+            samples.append((part.level, states[0, 2 * k :].T, states[1, 2 * k :].T))
         stopped = _stopped(table, starts)
         squares[0] = _at_start(trajectory, levels[0], stopped.get(0, ()), first[:, 0])
         ways = _ways(levels, stopped)
@@ -86,36 +98,37 @@ class DefectHistory:
             way = _way(levels[found[0] - 1], levels[found[0]], struck)
             squares[entered] = way.squares(last[:, entered - 1], first[:, entered])
         places = sorted([0, *(place for found in ways.values() for place in found)])
-        return cls(parts, table, starts, levels, places, squares)
+        return cls(trajectory.t_end, parts, table, starts, levels, places, squares, samples)
 
-    def amplitude(self, end: float) -> float:
-        """Root of the mean square of y over [0, end]."""
-        squares = (np.sum(level.configuration(eta) ** 2) for level, eta, _ in self._sampled(end))
-        return math.sqrt(float(sum(squares)) / SAMPLES)
-
-    def largest_energy(self, end: float) -> float:
-        """The largest kinetic + strain energy [J] in [0, end], without its sign."""
-        energies = (level.kinetic(eta_t) + level.strain(eta) for level, eta, eta_t in self._sampled(end))
-        return max(float(np.max(np.abs(energy))) for energy in energies)
+    @property
+    def largest_energy(self) -> float:
+        """The largest kinetic + strain energy [J] of the run, without its sign."""
+        energies = (level.kinetic(eta_t) + level.strain(eta) for level, eta, eta_t in self.samples)
+        return max(float(np.max(np.abs(energy), initial=0.0)) for energy in energies)
 
     def indicator(self, end: float) -> float:
         """The truncation indicator of [0, end] (truncation.py)."""
         lost = float(np.sum(self.squares[self.starts <= end]))
-        amplitude = self.amplitude(end)
+        samples = self.samples if end == self.end else self._sampled(end)
+        amplitude = math.sqrt(sum(float(np.sum(level.configuration(eta) ** 2)) for level, eta, _ in samples) / SAMPLES)
         if amplitude == 0:
             return math.inf if lost else 0.0
         return math.sqrt(lost) / amplitude
 
-    def _sampled(self, end: float) -> Iterator[tuple[LoadedLevel, np.ndarray, np.ndarray]]:
-        """eta and eta' (r, k) at times evenly spaced over [0, end], level by level."""
+    def _sampled(self, end: float) -> Iterator[Sample]:
         times = np.linspace(0.0, end, SAMPLES)
         owners = np.searchsorted(self.starts, times, side="right") - 1
         for part in self.parts:
-            rows = np.minimum(np.searchsorted(part.places, owners), len(part.places) - 1)
-            own = part.places[rows] == owners
-            if np.any(own):
-                eta, eta_t = part.states(rows[own], times[own] - part.starts[rows[own]])
-                yield part.level, eta.T, eta_t.T
+            rows, own = _rows(part, owners)
+            eta, eta_t = part.states(rows, times[own] - part.starts[rows])
+            yield part.level, eta.T, eta_t.T
+
+
+def _rows(part: Batch, owners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the segments (k,) by their places are in a batch: their rows in it (j,), and whether they are (k,)."""
+    rows = np.minimum(np.searchsorted(part.places, owners), len(part.places) - 1)
+    own = part.places[rows] == owners
+    return rows[own], own
 
 
 @dataclass(frozen=True)

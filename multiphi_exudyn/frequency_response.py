@@ -49,11 +49,6 @@ class FrequencyResponse:
         """Half the range (k,) [m] of a point in a period of the load, the mean over those kept; NaN where failed."""
         return np.array([np.mean(state.amplitudes(point)) for state in self.states])
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to distrust, one sentence of each kind."""
-        return grouped([state.warnings for state in self.states])
-
     def duty(self, contact: str) -> np.ndarray:
         """Part of the time (k,) that a contact is closed; NaN where failed."""
         return np.array([state.duty(contact) for state in self.states])

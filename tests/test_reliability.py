@@ -112,6 +112,12 @@ class TestTruncation:
         run = mp.simulate(mp.MultiPhiModel(chain(40), modes=2), 1.0, displacement=np.eye(40)[20])
         assert kinds(run) == ["lost energy", "truncation"]
 
+    def test_a_start_of_which_the_modes_hold_nothing_is_said(self):
+        structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 100.0]))
+        run = mp.simulate(mp.MultiPhiModel(structure, modes=1), 1.0, velocity=np.eye(2)[1])
+        assert kinds(run) == ["lost energy", "truncation"]
+        assert "took 1e+02 %" in run.warnings[0]
+
     def test_nothing_is_said_of_a_structure_at_rest(self):
         assert mp.simulate(mp.MultiPhiModel(chain(40), [stop("m3", 0.0, 10.0)], modes=2), 1.0).warnings == ()
 

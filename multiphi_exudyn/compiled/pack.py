@@ -109,6 +109,11 @@ class Pack:
             self._positions[indices] = self._add(level) if runs else None
         return self._positions[indices]
 
+    def known(self, level: LoadedLevel) -> int | None:
+        """Where a level stands, None where it has not been packed."""
+        position = self._positions.get(level.level.indices)
+        return position if position is not None and self.loaded[position] is level else None
+
     def connect(self) -> None:
         """Pack the ways between packed levels that the rule has computed since."""
         if (self.rule.mapped, len(self.loaded)) == self._seen:

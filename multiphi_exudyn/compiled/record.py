@@ -121,7 +121,11 @@ class Record:
         """A segment of the NumPy loop."""
         self.make_room()
         self.spans[self.count] = segment.start, segment.end, segment.armed_at, segment.level.level.highest_frequency
-        self.levels[self.count] = UNPACKED
+        position = self._pack.known(segment.level)
+        self.levels[self.count] = UNPACKED if position is None else position
+        if position is not None:
+            c = segment.coefficients
+            self.coefficients[self.count, :, : len(c)] = c.real, c.imag
         self.made[self.count] = segment
         self.count += 1
 
