@@ -108,6 +108,7 @@ class LinearRange:
                     trajectory.displacement(t),
                     trajectory.velocity(t),
                     extent,
+                    TOLERANCE,
                     t,
                     {name: float(trajectory.contact_force(name, t)) for name in known},
                 )
@@ -155,7 +156,7 @@ class LinearRange:
             return True  # nothing acts on it
         extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
         with self._linear.beside(self._mbs) as compared:
-            return compared.error(size * shape, size * rate * shape, extent) <= TOLERANCE
+            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE) <= TOLERANCE
 
 
 class LinearLimits:
