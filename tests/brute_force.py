@@ -26,12 +26,15 @@ STEP = 0.35  # times the fastest rate of any level: a step
 NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
 TERMS = 16  # of the exponential's series inside a step
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
-TOUCH = 1e-10  # of the same: a signal has fallen below zero, above what constraints drift by in a run
-SOON = 1e-5  # of a step: after which a signal that an instant has left at zero has a sign
+TOUCH = 1e-11  # of the same: a signal has fallen below zero, above what constraints drift by in a run
+SOON = 1e-7  # of a step: after which a signal that an instant has left at zero has a sign
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
 LEAST, BLOCK = 8, 64  # steps between two looks at the signs
 MOST_EVENTS = 600  # more are given up
-ROCKING, SLOW = 6, 1e-5  # instants close together, of speeds below a share of the scene's: an end of endless impacts
+MOST_ROCKING, SLOW = (
+    6,
+    1e-7,
+)  # instants close together, of speeds below a share of the scene's: an end of endless impacts
 FINE = 17  # places in two steps at which a dip is looked for
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
@@ -96,9 +99,9 @@ class Answer:
     impact: float = 0.0
 
 
-def solved(system, displacement, velocity, times):
-    """Motion from t = 0 at times (k,), ascending."""
-    return _Integration(system, np.asarray(times, float)).run(displacement, velocity)
+def solved(system, displacement, velocity, times, slow=SLOW):
+    """Motion from t = 0 at times (k,), ascending; slow: share of the scene's speeds at which endless impacts end."""
+    return _Integration(system, np.asarray(times, float), slow).run(displacement, velocity)
 
 
 @dataclass(frozen=True)
@@ -124,8 +127,8 @@ class _Level:
 
 
 class _Integration:
-    def __init__(self, system, times):
-        self.system, self.times = system, times
+    def __init__(self, system, times, slow):
+        self.system, self.times, self.slow = system, times, slow
         self.n, self.c = len(system.mass), len(system.stops)
         self.inverse = np.linalg.inv(system.mass)
         self.rows = np.array([s.row for s in system.stops]).reshape(self.c, self.n)
@@ -296,7 +299,7 @@ class _Integration:
                     raise NoAnswer("too many events")
                 rocking = rocking + 1 if t - before <= 100 * self._moment(t) else 0
                 before = t
-                if rocking > ROCKING:
+                if rocking > MOST_ROCKING:
                     y = self._at_rest(y, t)
                 state, y = self._settled(state, y, t, answer)
         if shown < len(self.times):
@@ -371,6 +374,7 @@ class _Integration:
             curved[:-1] |= low
             curved[1:] |= low
         curved[0] |= s[0] < 4 * np.abs(s[1] - s[0])
+        curved[-1] |= s[-1] < 4 * np.abs(s[-1] - s[-2])
         for j in np.flatnonzero(np.any(below | curved, axis=1)):
             roots = [
                 self._root(level, i, times, states, j, allowed[j + 1, i]) for i in np.flatnonzero(below[j] | curved[j])
@@ -399,7 +403,10 @@ class _Integration:
         above = int(np.flatnonzero(values[: below[0]] > 0)[-1]) if np.any(values[: below[0]] > 0) else -1
         if above < below[0] - 1:  # round-off of zero before it falls
             return places[max(above + 1, 0)]
-        return brentq(s, places[above], places[above + 1], xtol=1e-15 * times[-1], rtol=1e-14)
+        ends = places[above], places[above + 1]
+        if s(ends[0]) <= 0:  # round-off of zero, by another order of sums
+            return ends[0]
+        return brentq(s, *ends, xtol=1e-15 * times[-1], rtol=1e-14)
 
     def _show(self, answer, level, piece, shown):
         """Fills in the times asked for that lie in the piece."""
@@ -439,7 +446,7 @@ class _Integration:
     def _at_rest(self, y, t):
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
         w = self._inputs(np.array([t]))[0]
-        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= SLOW * self.speed]
+        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= self.slow * self.speed]
         if not slow:
             return y
         rows, u = self.rows[slow], np.array([self._rate(i, y, w) for i in slow])

@@ -251,7 +251,7 @@ def _wave(parts, amplitude, frequency=None):
         lambda t: amplitude * np.cos(omega * t + phase),
         lambda t: -amplitude * omega * np.sin(omega * t + phase),
         lambda t: -amplitude * omega**2 * np.cos(omega * t + phase),
-        step=1.5 / omega,
+        step=bf.STEP / omega,
     )
     return (amplitude, frequency, phase), course
 
@@ -320,7 +320,7 @@ def _function_load(parts):
         parts.load(
             row,
             mp.FunctionLoad(row, lambda t: size * np.sin(a * t + b) * np.exp(-c * t)),
-            bf.Course(lambda t: size * np.sin(a * t + b) * np.exp(-c * t), step=1 / (a + c)),
+            bf.Course(lambda t: size * np.sin(a * t + b) * np.exp(-c * t), step=bf.STEP / (a + c)),
         )
         return
     places = random.uniform(0.05, 0.8, 1 if kind == "narrow" else 3) * end
@@ -366,7 +366,7 @@ def _swept(parts, amplitude, end):
         omega, change = 2 * math.pi * hertz(t), 2 * math.pi * rising(t)
         return np.where(on(t), -amplitude * (omega**2 * np.cos(phase(t)) + change * np.sin(phase(t))), 0.0)
 
-    course = bf.Course(value, rate, acceleration, breaks=(duration,), step=1 / (2 * math.pi * max(first, last)))
+    course = bf.Course(value, rate, acceleration, breaks=(duration,), step=bf.STEP / (2 * math.pi * max(first, last)))
     return (amplitude, float(first), float(last), duration, law), course
 
 
@@ -393,7 +393,7 @@ def _way(parts, amplitude, *, whole=True):
         lambda t: (
             -amplitude * ((a**2 + b**2) * np.sin(a * t) * np.cos(b * t) + 2 * a * b * np.cos(a * t) * np.sin(b * t))
         ),
-        step=1 / (a + b),
+        step=bf.STEP / (a + b),
     )
     return made, course
 
