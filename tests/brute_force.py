@@ -99,9 +99,9 @@ class Answer:
     impact: float = 0.0
 
 
-def solved(system, displacement, velocity, times, slow=SLOW):
-    """Motion from t = 0 at times (k,), ascending; slow: share of the scene's speeds at which endless impacts end."""
-    return _Integration(system, np.asarray(times, float), slow).run(displacement, velocity)
+def solved(system, displacement, velocity, times, touch=TOUCH):
+    """Motion from t = 0 at times (k,), ascending; touch: of the scene's lengths, see TOUCH."""
+    return _Integration(system, np.asarray(times, float), touch).run(displacement, velocity)
 
 
 @dataclass(frozen=True)
@@ -127,8 +127,8 @@ class _Level:
 
 
 class _Integration:
-    def __init__(self, system, times, slow):
-        self.system, self.times, self.slow = system, times, slow
+    def __init__(self, system, times, touch):
+        self.system, self.times, self.touch = system, times, touch
         self.n, self.c = len(system.mass), len(system.stops)
         self.inverse = np.linalg.inv(system.mass)
         self.rows = np.array([s.row for s in system.stops]).reshape(self.c, self.n)
@@ -182,7 +182,7 @@ class _Integration:
             stiff += np.max(np.abs(np.diff(law.forces) / np.diff(law.knots))) * np.outer(law.row, law.row)
         matrix = np.block([[np.zeros_like(stiff), np.eye(self.n)], [-self.inverse @ stiff, -self.inverse @ damped]])
         omega = np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stiff))))
-        return max(omega, np.max(np.abs(np.linalg.eigvals(matrix))))
+        return max(omega, np.max(np.abs(np.linalg.eigvals(matrix))), 1 / self.times[-1])
 
     # ------------------------------------------------------------------ levels
 
@@ -366,7 +366,7 @@ class _Integration:
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
         allowed = ZERO * (np.abs(states) @ np.abs(level.signals).T + np.abs(inputs) @ np.abs(level.signal_inputs).T)
         largest = np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.c])
-        allowed = np.maximum.accumulate(allowed + TOUCH * (np.abs(level.signals) @ largest), axis=0)
+        allowed = np.maximum.accumulate(allowed + self.touch * (np.abs(level.signals) @ largest), axis=0)
         below = s[1:] < -allowed[1:]
         curved = np.zeros_like(below)
         if len(s) > 2:
@@ -393,13 +393,15 @@ class _Integration:
             return values if np.ndim(tau) else float(values[0])
 
         moment = SOON * min(width, STEP / self._rate_of_all)
-        at_zero = j == 0 and abs(s(0.0)) <= 100 * allowed  # where an instant has left it: a moment later it has a sign
+        at_zero = j == 0 and abs(s(0.0)) <= 5 * allowed  # where an instant has left it: a moment later it has a sign
         first = min(moment, width) if at_zero else 0.0
         places = first + (width - first) * (np.linspace(0, 1, FINE) ** 2)
         values = s(places)
         below = np.flatnonzero(values < -allowed)
         if not len(below):
             return None
+        if below[0] == 0:
+            return first
         above = int(np.flatnonzero(values[: below[0]] > 0)[-1]) if np.any(values[: below[0]] > 0) else -1
         if above < below[0] - 1:  # round-off of zero before it falls
             return places[max(above + 1, 0)]
@@ -446,7 +448,7 @@ class _Integration:
     def _at_rest(self, y, t):
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
         w = self._inputs(np.array([t]))[0]
-        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= self.slow * self.speed]
+        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= SLOW * self.speed]
         if not slow:
             return y
         rows, u = self.rows[slow], np.array([self._rate(i, y, w) for i in slow])
@@ -458,7 +460,7 @@ class _Integration:
     def _touching(self, y, w):
         gaps = self.rows @ y[: self.n] + [s.gap for s in self.system.stops]
         gaps -= [0.0 if k is None else w[k] for k in self.ways]
-        near = [i for i in self.rigid if gaps[i] <= 10 * TOUCH * self.length]
+        near = [i for i in self.rigid if gaps[i] <= 10 * self.touch * self.length * np.sum(np.abs(self.rows[i]))]
         if any(gaps[i] < -1e-6 * self.length for i in near):
             raise NoAnswer("inside a rigid stop")
         return near

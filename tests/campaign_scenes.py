@@ -555,10 +555,10 @@ def _truncated(random):
     if random.random() < 0.4:
         ratios = np.full(n, 0.03)
         parts.damping = mp.ModalDamping(ratios)
-    _contacts(parts, str(random.choice(["compliant", "rigid", "mixed"])))
+    _contacts(parts, str(random.choice(["compliant", "rigid", "mixed"])), int(random.integers(1, min(3, n - 1) + 1)))
     if random.random() < 0.3:
         _harmonic_load(parts)
-    modes = int(random.integers(1, max(1, n - len(parts.contacts)) + 1))
+    modes = int(random.integers(1, n - len(parts.contacts) + 1))
     return replace(parts.scene(velocity=_moving(parts), modes=modes), system=None)
 
 

@@ -1,0 +1,149 @@
+"""The campaign of what users bring: reproducible scenes, brute force that is right, judges that see what is broken."""
+
+import dataclasses
+import math
+
+import brute_force as bf
+import campaign_judge
+import numpy as np
+import pytest
+import random_campaign
+from campaign_scenes import KINDS, numbers, scene_of
+from random_campaign import differences, judged, main
+
+import multiphi_exudyn as mp
+
+LIGHT = dict.fromkeys(KINDS, (3, 4)) | {
+    "functions": (0, 1),
+    "units": (0, 1),
+    "moving bases": (2, 3),
+    "rigid": (0, 1),
+    "several": (1, 2),
+    "sampled": (0, 1),
+    "truncated": (0, 1),
+}  # quick ones
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scenes_of_every_kind_are_right(kind):
+    for number in LIGHT[kind]:
+        assert [verdict for verdict, _ in judged(kind, number)[0]] == ["ok"]
+
+
+def test_a_scene_comes_from_its_kind_and_number_alone():
+    first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
+    assert np.array_equal(first.velocity, again.velocity)
+    assert first.t_end == again.t_end != other.t_end
+    assert numbers(("rigid", "free"), 3, 3) == [("rigid", 3), ("free", 3), ("rigid", 4)]
+
+
+class TestBruteForce:
+    """Against motions that are known exactly."""
+
+    def test_strikes_and_leaves_a_rigid_stop(self):
+        """Mass 1, spring 1, x' = -1 at x = 0 over a stop at -0.5: struck at 30 degrees, then at rest on it."""
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.eye(1), [bf.Stop(np.ones(1), 0.5)])
+        end = math.pi / 6 + 1.0
+        answer = bf.solved(system, np.zeros(1), -np.ones(1), np.array([0.5, math.pi / 6 + 0.5, end]))
+        assert answer.displacement[0] == pytest.approx(
+            [-math.sin(0.5), -0.5 * math.cos(0.5), -0.5 * math.cos(1.0)], abs=1e-13
+        )
+        assert answer.impulse[0] == pytest.approx(math.cos(math.pi / 6), abs=1e-13)
+        assert answer.impact == pytest.approx(0.375, abs=1e-13)
+
+    def test_swings_on_a_compliant_stop(self):
+        """Mass 1 without a spring against 4 N/m: half a period of 2 rad/s, and back."""
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), [bf.Stop(np.ones(1), 0.0, 4.0)])
+        answer = bf.solved(system, np.zeros(1), -np.ones(1), np.array([math.pi / 4, math.pi / 2 + 1.0]))
+        assert answer.displacement[0] == pytest.approx([-0.5, 1.0], abs=1e-13)
+        assert answer.impulse[0] == pytest.approx(2.0, abs=1e-13)
+
+    def test_follows_a_resonant_load(self):
+        """x'' + x = cos t from rest: x = t sin(t) / 2."""
+        load = (np.ones(1), bf.Course(np.cos))
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.eye(1), loads=[load])
+        times = np.linspace(0.1, 20, 30)
+        answer = bf.solved(system, np.zeros(1), np.zeros(1), times)
+        assert np.max(np.abs(answer.displacement[0] - times * np.sin(times) / 2)) < 1e-12
+
+    def test_rests_on_a_stop_that_carries_it_away(self):
+        """A free mass pressed with 1 N on a stop whose acceleration is at most 0.5 m/s2: it never leaves it."""
+        way = bf.Course(lambda t: 0.5 * (1 - np.cos(t)), lambda t: 0.5 * np.sin(t), lambda t: 0.5 * np.cos(t), step=0.3)
+        system = bf.System(
+            np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), [bf.Stop(np.ones(1), 0.0, course=way)], constant=-np.ones(1)
+        )
+        times = np.linspace(0.1, 6, 7)
+        answer = bf.solved(system, np.zeros(1), np.zeros(1), times)
+        assert np.max(np.abs(answer.displacement[0] - 0.5 * (1 - np.cos(times)))) < 1e-12
+        assert answer.impulse[0] == pytest.approx(times[-1] + 0.5 * math.sin(times[-1]), abs=1e-12)
+
+
+class TestJudge:
+    """An answer that is broken on purpose is told."""
+
+    KIND, NUMBER = "rigid", 0
+
+    def verdict(self):
+        return [kind for kind, _ in judged(self.KIND, self.NUMBER)[0]]
+
+    def test_tells_an_event_at_another_time(self, monkeypatch):
+        """A stop that stands 1e-5 of its gap elsewhere."""
+        simulate = mp.simulate
+
+        def shifted(model, *given, **named):
+            contacts = [dataclasses.replace(c, gap=c.gap * (1 + 1e-5)) for c in model.contacts]
+            return simulate(dataclasses.replace(model, contacts=contacts), *given, **named)
+
+        monkeypatch.setattr("campaign_judge.mp.simulate", shifted)
+        assert "failure: wrong" in self.verdict()
+
+    def test_tells_an_impulse_that_is_lost(self, monkeypatch):
+        impulse = mp.Trajectory.contact_impulse
+        monkeypatch.setattr(mp.Trajectory, "contact_impulse", lambda *given: 0.999 * impulse(*given))
+        assert self.verdict() == ["failure: impulse"]
+
+    def test_tells_a_run_that_fails(self, monkeypatch):
+        simulate = mp.simulate
+        failed = {"status": "failed", "message": "at t = 1 s: chatter: too many"}
+        monkeypatch.setattr(
+            "campaign_judge.mp.simulate", lambda *g, **n: dataclasses.replace(simulate(*g, **n), **failed)
+        )
+        assert self.verdict() == ["chatter"]
+
+    def test_tells_energy_that_is_lost(self, monkeypatch):
+        monkeypatch.setattr(mp.Ledger, "residual", property(lambda ledger: 1e-6 * ledger.initial))
+        assert self.verdict() == ["failure: ledger"]
+
+    def test_excuses_no_motion_that_a_nudge_does_not_change(self):
+        scene = scene_of(self.KIND, self.NUMBER)
+        motion = campaign_judge.native(scene)
+        assert not campaign_judge.sensitive(scene, motion, campaign_judge.INSTANTS)
+
+
+class TestKernels:
+    """The same cases under several kernels of the linear algebra library."""
+
+    def test_equal_answers_do_not_differ(self):
+        other = {"rigid/0": ["ok", 4, [1.0, 2.0 + 1e-9]]}
+        assert differences({"a": {"rigid/0": ["ok", 4, [1.0, 2.0]]}, "b": other}) == []
+
+    @pytest.mark.parametrize(
+        ("other", "said"),
+        [
+            (["chatter", 4, [1.0]], "status ok, chatter"),
+            (["ok", 6, [1.0, 2.0]], "4 and 6 events"),
+            (["ok", 4, [1.0, 2.1]], "answers 0.05 apart, 4 and 4 events"),
+        ],
+    )
+    def test_what_differs_is_told(self, other, said):
+        first = {"rigid/0": ["ok", 4, [1.0, 2.0]]}
+        assert differences({"a": first, "b": {"rigid/0": other}}) == [f"rigid 0  a and b: {said}"]
+
+    def test_a_kernel_that_does_not_run_is_refused(self, monkeypatch, capsys, tmp_path):
+        monkeypatch.setenv("OPENBLAS_CORETYPE", "Abacus")
+        with pytest.raises(SystemExit):
+            main(["--count", "1", "--out", str(tmp_path / "chunks")])
+        assert "the library runs" in capsys.readouterr().err
+
+    def test_the_running_kernel_has_a_name(self):
+        assert random_campaign.kernel() != "unknown"
