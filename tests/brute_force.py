@@ -36,6 +36,7 @@ MOST_ROCKING, SLOW = (
     1e-7,
 )  # instants close together, of speeds below a share of the scene's: an end of endless impacts
 FINE = 17  # places in two steps at which a dip is looked for
+ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
 
@@ -427,6 +428,7 @@ class _Integration:
         """The state after an instant, and y behind its impacts."""
         w = self._inputs(np.array([t]))[0]
         touching = self._touching(y, w)
+        y = self._without_drift(y, w, touching)
         y = self._struck(y, w, touching, answer)
         resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
         best, worst = None, np.inf
@@ -456,6 +458,21 @@ class _Integration:
         y = y.copy()
         y[self.n : 2 * self.n] += self.inverse @ rows.T @ impulses
         return y
+
+    def _without_drift(self, y, w, touching):
+        """y with round-off of the gaps of what touches taken away, which a long contact has added up."""
+        if not touching:
+            return y
+        rows = self.rows[touching]
+        gaps = [rows[k] @ y[: self.n] + self._offset(i, w) for k, i in enumerate(touching)]
+        pulled = np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ np.array(gaps)
+        y = y.copy()
+        y[: self.n] -= self.inverse @ rows.T @ pulled
+        return y
+
+    def _offset(self, i, w):
+        """gap_i - z_i [m]."""
+        return self.system.stops[i].gap - (0.0 if self.ways[i] is None else w[self.ways[i]])
 
     def _touching(self, y, w):
         gaps = self.rows @ y[: self.n] + [s.gap for s in self.system.stops]
@@ -563,8 +580,8 @@ class _Integration:
                 if i in resting:
                     size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
                     if state[i] == "open":
+                        value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self._rate_of_all * share * tau) ** 2
-                        value = value if abs(value) > 1e-14 * self.length else 0.0
                     worst = max(worst, -value / size if size else 0.0)
         return worst
 
