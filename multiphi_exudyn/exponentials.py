@@ -1,8 +1,9 @@
 """Exponentials: the functions of time that a motion between events is made of, and their derivatives and integrals.
 
-    phi_j(t) = t^d_j exp(lambda_j t)
+    phi_j(t) = (t / T)^d_j exp(lambda_j t)
 
-lambda (p,) complex [1/s]. Powers d > 0 belong to nearly critical, rigid-body and resonant motion.
+lambda (p,) complex [1/s], T the unit [s] in which powers count time: high powers of seconds leave the range of numbers
+where a motion lasts microseconds or years. Powers d > 0 belong to nearly critical, rigid-body and resonant motion.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ SERIES_ROUND_OFF = 1e-18  # of 1: terms of that series below it are left out
 
 @dataclass(frozen=True)
 class Exponentials:
-    """The functions phi_j(t) = t^d_j exp(lambda_j t).
+    """The functions phi_j(t) = (t / unit)^d_j exp(lambda_j t).
 
-    rates: lambda (p,) complex, 1/s. powers: d (p,) int; j with d_j > 0 follows its d_j - 1 directly.
+    rates: lambda (p,) complex, 1/s. powers: d (p,) int; j with d_j > 0 follows its d_j - 1 directly. unit: T [s].
     """
 
     rates: np.ndarray
     powers: np.ndarray
+    unit: float = 1.0
 
     @functools.cached_property
     def pure(self) -> bool:
@@ -42,7 +44,7 @@ class Exponentials:
         times = np.asarray(t, dtype=float)[..., None] if isinstance(t, np.ndarray) else t
         values = np.exp(times * self.rates)
         if not self.pure:
-            values[..., self._chained] *= times ** self.powers[self._chained]
+            values[..., self._chained] *= (times / self.unit) ** self.powers[self._chained]
         return np.asarray(values)
 
     def derivative(self, coefficients: np.ndarray) -> np.ndarray:
@@ -50,20 +52,20 @@ class Exponentials:
         result = coefficients * self.rates
         if not self.pure:
             chained = self._chained
-            result[..., chained - 1] += self.powers[chained] * coefficients[..., chained]
+            result[..., chained - 1] += self.powers[chained] / self.unit * coefficients[..., chained]
         return result
 
     def integrals(self, duration: float) -> np.ndarray:
         """Integral of every phi_j over [0, duration], (p,)."""
-        return exponential_integrals(self.rates, self.powers, duration)
+        return exponential_integrals(self.rates, self.powers, duration, self.unit)
 
     def shifted(self, coefficients: np.ndarray, delay: float) -> np.ndarray:
         """Coefficients (..., p) of the same function from a later start: f(t) = g(t + delay)."""
         result = coefficients * np.exp(delay * self.rates)
-        return result if self.pure else result @ self._translation(delay)
+        return result if self.pure else result @ self._translation(delay / self.unit)
 
     def _translation(self, delay: float) -> np.ndarray:
-        """(t + delay)^d expanded in powers of t, as a matrix from old to new coefficients."""
+        """(t + delay)^d expanded in powers of t, both in units, as a matrix from old to new coefficients."""
         matrix = np.eye(len(self.powers))
         for j in self._chained:
             degree, binomial = int(self.powers[j]), 1.0
@@ -73,12 +75,13 @@ class Exponentials:
         return matrix
 
 
-def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float) -> np.ndarray:
-    """Integral of t^d exp(s t) over [0, duration], elementwise; d small.
+def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float, unit: float) -> np.ndarray:
+    """Integral of (t / unit)^d exp(s t) over [0, duration], elementwise; d small.
 
-    By parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
+    In units of time: by parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
     """
     exponents = rates * duration
+    rates, duration = rates * unit, duration / unit
     small = np.abs(exponents) < SERIES_BELOW + powers
     safe = np.where(small, 1.0, rates)
     by_parts = np.where(small, 0.0, np.expm1(exponents) / safe)
@@ -92,4 +95,4 @@ def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float
     for degree in range(1, int(np.max(powers, initial=0)) + 1):
         raised = (duration**degree * np.exp(exponents) - degree * by_parts) / safe
         by_parts = np.where(powers >= degree, raised, by_parts)
-    return np.where(small, series * duration ** (powers + 1.0), by_parts)
+    return unit * np.where(small, series * duration ** (powers + 1.0), by_parts)

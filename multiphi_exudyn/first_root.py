@@ -1,9 +1,9 @@
 """First descent of a sum of exponentials through zero, certified: no crossing is stepped over.
 
-    g(t) = constant + Re sum_j a_j t^d_j exp(lambda_j t) >= 0 at t = 0;   wanted: the first t with g falling below 0
+    g(t) = constant + Re sum_j a_j (t/T)^d_j exp(lambda_j t) >= 0 at t = 0;   wanted: the first t with g falling below 0
 
 Between two samples a distance h apart g differs from its cubic Hermite interpolant by at most
-h^4/384 max|g''''|, and max|g^(k)| <= sum_j |a_j^(k)| t^d_j exp(Re lambda_j t) is known in closed form. A cubic
+h^4/384 max|g''''|, and max|g^(k)| <= sum_j |a_j^(k)| (t/T)^d_j exp(Re lambda_j t) is known in closed form. A cubic
 lies above the smallest of its four Bernstein coefficients, so
 
     min(g0, g0 + h g0'/3, g1 - h g1'/3, g1) > h^4/384 max|g''''|
@@ -168,7 +168,7 @@ class DescentFinder:
             if self.basis.pure:
                 found = (np.abs(coefficients) @ (envelope[:, None] * self._magnitudes)).tolist()
                 return found
-            envelope = envelope * horizon**self.basis.powers
+            envelope = envelope * (horizon / self.basis.unit) ** self.basis.powers
             found = (np.abs(self._derivatives(coefficients, DERIVATIVES)) @ envelope).T.tolist()
             return found
 

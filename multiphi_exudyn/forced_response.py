@@ -1,18 +1,18 @@
 """Forced response of modal equations in closed form: a load that is a polynomial on a carrier.
 
-    eta'' + D eta' + diag(omega^2) eta = Re( exp(mu t) sum_d p_d t^d ),   eta = Re( exp(mu t) sum_k x_k t^k )
+    eta'' + D eta' + diag(omega^2) eta = Re( exp(mu t) sum_d p_d u^d ),   eta = Re( exp(mu t) sum_k x_k u^k )
 
-is solved mode by mode, D diagonal or not, as the sum of first-order equations of its poles s,
+u = t/T, T the horizon, is solved mode by mode, D diagonal or not, as the sum of first-order equations of its poles s,
 
     z' = s z + exp(mu t) p(t),   z = exp(mu t) w,   w' = (s - mu) w + p(t)
 
-w is a polynomial. Far from the pole (|s - mu| T large, T the horizon) it is the finite one,
+w is a polynomial of u. Far from the pole (|s - mu| T large) it is the finite one,
 
-    w_k = ((k + 1) w_k+1 - p_k) / (s - mu),   k = D, ..., 0
+    w_k = ((k + 1) w_k+1 / T - p_k) / (s - mu),   k = D, ..., 0
 
 and near to it, at resonance included, that of the motion from rest, a Taylor series that is cut at round-off:
 
-    w_k+1 = ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
+    w_k+1 = T ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
 
 Two poles that (nearly) coincide, of a critically damped or a rigid-body mode, are solved as one equation of second
 order in the same two ways. Nothing grows beyond the load's own size, whatever the distance from a pole.
@@ -37,6 +37,7 @@ def particular(
 ) -> np.ndarray:
     """One particular response x (K + 1, r) to modal forces p (D + 1, r) on the carrier ``rate``, good for [0, horizon].
 
+    Both are coefficients of powers of t / horizon.
     squares: omega^2 (r,). damping: D (r, r). response: the closed form of the free motion.
     """
     if not np.any(forces):
@@ -82,12 +83,12 @@ def _first_order(distance: np.ndarray, forces: np.ndarray, horizon: float) -> np
     reach = float(np.max(np.abs(distance[near]), initial=0.0)) * horizon
     w = np.zeros((_terms(degree, reach, 1) if np.any(near) else degree + 1, len(distance)), complex)
     for k in range(degree, -1, -1):
-        above = (k + 1) * w[k + 1, far] if k < degree else 0.0
+        above = (k + 1) / horizon * w[k + 1, far] if k < degree else 0.0
         w[k, far] = (above - forces[k, far]) / distance[far]
     if np.any(near):
         for k in range(len(w) - 1):
             given = forces[k, near] if k <= degree else 0.0
-            w[k + 1, near] = (distance[near] * w[k, near] + given) / (k + 1)
+            w[k + 1, near] = (distance[near] * w[k, near] + given) * horizon / (k + 1)
     return w
 
 
@@ -103,14 +104,14 @@ def _second_order(
     reach = float(np.max(np.maximum(distance, np.abs(slope))[near], initial=0.0)) * horizon
     w = np.zeros((_terms(degree, reach, 2) if np.any(near) else degree + 1, len(squares)), complex)
     for k in range(degree, -1, -1):
-        first = (k + 1) * w[k + 1, far] if k < degree else 0.0
-        second = (k + 2) * (k + 1) * w[k + 2, far] if k < degree - 1 else 0.0
+        first = (k + 1) / horizon * w[k + 1, far] if k < degree else 0.0
+        second = (k + 2) * (k + 1) / horizon**2 * w[k + 2, far] if k < degree - 1 else 0.0
         w[k, far] = (forces[k, far] - slope[far] * first - second) / value[far]
     if np.any(near):
         for k in range(len(w) - 2):
             given = forces[k, near] if k <= degree else 0.0
-            pulled = slope[near] * (k + 1) * w[k + 1, near] + value[near] * w[k, near]
-            w[k + 2, near] = (given - pulled) / ((k + 1) * (k + 2))
+            pulled = slope[near] * (k + 1) / horizon * w[k + 1, near] + value[near] * w[k, near]
+            w[k + 2, near] = (given - pulled) * horizon**2 / ((k + 1) * (k + 2))
     return w
 
 

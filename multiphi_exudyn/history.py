@@ -164,10 +164,10 @@ class History:
         return np.where(inside, (values * np.exp(self.rates[i] * s)).real, 0.0)
 
 
-def differentiated(rate: complex | np.ndarray, coefficients: np.ndarray) -> np.ndarray:
-    """Time derivative of exp(rate s) sum_d a_d s^d, as coefficients (D + 1, ...) of such a sum."""
+def differentiated(rate: complex | np.ndarray, coefficients: np.ndarray, unit: float = 1.0) -> np.ndarray:
+    """Time derivative of exp(rate s) sum_d a_d (s / unit)^d, as coefficients (D + 1, ...) of such a sum."""
     result = np.asarray(rate * coefficients)
-    result[:-1] += (np.arange(1, len(coefficients)) * coefficients[1:].T).T
+    result[:-1] += (np.arange(1, len(coefficients)) / unit * coefficients[1:].T).T
     return result
 
 

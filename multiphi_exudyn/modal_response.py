@@ -77,12 +77,12 @@ class ModalResponse:
         Re u Re v = Re (u v + u conj(v)) / 2 turns it into integrals of single exponentials.
         """
         velocity = self.shapes * self.basis.derivative(coefficients)
-        rates, powers = self.basis.rates, self.basis.powers
+        rates, powers, unit = self.basis.rates, self.basis.powers, self.basis.unit
         degrees = powers[:, None] + powers[None, :]
         same = velocity.T @ damping @ velocity
         crossed = velocity.T @ damping @ velocity.conj()
-        total = same * exponential_integrals(rates[:, None] + rates[None, :], degrees, duration)
-        total += crossed * exponential_integrals(rates[:, None] + rates[None, :].conj(), degrees, duration)
+        total = same * exponential_integrals(rates[:, None] + rates[None, :], degrees, duration, unit)
+        total += crossed * exponential_integrals(rates[:, None] + rates[None, :].conj(), degrees, duration, unit)
         return 0.5 * float(np.sum(total.real))
 
 

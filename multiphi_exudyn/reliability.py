@@ -127,8 +127,10 @@ def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
+    """largest: zero where truncation has taken all energy at the start."""
     if lost > ENERGY_SHARE * largest:
-        yield f"lost energy: truncation took {_per_cent(lost / largest)} of the largest energy of the run; {REMEDY}"
+        share = _per_cent(lost / (largest or lost))
+        yield f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}"
 
 
 def _truncation(trajectory: Trajectory, history: DefectHistory, tolerance: Tolerance | None) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Root search: the first descent of one signal in an interval, by certified bounds of g, g' and g''.
 
-    g(t) = constant + Re sum_j a_j t^d_j exp(lambda_j t),   max|g^(k)| <= bound_k, k = 0 ... 6
+    g(t) = constant + Re sum_j a_j (t/T)^d_j exp(lambda_j t),   max|g^(k)| <= bound_k, k = 0 ... 6
 
 An interval is divided until monotony or curvature of certified sign decides, and Newton finishes; the bounds and their
 source are those of first_root.py.

@@ -19,13 +19,13 @@ def coupled(rigid_alone):
     return damping
 
 
-def powers(x, rate, t, derivative):
-    """The k-th derivative at t of exp(rate t) sum_k x_k t^k, complex (r,)."""
+def powers(x, rate, t, derivative, unit):
+    """The k-th derivative at t of exp(rate t) sum_k x_k (t / unit)^k, complex (r,)."""
     for _ in range(derivative):
         moved = np.zeros_like(x)
-        moved[:-1] = np.arange(1, len(x))[:, None] * x[1:]
+        moved[:-1] = np.arange(1, len(x))[:, None] / unit * x[1:]
         x = rate * x + moved
-    return np.exp(rate * t) * (t ** np.arange(len(x)) @ x)
+    return np.exp(rate * t) * ((t / unit) ** np.arange(len(x)) @ x)
 
 
 @pytest.mark.parametrize("damping", [DIAGONAL, coupled(True), coupled(False)], ids=["diagonal", "rigid-alone", "all"])
@@ -44,11 +44,11 @@ def powers(x, rate, t, derivative):
 )
 def test_the_particular_response_satisfies_its_equation(rate, horizon, degree, damping):
     random = np.random.default_rng(0)
-    forces = random.normal(size=(degree + 1, 6)) / horizon ** np.arange(degree + 1)[:, None] + 0j
+    forces = random.normal(size=(degree + 1, 6)) + 0j
     x = particular(OMEGA**2, damping, modal_response(OMEGA**2, damping), rate, forces, horizon)
     for t in np.linspace(0, horizon, 5):
-        eta, eta_t, eta_tt = (powers(x, rate, t, k).real for k in range(3))
-        left, right = eta_tt + damping @ eta_t + OMEGA**2 * eta, powers(forces, rate, t, 0).real
+        eta, eta_t, eta_tt = (powers(x, rate, t, k, horizon).real for k in range(3))
+        left, right = eta_tt + damping @ eta_t + OMEGA**2 * eta, powers(forces, rate, t, 0, horizon).real
         size = np.abs(eta_tt) + np.abs(damping) @ np.abs(eta_t) + OMEGA**2 * np.abs(eta)
         assert_allclose(left, right, rtol=0, atol=3e-12 * float(np.max(size)))
 
@@ -59,7 +59,7 @@ def test_nothing_grows_beyond_the_load_near_a_pole():
     response = modal_response(np.array([4.0]), damping)
     for offset in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
         x = particular(np.array([4.0]), damping, response, 2j * (1 + offset), np.ones((1, 1), complex), 10.0)
-        assert np.max(np.abs(x) * 10.0 ** np.arange(len(x))[:, None]) < 10.0
+        assert np.max(np.abs(x)) < 10.0
 
 
 def test_no_force_gives_no_response():

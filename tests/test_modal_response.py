@@ -182,9 +182,10 @@ class TestExponentialIntegrals:
         st.complex_numbers(max_magnitude=30, allow_nan=False).filter(lambda s: s.real < 2),
         st.integers(0, 10),
         st.floats(1e-3, 3),
+        st.sampled_from([0.5, 1.0, 4.0]),
     )
-    def test_equal_quadrature(self, rate, power, duration):
-        found = exponential_integrals(np.array([rate]), np.array([power]), duration)[0]
+    def test_equal_quadrature(self, rate, power, duration, unit):
+        found = exponential_integrals(np.array([rate]), np.array([power]), duration, unit)[0] * unit**power
         nodes, weights = np.polynomial.legendre.leggauss(20)
         panels = np.linspace(0, duration, 25)
         t = (panels[:-1, None] + duration / 24 * (nodes + 1) / 2).ravel()

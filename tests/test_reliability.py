@@ -108,6 +108,11 @@ class TestTruncation:
         assert float(told.split("took ")[1].split(" %")[0]) == pytest.approx(100 * lost / few.ledger.initial, rel=0.1)
         assert many.warnings == ()
 
+    def test_all_energy_taken_at_the_start_is_said(self):
+        structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 9.0]), points={"a": 0})
+        run = mp.simulate(mp.MultiPhiModel(structure, modes=1), 1.0, velocity=np.array([0.0, 1.0]))
+        assert run.warnings[0].startswith("lost energy: truncation took 1e+02 % of")
+
     def test_a_start_that_the_modes_do_not_hold_is_said(self):
         run = mp.simulate(mp.MultiPhiModel(chain(40), modes=2), 1.0, displacement=np.eye(40)[20])
         assert kinds(run) == ["lost energy", "truncation"]

@@ -132,3 +132,34 @@ class TestFreeBodiesWithADashpot:
         run = mp.simulate(model, unit, velocity=velocity / unit, loads=loads)
         assert_allclose(run.displacement(unit), expected[:n], rtol=0, atol=1e-12)
         assert_allclose(run.velocity(unit) * unit, expected[n:], rtol=0, atol=1e-12)
+
+
+class TestLoadsNearResonance:
+    """The response to a load near a pole is a polynomial of many powers of time on the load's carrier."""
+
+    @staticmethod
+    def run(unit, damping):
+        stiffness = np.array([[30.0, -10.0], [-10.0, 10.0]])
+        structure = mp.LinearStructure(
+            np.eye(2), stiffness / unit**2, None if damping is None else damping / unit, {"a": 0, "b": 1}
+        )
+        model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "b", 0.01, 500.0 / unit**2)], modes="all")
+        frequency = (model.level(()).omega[0] / (2 * math.pi)) * (1 + 2e-2)
+        loads = [
+            mp.HarmonicLoad("a", 1 / unit**2, frequency),
+            mp.FunctionLoad("b", lambda t: np.exp(-t / unit) / unit**2, tolerance=1e-9),
+        ]
+        return mp.simulate(model, 4.0 * unit, loads=loads, compiled=False)
+
+    @pytest.mark.parametrize("damping", [None, np.array([[0.1, -0.05], [-0.05, 0.3]])], ids=["undamped", "coupled"])
+    @pytest.mark.parametrize("unit", [2.0**-40, 2.0**40])
+    def test_move_alike_in_every_unit_of_time(self, unit, damping):
+        one, other, t = self.run(1.0, damping), self.run(unit, damping), np.linspace(0, 4, 41)
+        assert (one.status, one.message) == (other.status, other.message) == ("ok", "")
+        assert len(one.events) > 2
+        assert [(e.kind, e.time * unit) for e in one.events] == [(e.kind, e.time) for e in other.events]
+        assert np.array_equal(one.displacement(t), other.displacement(t * unit))
+        assert np.array_equal(one.velocity(t), other.velocity(t * unit) * unit)
+        assert np.array_equal(one.contact_force("stop", t), other.contact_force("stop", t * unit) * unit**2)
+        assert one.ledger.work_of_loads == other.ledger.work_of_loads * unit**2
+        assert one.ledger.damping == other.ledger.damping * unit**2

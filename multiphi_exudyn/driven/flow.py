@@ -1,9 +1,9 @@
 """Flow: the motion of a driven level while one piece of every load lasts, in closed form.
 
-    xi(t) = Re V (c exp(lambda t)) + Re sum_j exp(mu_j t) sum_k x_jk t^k
+    xi(t) = Re V (c exp(lambda t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
 
-xi = (eta, w) as in driven/level.py; the free response and the closed-form response to the present piece of every load
-(forced_response.py).
+xi = (eta, w) as in driven/level.py, T the horizon, so that no power outgrows the motion; the free response and the
+closed-form response to the present piece of every load (forced_response.py).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from multiphi_exudyn.history import differentiated
 
 __all__ = ["Basis", "Flow"]
 
-Basis = tuple[tuple[complex, int], ...]  # carriers and numbers of powers
+Basis = tuple[float, tuple[tuple[complex, int], ...]]  # unit of powers, carriers and numbers of their powers
 
 
 @dataclass(frozen=True)
@@ -34,28 +34,33 @@ class Flow:
 
     @classmethod
     def of(cls, level: DrivenLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
-        """The motion from xi, xi' under a drive, good for [0, horizon]."""
+        """The motion from xi, xi' under a drive, good for [0, horizon], a power of two."""
         own = level.plain.level
         response, q = own.response, level.excitation.channels
-        blocks, key = list[np.ndarray](), list[tuple[complex, int]]()
-        for rate, given in drive.terms:
+        blocks, carriers = list[np.ndarray](), list[tuple[complex, int]]()
+        for rate, terms in drive.terms:
+            given = (terms.T * horizon ** np.arange(len(terms))).T
             forces = given @ level.force.T
             if np.any(level.force_rate):
-                forces = forces + differentiated(rate, given) @ level.force_rate.T
+                forces = forces + differentiated(rate, given, horizon) @ level.force_rate.T
             x = particular(own.squares, own.damping, response, rate, forces, horizon)
             block = np.zeros((max(len(x), len(given)), own.modes + q), complex)
             block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
             blocks.append(block)
-            key.append((rate, len(block)))
+            carriers.append((rate, len(block)))
         at_once = sum(block[0] for block in blocks).real
-        rate_at_once = sum(differentiated(k[0], block)[0] for k, block in zip(key, blocks, strict=True)).real
+        rates_at_once = (differentiated(c[0], b, horizon)[0] for c, b in zip(carriers, blocks, strict=True))
+        rate_at_once = sum(rates_at_once).real
         (eta, _), (eta_t, _) = level.split(xi - at_once), level.split(xi_t - rate_at_once)
         steady = level.plain.asymptotic.drive if level.plain.driven else None
         free = response.coefficients(eta, eta_t, steady)
         forced = np.concatenate(blocks).T
         shapes = np.hstack([np.vstack([response.shapes, np.zeros((q, len(free)))]), forced])
-        coefficients = np.concatenate([free, np.ones(forced.shape[1])])
-        return cls(_basis(response.basis, tuple(key)), shapes, coefficients, tuple(key))
+        unit = horizon if max(count for _, count in carriers) > 1 else response.basis.unit
+        own_powers = (unit / response.basis.unit) ** response.basis.powers
+        coefficients = np.concatenate([free * own_powers, np.ones(forced.shape[1])])
+        key = unit, tuple(carriers)
+        return cls(_basis(response.basis, key), shapes, coefficients, key)
 
     @property
     def rows(self) -> np.ndarray:
@@ -71,6 +76,7 @@ class Flow:
 
 
 def _basis(free: Exponentials, key: Basis) -> Exponentials:
-    """The exponentials of the free response and t^k exp(mu t) of every carrier."""
-    rates = np.concatenate([free.rates, *(np.full(count, rate) for rate, count in key)])
-    return Exponentials(rates, np.concatenate([free.powers, *(np.arange(count) for _, count in key)]))
+    """The exponentials of the free response and (t/T)^k exp(mu t) of every carrier."""
+    unit, carriers = key
+    rates = np.concatenate([free.rates, *(np.full(count, rate) for rate, count in carriers)])
+    return Exponentials(rates, np.concatenate([free.powers, *(np.arange(count) for _, count in carriers)]), unit)

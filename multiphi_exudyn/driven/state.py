@@ -31,7 +31,8 @@ class DrivenState(State):
     @functools.cached_property
     def flow(self) -> Flow:
         """The motion that starts here."""
-        horizon = _bucket(min(self.drive.until, self.until) - self.drive.time)
+        until = min(self.drive.until, self.until)
+        horizon = _bucket(until - self.drive.time if until > self.drive.time else until)
         return Flow.of(self.level, self.displacement, self.velocity, self.drive, horizon)
 
     @property
