@@ -229,10 +229,13 @@ class EventRule(Passage):
             return self._with_phases(state, heard), Loss(), []
         self.transitions += 1
         opened = sorted(i for i in asking if self._rigid[i])
+        pushed = dict[int, float]()
         if opened:
-            entered, _, lost = self._collided(entered, opened)
+            entered, impulses, lost = self._collided(entered, opened)
             entered, loss = self._with_phases(entered), loss + lost
-        return entered, loss, [Change(i, "open" if i in state.closed else "close") for i in sorted(asking)]
+            pushed = dict(zip(opened, impulses.tolist(), strict=True))
+        changes = [Change(i, "open" if i in state.closed else "close", pushed.get(i, 0.0)) for i in sorted(asking)]
+        return entered, loss, changes
 
     def _impact(
         self, state: State, striking: set[int], compliant: set[int], freed: Iterable[int] = ()
@@ -250,13 +253,14 @@ class EventRule(Passage):
         closed = self._pressing(released, struck, touching)
         after, dropped = struck, loss + plastic
         while closed:
-            still, stilled = self._stilled(struck, touching, closed)
+            still, further, stilled = self._stilled(struck, touching, closed)
             after = self._at_rest_on(state, still, compliant | closed)
             pulling = {i for i in closed if self._reaction_sign(state, still, after.level, i) < (i in freed)}
             if same and after.closed == state.closed:
                 pulling.update(closed.intersection(freed))
             if not pulling:
                 dropped = self._loss(state, after, released.kinetic - still.kinetic, plastic + stilled)
+                impulses = impulses + further
                 break
             closed = closed - pulling
             after = struck
@@ -286,7 +290,16 @@ class EventRule(Passage):
         struck = [Change(i, "close", pushed[i]) for i in sorted(striking) if i in closed or pushed[i] > 0]
         rebounds = {change.contact for change in struck} - closed
         sprung = [Change(i, "close") for i in sorted(compliant - before)]
-        return struck + sprung + [Change(i, "open") for i in sorted(rebounds | (before - closed))]
+        opened = [Change(i, "open", pushed.get(i, 0.0)) for i in sorted(before - closed)]
+        changes = [
+            *struck,
+            *sprung,
+            *sorted([*(Change(i, "open") for i in rebounds), *opened], key=lambda c: c.contact),
+        ]
+        shared = tuple((i, pushed[i]) for i in sorted(pushed) if i in before & closed and pushed[i] > 0)
+        if shared and changes:
+            changes[0] = replace(changes[0], shared=shared)
+        return changes
 
     def _pressing(self, released: State, state: State, touching: list[int]) -> set[int]:
         """Contacts at rest relative to their stop after an impact whose free motion would close them further.

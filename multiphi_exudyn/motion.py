@@ -167,8 +167,9 @@ class Motion:
 
     def _record(self, changes: list[Change], loss: Loss) -> None:
         for change in changes:
-            name = self.model.contacts[change.contact].name
-            self._keep_event(Event(self.time, name, change.kind, loss, change.impulse))
+            names = self.model.contacts
+            shared = tuple((names[i].name, impulse) for i, impulse in change.shared)
+            self._keep_event(Event(self.time, names[change.contact].name, change.kind, loss, change.impulse, shared))
             loss = Loss()
 
     @property

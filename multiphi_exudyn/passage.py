@@ -78,13 +78,19 @@ class Passage(ContactFunctions):
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
         return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)
 
-    def _stilled(self, state: State, touching: Sequence[int], closed: set[int]) -> tuple[State, Loss]:
-        """After an impact: contacts that stay closed lose a speed too small to be seen, and give it to no other."""
-        rows = state.level.level.speed_rows[sorted(closed)]
+    def _stilled(self, state: State, touching: Sequence[int], closed: set[int]) -> tuple[State, np.ndarray, Loss]:
+        """After an impact: contacts that stay closed lose a speed too small to be seen, and give it to no other.
+
+        State, impulses of those that touch, loss.
+        """
+        held = sorted(closed)
+        rows = state.level.level.speed_rows[held]
         if np.all(np.abs(rows @ state.velocity) <= RESTING * self._sizes(rows, state)):
-            return state, Loss()
-        after, _, lost = self._collided(state, touching, sorted(closed))
-        return after, lost
+            return state, np.zeros(len(touching)), Loss()
+        after, impulses, lost = self._collided(state, touching, held)
+        pushed, pulled = np.split(impulses, [len(touching)])
+        pushed[np.searchsorted(touching, held)] -= pulled
+        return after, pushed, lost
 
     def _nearest(
         self,

@@ -171,7 +171,7 @@ def _clusters(trajectory: Trajectory) -> list[str]:
 
 def _load_pieces(trajectory: Trajectory) -> list[str]:
     """Whether the loads have so many pieces that they set the time and memory of the run."""
-    level = trajectory.segments[0].level
+    level = trajectory.final.level if trajectory.final is not None else None
     if not isinstance(level, DrivenLevel) or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
         return []
     pieces = level.excitation.pieces(trajectory.t_end)

@@ -134,11 +134,15 @@ class Loss:
 
 @dataclass(frozen=True)
 class Change:
-    """One contact's change of state at an instant: its position, "close" | "open", impulse of its impact [N s]."""
+    """One contact's change of state at an instant: its position, "close" | "open", impulse of its impact [N s].
+
+    shared: position and impulse of contacts that stay closed in that impact, carried by the first change.
+    """
 
     contact: int
     kind: str
     impulse: float = 0.0
+    shared: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -147,6 +151,7 @@ class Event:
 
     time [s]; contact: its name; kind: "close" | "open"; loss: the energy [J] of the whole instant, carried by its
     first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an "open" of equal time.
+    shared: name and impulse of contacts that are closed and stay so in the impact, carried by its first event.
     """
 
     time: float
@@ -154,6 +159,7 @@ class Event:
     kind: str
     loss: Loss
     impulse: float = 0.0
+    shared: tuple[tuple[str, float], ...] = ()
 
     @property
     def energy_loss(self) -> float:

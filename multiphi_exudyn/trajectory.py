@@ -140,7 +140,9 @@ class Trajectory:
             for segment in self.segments
             if i in segment.level.level.indices and segment.start < last and segment.end > first
         )
-        struck = sum(e.impulse for e in self.events if e.contact == contact and first <= e.time <= last)
+        within = [event for event in self.events if first <= event.time <= last]
+        struck = sum(event.impulse for event in within if event.contact == contact)
+        struck += sum(impulse for event in within for name, impulse in event.shared if name == contact)
         return float(pushed + struck)
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:

@@ -31,7 +31,7 @@ from campaign_scenes import KINDS, numbers, scene_of
 from run_checks import complaints
 from strategies import built, recipe_of
 
-from multiphi_exudyn import MultiPhiError, simulate
+from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
 from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
 
@@ -70,6 +70,7 @@ def _named(judge):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", MultiPhiWarning)
             return call_within(LONGEST, judge)
     except MultiPhiError as error:
         return [("refused", str(error))]

@@ -24,7 +24,7 @@ BEAM = {
     },
     "contacts": [{"name": "stop", "direction": "middle", "gap": 1e-3, "stiffness": 1e5}],
     "start": {"load_at": "tip", "measured_at": "tip", "displacement": 0.01},
-    "damping": {"modal_ratios": [0.01, 0.02]},
+    "damping": {"modal_ratios": [0.01, 0.02], "beyond": 0.0},
     "outputs": {"t_end": 0.1, "points": ["tip"], "interval": 1e-3},
     "models": [
         {"kind": "reduced", "name": "all", "modes": "all"},

@@ -131,7 +131,7 @@ class TestACutCluster:
         model = mp.MultiPhiModel(square(4), STOPS, modes=2)
         with pytest.warns(mp.MultiPhiWarning, match=r"^cluster: 1 of \d levels keep .* \(open\) 3 in place of 2, .*"):
             run = mp.simulate(model, 2.0, displacement=-0.05 * np.ones(16))
-        assert [sentence.split(":")[0] for sentence in run.warnings] == ["cluster"]
+        assert "cluster" in [sentence.split(":")[0] for sentence in run.warnings]
         for loads in ((), [mp.HarmonicLoad("p", 1.0, 0.3)]):
             three = mp.simulate(mp.MultiPhiModel(square(4), STOPS, modes=3), 2.0, loads=loads)
             assert not [sentence for sentence in three.warnings if "(open)" in sentence]

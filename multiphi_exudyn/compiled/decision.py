@@ -240,16 +240,16 @@ def strike(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, work: 
 
 
 @inlined
-def part_with(k: Levels, b: int, contact: int, v: np.ndarray) -> float:
-    """A rigid contact that has opened keeps no velocity into its stop; returns the kinetic energy that takes."""
+def part_with(k: Levels, b: int, contact: int, v: np.ndarray) -> tuple[float, float]:
+    """A rigid contact that has opened keeps no velocity into its stop; kinetic energy lost, and impulse."""
     r, row = k.sizes[b, 0], k.own[b, contact]
     speed, square, _ = push(row, v, r)
     if speed >= 0:
-        return 0.0
+        return 0.0, 0.0
     before = kinetic(v, r)
     for i in range(r):
         v[i] -= speed / square * row[0, i]
-    return before - kinetic(v, r)
+    return before - kinetic(v, r), -speed / square
 
 
 @inlined
@@ -287,7 +287,7 @@ def decide(
         amounts[1] = before - kinetic(after[1], k.sizes[b, 0]) - amounts[0]
         amounts[2] = strained - potential(k, b, after[0])
         if rigid and k.closed[a, contact]:
-            amounts[0] = part_with(k, b, contact, after[1])
+            amounts[0], amounts[3] = part_with(k, b, contact, after[1])
     for _ in range(2):
         stand(k, b, after[0], after[1], c, work, phases)
         if answer != PLAIN or rigid or phases[contact] != REFUSED:

@@ -77,7 +77,7 @@ def level_modes(comparison: Comparison) -> tuple[LevelModes, ...]:
         LevelModes(
             closed=closed,
             share=shares.get(closed, 0.0) if shares else None,
-            frequencies=MultiPhiModel(bench.structure, contacts, modes=SHOWN).level(closed).frequencies,
+            frequencies=MultiPhiModel(bench.structure, contacts, modes=SHOWN).level(closed).frequencies[:SHOWN],
             beams=drawn.shapes(closed),
             published=tuple(column for column in published if column.level == closed),
         )
