@@ -91,13 +91,18 @@ class System:
 
 @dataclass
 class Answer:
-    """x, x' (n, k) at the times asked for, events [(time, contact, state)], impulses (c,), energy lost by impacts."""
+    """x, x' (n, k) at the times asked for, events [(time, contact, state)], impulses (c,), energy lost by impacts.
+
+    length, speed: of the scene, what its gaps, start, stops and loads make [m, m/s].
+    """
 
     displacement: np.ndarray
     velocity: np.ndarray
     events: list = field(default_factory=list)
     impulse: np.ndarray | None = None
     impact: float = 0.0
+    length: float = 0.0
+    speed: float = 0.0
 
 
 def solved(system, displacement, velocity, times, touch=TOUCH):
@@ -285,7 +290,7 @@ class _Integration:
         self.length = max(self.length, np.max(accelerations) * (STEP / self._fastest()) ** 2, 1e-300)
         self.speed = self.length * self._fastest()
         y, t, k = np.concatenate([displacement, velocity, np.zeros(self.c)]), 0.0, 0
-        answer = Answer(*np.zeros((2, self.n, len(self.times))))
+        answer = Answer(*np.zeros((2, self.n, len(self.times))), length=self.length, speed=self.speed)
         state, y = self._settled(self._lowest(), y, 0.0, answer)
         shown, instants, block, rocking, before = 0, 0, LEAST, 0, 0.0
         while k < len(self.nodes) - 1:
