@@ -52,8 +52,12 @@ class Base:
     mass: Matrix
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
-        """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k)."""
-        return np.asarray(self.modes.shapes.T @ (self.mass @ x))
+        """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), zero where it is round-off.
+
+        Of a mode that alone moves a contact it would give one at rest a speed.
+        """
+        shapes = self.modes.shapes.T
+        return cleared(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
     @functools.cached_property
     def gaps(self) -> np.ndarray:

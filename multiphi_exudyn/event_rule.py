@@ -46,7 +46,7 @@ from multiphi_exudyn.build_level import independent
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.least_distance import Infeasible
 from multiphi_exudyn.passage import RESTING, Passage
-from multiphi_exudyn.state import Change, Loss, Phase, Rows, SignalTable, State, sign_of
+from multiphi_exudyn.state import Change, Loss, Phase, Row, Rows, SignalTable, State, sign_of
 from multiphi_exudyn.transition import LoadedLevel, nearest_admissible
 
 __all__ = ["EventRule"]
@@ -142,8 +142,7 @@ class EventRule(Passage):
             return Phase.ARMED
         rate = own.rate_sign(state.velocity, state.acceleration, state.swing)
         if rate == 0:
-            table = SignalTable(state.basis, state.shapes, Rows.of([own], len(state.shapes)), [False])
-            (rate,) = state.finder.signs(table.signals(state.coefficients(), state), since=2)
+            rate = self._becoming(state, own, since=2)
         if value == 0 and rate >= 0:
             return Phase.ARMED
         stays = contact in self._viscous or (self._rigid[contact] and contact in state.closed)
@@ -156,9 +155,15 @@ class EventRule(Passage):
         force = self.entered_function(state.level, contact)
         sign = force.sign(state.displacement, state.velocity, state.reach)
         if sign == 0:
-            table = SignalTable(state.basis, state.shapes, Rows.of([force], len(state.shapes)), [False])
-            (sign,) = state.finder.signs(table.signals(state.coefficients(), state))
+            sign = self._becoming(state, force)
         return sign <= 0
+
+    @staticmethod
+    def _becoming(state: State, row: Row, since: int = 0) -> int:
+        """Sign of a function's first derivative, of order ``since`` or higher, that is not round-off."""
+        table = SignalTable(state.basis, state.shapes, Rows.of([row], len(state.shapes)), [False])
+        (sign,) = state.finder.signs(table.signals(state.coefficients(), state), table.sizes(state), since)
+        return sign
 
     def _held(self, state: State, contacts: Iterable[int]) -> set[int]:
         """Those of these contacts that are rigid and closed."""
@@ -315,7 +320,7 @@ class EventRule(Passage):
         if not np.any(resting):
             return set()
         at_rest = np.array(touching)[resting].tolist()
-        sizes = np.abs(rows[resting]) @ state.accelerating
+        sizes = np.abs(rows[resting]) @ np.maximum(state.accelerating, released.accelerating)
         _, multipliers = self._nearest(state.level, at_rest, rows[resting], state.acceleration, sizes)
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         pressing = pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}

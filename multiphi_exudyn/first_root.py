@@ -134,15 +134,19 @@ class DescentFinder:
         result: list[int] = down.nonzero()[0].tolist()
         return result
 
-    def signs(self, signals: Signals, since: int = 0) -> list[int]:
+    def signs(self, signals: Signals, sizes: np.ndarray, since: int = 0) -> list[int]:
         """For each signal: +1 or -1 as it is, or becomes at once, positive or negative at t = 0; 0 if it vanishes.
 
-        since: derivatives of a lower order are known to be zero.
+        sizes: (s, p) of which terms the coefficients are sums. since: derivatives of a lower order are zero.
         """
         derivatives = self._derivatives(signals.coefficients, DERIVATIVES)
         values = (derivatives @ self.basis.at(0.0)).real
         values[0] += signals.constants
-        noise = ZERO * (np.abs(derivatives) @ np.abs(self.basis.at(0.0)))  # t^d, d > 0, is zero and has none
+        at_once = np.abs(self.basis.at(0.0))  # t^d, d > 0, is zero and has no round-off
+        noise = np.zeros_like(values)
+        for order in range(DERIVATIVES):
+            noise[order] = ZERO * (sizes @ at_once)
+            sizes = self.basis.bounding.derivative(sizes)
         noise[0] += ZERO * np.abs(signals.constants)
         decided = np.abs(values) > noise
         decided[:since] = False

@@ -50,6 +50,11 @@ class ModalResponse:
         c: np.ndarray = (self._from_state @ np.concatenate([displacement, velocity])).view(complex)
         return c if force is None else c + self.from_force @ force
 
+    def sizes(self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Of which terms (p,) the coefficients are the sums, from the sizes (r,) of eta(0), eta'(0) and p."""
+        maps = np.abs(self.from_displacement), np.abs(self.from_velocity), np.abs(self.from_force)
+        return np.asarray(maps[0] @ displacement + maps[1] @ velocity + maps[2] @ force)
+
     def state(self, coefficients: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """eta(t), eta'(t), both (r,)."""
         r, values = len(self.shapes), self.basis.at(t)

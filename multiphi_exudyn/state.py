@@ -97,6 +97,11 @@ class State:
             self.displacement, self.velocity, drive if self.level.driven else None
         )
 
+    @property
+    def terms(self) -> np.ndarray:
+        """Of which terms (p,) the coefficients are the sums."""
+        return np.abs(self.coefficients())
+
     def after(self, coefficients: np.ndarray, t: float) -> State:
         """The state a time t [s] later, of the motion with these coefficients."""
         displacement, velocity = self.level.level.response.state(coefficients, t)
@@ -296,6 +301,13 @@ class SignalTable:
         self._rate = None if rows.rate is None else rows.rate @ shapes
         self._rates = np.flatnonzero(rates)
         self._constants = np.where(rates, 0.0, rows.constant)
+
+    def sizes(self, state: State) -> np.ndarray:
+        """Of which terms (k, p) the coefficients of the signals are the sums; of none is the rate meant."""
+        terms = np.abs(self._position) * state.terms
+        return (
+            terms if self._rate is None else terms + self._basis.bounding.derivative(np.abs(self._rate) * state.terms)
+        )
 
     def signals(self, coefficients: np.ndarray, state: State) -> Signals:
         """The signals of the motion with these coefficients (p,), which starts at ``state``."""

@@ -173,7 +173,9 @@ class Signal:
         return max(self._bound(self.coefficients, duration) + abs(self.constant), self.terms)
 
     def _bound(self, coefficients, duration):
-        growth = np.exp(np.maximum(self.basis.rates.real, 0) * duration) * duration**self.basis.powers
+        growth = (
+            np.exp(np.maximum(self.basis.rates.real, 0) * duration) * (duration / self.basis.unit) ** self.basis.powers
+        )
         return float(np.abs(coefficients) @ growth)
 
     def __call__(self, t):
@@ -182,7 +184,7 @@ class Signal:
     def exactly(self, t):
         """The same in extended precision."""
         wide = np.asarray(t, np.longdouble)[:, None]
-        phi = np.exp(wide * self.basis.rates.astype(np.clongdouble)) * wide**self.basis.powers
+        phi = np.exp(wide * self.basis.rates.astype(np.clongdouble)) * (wide / self.basis.unit) ** self.basis.powers
         return (phi @ self.coefficients.astype(np.clongdouble)).real + np.longdouble(self.constant)
 
     def lowest(self, duration, samples):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from integrated import integrated
 from numpy.testing import assert_allclose
@@ -280,6 +280,7 @@ class TestSmoothLoadsHoldTheirToleranceInTheResponse:
 class TestEquivalences:
     @given(seed=st.integers(0, 10**6), kind=st.sampled_from(["mixed", "rigid"]))
     @settings(max_examples=25)
+    @example(seed=4593, kind="rigid")  # comes to rest at its stop where no force presses it
     def test_a_harmonic_of_frequency_zero_is_a_constant_load(self, seed, kind):
         model, random = random_model(seed, damping="modal", kind=kind)
         amplitude, x0 = float(random.normal()), np.zeros(model.structure.n)

@@ -23,6 +23,11 @@ def basis(rates, powers=None):
 POLYNOMIAL = basis([0, 0, 0, 0, 0], [0, 1, 2, 3, 4])  # 1, t, ..., t^4
 
 
+def signs(found_basis, row, sizes=None):
+    """Of one signal; sizes: of which its coefficients are the sums, by default their own."""
+    return DescentFinder(found_basis).signs(signals(row), np.abs([row if sizes is None else sizes]))
+
+
 def first(finder, given_signals, horizon):
     """Time of the first descent, None if there is none."""
     found = finder.first(given_signals, horizon)
@@ -211,10 +216,16 @@ class TestSigns:
         row = np.zeros(5)
         row[order] = 1e-5 * sign
         row[order + 1 :] = -3.0 * sign
-        assert DescentFinder(POLYNOMIAL).signs(signals(row)) == [sign]
+        assert signs(POLYNOMIAL, row) == [sign]
 
     def test_round_off_is_no_sign(self):
-        own = DescentFinder(basis([2j, 3j]))
-        assert DescentFinder(POLYNOMIAL).signs(signals([0.0, -0.2, 0.0, 0.0, 1e30])) == [-1]  # t^4 is zero at t = 0
-        assert own.signs(signals([1.0, -1.0 - 1e-15])) == [1]  # by its second derivative, 9 - 4
-        assert own.signs(signals([0.0, 0.0])) == [0]
+        own = basis([2j, 3j])
+        assert signs(POLYNOMIAL, [0.0, -0.2, 0.0, 0.0, 1e30]) == [-1]  # t^4 is zero at t = 0
+        assert signs(own, [1.0, -1.0 - 1e-15]) == [1]  # by its second derivative, 9 - 4
+        assert signs(own, [0.0, 0.0]) == [0]
+
+    def test_nor_is_that_of_coefficients_that_are_sums_of_larger_terms(self):
+        own = basis([2j, 3j])
+        assert signs(own, [0.0, -1e-16]) == [-1]
+        assert signs(own, [0.0, -1e-16], sizes=[0.0, 1.0]) == [0]
+        assert signs(own, [0.1, -0.1 - 1e-16], sizes=[1.0, 1.0]) == [1]

@@ -94,6 +94,23 @@ def test_change_nothing_that_happens(number, kind):
             assert not differences(given, Units(**{quantity: 2.0**power}), one), f"{quantity} by 2^{power}"
 
 
+@pytest.mark.parametrize("power", range(-20, 21, 5))
+def test_a_stop_that_is_touched_without_speed_is_not_struck(power):
+    """The point before it stands, the other one leaves: what is left of the first one's speed is round-off.
+
+    Of the two free modes only one moves the first point.
+    """
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        root = random.normal(size=(2, 2))
+        mass = (root @ root.T + np.eye(2)) * 2.0**power
+        structure = mp.LinearStructure(mass, np.zeros((2, 2)), points={"a": 0, "b": 1})
+        contacts = [mp.UnilateralContact(name, {name: -1.0}, 0.0) for name in "ab"]
+        model = mp.MultiPhiModel(structure, contacts, modes="all")
+        run = mp.simulate(model, 1e-3, velocity=np.array([0.0, -2.0]), compiled=False)
+        assert not [event for event in run.events if event.time == 0.0 and event.impulse != 0.0], (seed, run.events)
+
+
 class TestFreeBodiesWithADashpot:
     @pytest.mark.parametrize("unit", [2.0**k for k in (-40, -20, 0, 20, 40)])
     def test_come_to_move_together(self, unit):

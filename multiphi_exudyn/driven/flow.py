@@ -25,12 +25,16 @@ Basis = tuple[float, tuple[tuple[complex, int], ...]]  # unit of powers, carrier
 
 @dataclass(frozen=True)
 class Flow:
-    """xi(t) = Re shapes (coefficients * basis) from a state on. key: what distinguishes its basis in its level."""
+    """xi(t) = Re shapes (coefficients * basis) from a state on. key: what distinguishes its basis in its level.
+
+    parts: of which sizes (2, r) eta and eta' are the sums, free and forced.
+    """
 
     basis: Exponentials
     shapes: np.ndarray
     coefficients: np.ndarray
     key: Basis
+    parts: np.ndarray
 
     @classmethod
     def of(cls, level: DrivenLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
@@ -60,7 +64,8 @@ class Flow:
         own_powers = (unit / response.basis.unit) ** response.basis.powers
         coefficients = np.concatenate([free * own_powers, np.ones(forced.shape[1])])
         key = unit, tuple(carriers)
-        return cls(_basis(response.basis, key), shapes, coefficients, key)
+        parts = np.abs([eta, eta_t]) + np.abs([at_once[: own.modes], rate_at_once[: own.modes]])
+        return cls(_basis(response.basis, key), shapes, coefficients, key, parts)
 
     @property
     def rows(self) -> np.ndarray:

@@ -85,6 +85,15 @@ class DrivenState(State):
         """Coefficients (p,) of the exponentials for the motion that starts here."""
         return self.flow.coefficients
 
+    @property
+    def terms(self) -> np.ndarray:
+        """Of which terms (p,) the coefficients are the sums."""
+        response = self.level.plain.level.response
+        eta, eta_t = self.flow.parts
+        free = response.sizes(eta, eta_t, np.abs(self.level.plain.asymptotic.drive))
+        units = (self.flow.basis.unit / response.basis.unit) ** response.basis.powers
+        return np.concatenate([free * units, np.ones(len(self.flow.coefficients) - len(free))])
+
     def after(self, coefficients: np.ndarray, t: float) -> DrivenState:
         """The state a time t [s] later."""
         return replace(self, displacement=self.flow.at(t), velocity=self.flow.at(t, 1), drive=self.drive.after(t))
