@@ -118,7 +118,7 @@ class _Drawn:
 
     def shapes(self, closed: tuple[str, ...]) -> tuple[BeamShapes, ...]:
         """Every beam in the modes of a level, the largest value of each mode 1, the tip that moves most above zero."""
-        modes = self.model.level(closed).shapes
+        modes = self.model.level(closed).shapes[:, :SHOWN]
         of = {name: rows @ modes for name, (_, rows) in self.stations.items()}
         tips = np.array([values[-1] for values in of.values()])
         most = np.take_along_axis(tips, np.argmax(np.abs(tips), axis=0)[None], axis=0)[0]
