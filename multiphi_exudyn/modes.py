@@ -34,6 +34,7 @@ DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it i
 EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
 NEAR = 1e-6  # of omega^2: round-off turns nearer modes into each other by more than 1e-10, so they are kept together
 MOVES = 1e-5  # of what modes can move a row by: with less, the round-off of a mode could choose its sign
+TURNED = 1e-14  # of what a coordinate moves in a cluster: what a rotation leaves of less in one mode is its round-off
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,9 @@ def turned(
     for first, last in _clusters(squares):
         squares[first:last] = np.mean(squares[first:last])
         turn = _turn(seen[:, first:last], sizes)
-        shapes[:, first:last] = shapes[:, first:last] @ turn
+        lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
+        cluster = shapes[:, first:last] @ turn
+        shapes[:, first:last] = np.where(np.abs(cluster) <= TURNED * lengths, 0.0, cluster)
         seen[:, first:last] = seen[:, first:last] @ turn
     forward = seen[_first_moved(np.abs(seen), sizes[:, None]), np.arange(len(squares))] >= 0
     return squares, np.where(forward, shapes, -shapes)
