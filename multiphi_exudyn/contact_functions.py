@@ -207,6 +207,8 @@ class ContactFunctions:
             return [(True, own, False)]
         if phase is Phase.RECOVERING:
             return [(False, -own, False), (True, own, True)]
+        if phase is Phase.HELD_BACK:
+            return [(False, -own, False)]
         return [(False, -own, False), (True, -self.entered_function(level, contact), False)]
 
 

@@ -22,7 +22,8 @@ bases of two levels need not agree, so the rule says what happens then:
 5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
    armed when s reaches zero, and asks again if s turns down before.
 6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
-   armed), or until s in the level it would enter has (then it changes).
+   armed), or until s in the level it would enter has (then it changes). Where it then asks again at the same
+   instant, for ever, it is *held back* until s has risen to zero, or until another contact asks.
 
 7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero; then,
    open with g < 0, it is refused as in 6: armed when g has risen to zero, closed when its force in the level with it
@@ -90,8 +91,8 @@ class EventRule(Passage):
         state, lost, made = self.decide(state, set())
         return state, loss + lost, changes + made
 
-    def decide(self, state: State, asking: set[int]) -> tuple[State, Loss, list[Change]]:
-        """State right after an instant at which these contacts ask to change."""
+    def decide(self, state: State, asking: set[int], again: Iterable[int] = ()) -> tuple[State, Loss, list[Change]]:
+        """State right after an instant at which these contacts ask to change; ``again``: those refused at it before."""
         heard, freed = set(asking), self._held(state, asking)
         loss, changes = Loss(), list[Change]()
         if asking:
@@ -111,10 +112,18 @@ class EventRule(Passage):
             elif pulling:  # heard before: what others did at this instant took its reaction away
                 state, lost, made = self._switch(state, pulling)
             else:
-                return state, loss, changes
+                return self._held_back(state, again), loss, changes
             loss, changes = loss + lost, changes + made
         names = ", ".join(self.model.contacts[i].name for i in sorted(unheard))
         raise NumericalFailure(f"contacts {names}: no set of closed contacts is admissible at this instant")
+
+    @staticmethod
+    def _held_back(state: State, again: Iterable[int]) -> State:
+        """The state, with those of ``again`` held back that are refused once more."""
+        phases = list(state.phases)
+        for i in again:
+            phases[i] = Phase.HELD_BACK if phases[i] is Phase.REFUSED else phases[i]
+        return replace(state, phases=tuple(phases))
 
     def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
         """The state with the phase in which every contact stands; ``refused``: those that asked in vain."""

@@ -66,7 +66,7 @@ class DescentFinder:
     """Finds first descents of signals on one basis of exponentials; keeps that basis' sample tables.
 
     refine: factor on the density of the samples (the answer does not depend on it; the work does). The compiled loop
-    takes it when it first meets the level.
+    takes it when it first meets the level. instant: time [s] in which nothing moves.
     """
 
     def __init__(self, basis: Exponentials, refine: float = 1.0) -> None:
@@ -79,7 +79,7 @@ class DescentFinder:
         self._window = WINDOW / float(np.max(self._growth)) if np.any(self._growth) else math.inf
         self._orders = basis.rates ** np.arange(DERIVATIVES)[:, None]
         self._fastest = float(np.max(np.abs(basis.rates), initial=0.0))
-        self._instant = INSTANT / self._fastest if self._fastest else 0.0
+        self.instant = INSTANT / self._fastest if self._fastest else 0.0
         self._magnitudes = np.abs(basis.rates[:, None]) ** np.arange(DERIVATIVES)
         self._tables: dict[float, _Table] = {}
 
@@ -128,7 +128,7 @@ class DescentFinder:
         reached = (coefficients @ values).real + signals.constants
         slopes = (self.basis.derivative(coefficients) @ values).real
         terms = np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants)
-        soon = np.maximum(ZERO * terms, -slopes * self._instant)
+        soon = np.maximum(ZERO * terms, -slopes * self.instant)
         down = (reached <= np.minimum(SIMULTANEOUS * terms, soon)) & (slopes <= 0)
         down[found.signal] = True
         result: list[int] = down.nonzero()[0].tolist()

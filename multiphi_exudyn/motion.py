@@ -8,7 +8,7 @@ with its cause.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -153,16 +153,17 @@ class Motion:
         if asking:
             self._decided.append((self._last_decision, state.level.level.highest_frequency))
             self._last_decision = self.time
-            self._decide(asking)
+            again = {i for i in asking if phases[i] is Phase.REFUSED} if reached <= finder.instant else set[int]()
+            self._decide(asking, again)
             self._check_chatter()
 
     def _segment(self, started: float, coefficients: np.ndarray, armed_at: float) -> Segment:
         """The motion from the present state up to now."""
         return Segment(started, self.time, self.state.level, coefficients, self.state.phases, armed_at)
 
-    def _decide(self, asking: set[int]) -> None:
-        """These contacts ask to change at this instant."""
-        self.state, loss, changes = self.rule.decide(self.state, asking)
+    def _decide(self, asking: set[int], again: Iterable[int] = ()) -> None:
+        """These contacts ask to change at this instant; ``again``: those that were refused at it before."""
+        self.state, loss, changes = self.rule.decide(self.state, asking, again)
         self._record(changes, loss)
 
     def _record(self, changes: list[Change], loss: Loss) -> None:

@@ -114,7 +114,11 @@ class Passage(ContactFunctions):
     def _squeezed(self, contacts: Sequence[int]) -> NumericalFailure:
         """The failure of a run in which stops that move leave no way out between these contacts."""
         names = ", ".join(self.model.contacts[i].name for i in sorted(contacts))
-        return NumericalFailure(f"rigid contacts {names}: their stops move against each other and leave no way out")
+        complete = self.model.level_at(()).modes == self.model.base.modes.count
+        kept = "" if complete else " in the kept modes, need more of them"
+        return NumericalFailure(
+            f"rigid contacts {names}: their stops move against each other and leave no way out{kept}"
+        )
 
     @staticmethod
     def _free(level: LoadedLevel) -> int:

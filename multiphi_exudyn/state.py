@@ -25,6 +25,7 @@ class Phase(Enum):
     ARMED = "armed"
     RECOVERING = "recovering"
     REFUSED = "refused"
+    HELD_BACK = "held back"
 
 
 @dataclass(frozen=True)

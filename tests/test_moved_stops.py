@@ -47,6 +47,22 @@ def test_the_ledger_closes_whatever_stop_has_moved_at_the_start(kind, moved, tru
     assert begun_closed >= 3
 
 
+@pytest.mark.parametrize("moved", ["stop", "base"])
+@pytest.mark.parametrize("kind", ["rigid", "mixed"])
+def test_rigid_stops_that_one_mode_cannot_meet_end_in_no_endless_exchange(kind, moved):
+    """In one mode two contacts follow from each other; what a stop's motion leaves between them is said by name."""
+    ended = 0
+    for seed in range(12):
+        run = started_moved(seed, kind, moved, True)
+        if run.status == "ok":
+            ended += 1
+            ledger = run.ledger
+            assert abs(ledger.residual) < 1e-10 * max(ledger.initial, abs(ledger.work_of_loads), ledger.final)
+        else:
+            assert run.message.endswith("leave no way out in the kept modes, need more of them"), run.message
+    assert ended >= 6
+
+
 def test_a_spring_pressed_by_its_moved_stop_holds_energy_at_the_start():
     structure = mp.LinearStructure([[1.0]], [[4.0]], points={"m0": 0})
     model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m0", 0.0, 10.0)], modes="all")

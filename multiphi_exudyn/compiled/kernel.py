@@ -24,6 +24,7 @@ from multiphi_exudyn.compiled.decision import (
 from multiphi_exudyn.compiled.pack import Levels
 from multiphi_exudyn.compiled.search import FOUND, UNDECIDED, first_descent, meets_another
 from multiphi_exudyn.compiled.waves import BOUNDS, cached, copy, exponentials, inlined, jit
+from multiphi_exudyn.first_root import INSTANT
 
 __all__ = ["CHATTER", "CLOSE", "DONE", "FULL", "LEFT", "OPEN", "run"]
 
@@ -171,7 +172,8 @@ def run(
         answer, b = DENIED, a
         if asking >= 0:
             answer, b = decide(k, a, asking, at_x, at_v, after, next_c, work, follow, amounts)
-            if answer == NOT_PLAIN:
+            again = reached * k.scales[a, 3] <= INSTANT and phases[asking] == REFUSED and follow[asking] == REFUSED
+            if answer == NOT_PLAIN or again:
                 return LEFT, a, time, n, m, samples, transitions
         started, time = time, end if reached == horizon else time + reached
         spans[n, 0], spans[n, 1], spans[n, 2], spans[n, 3] = started, time, armed_at, k.scales[a, 3]

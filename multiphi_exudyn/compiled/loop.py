@@ -8,7 +8,7 @@ from multiphi_exudyn.compiled.kernel import CHATTER, FULL, run
 from multiphi_exudyn.compiled.pack import Pack
 from multiphi_exudyn.compiled.record import NUMBERS, PHASES, Record
 from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.state import State
+from multiphi_exudyn.state import Phase, State
 
 __all__ = ["CompiledLoop"]
 
@@ -36,7 +36,7 @@ class CompiledLoop:
         window, period, within: of the chatter check of motion.py.
         """
         position = self._pack.position(state.level)
-        if position is None:
+        if position is None or Phase.HELD_BACK in state.phases:
             return state, time, 0, False
         self._pack.connect()
         levels = self._pack.levels

@@ -7,6 +7,7 @@ load that jumps there may make contacts change, by the same rule.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,9 +61,9 @@ class DrivenMotion(Motion):
         if asking:
             self._decide(asking)
 
-    def _decide(self, asking: set[int]) -> None:
+    def _decide(self, asking: set[int], again: Iterable[int] = ()) -> None:
         before = self._state.level.configuration(self._state.displacement)
-        super()._decide(asking)
+        super()._decide(asking, again)
         self.work += self._varying_work(before, self._state)
 
     def _varying_work(self, before: np.ndarray, state: DrivenState) -> float:
