@@ -245,9 +245,11 @@ class EventRule(Passage):
         opened = sorted(i for i in asking if self._rigid[i])
         pushed = dict[int, float]()
         if opened:
-            entered, impulses, lost = self._collided(entered, opened)
+            before = entered
+            entered, impulses, lost = self._collided(before, opened)
             entered, loss = self._with_phases(entered), loss + lost
-            pushed = dict(zip(opened, impulses.tolist(), strict=True))
+            if np.linalg.norm(entered.velocity - before.velocity) > RESTING * np.linalg.norm(before.velocity):
+                pushed = dict(zip(opened, impulses.tolist(), strict=True))
         changes = [Change(i, "open" if i in state.closed else "close", pushed.get(i, 0.0)) for i in sorted(asking)]
         return entered, loss, changes
 

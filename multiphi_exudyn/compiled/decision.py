@@ -243,13 +243,13 @@ def strike(k: Levels, a: int, contact: int, x: np.ndarray, v: np.ndarray, work: 
 def part_with(k: Levels, b: int, contact: int, v: np.ndarray) -> tuple[float, float]:
     """A rigid contact that has opened keeps no velocity into its stop; kinetic energy lost, and impulse."""
     r, row = k.sizes[b, 0], k.own[b, contact]
-    speed, square, _ = push(row, v, r)
+    speed, square, size = push(row, v, r)
     if speed >= 0:
         return 0.0, 0.0
     before = kinetic(v, r)
     for i in range(r):
         v[i] -= speed / square * row[0, i]
-    return before - kinetic(v, r), -speed / square
+    return before - kinetic(v, r), -speed / square if -speed > RESTING * size else 0.0
 
 
 @inlined
