@@ -129,7 +129,7 @@ class DescentFinder:
         slopes = (self.basis.derivative(coefficients) @ values).real
         terms = np.abs(coefficients) @ np.abs(values) + np.abs(signals.constants)
         soon = np.maximum(ZERO * terms, -slopes * self.instant)
-        down = (reached <= np.minimum(SIMULTANEOUS * terms, soon)) & (slopes <= 0)
+        down = (reached <= np.minimum(SIMULTANEOUS * terms, soon)) & (slopes <= 0) & (terms > 0)  # nothing never falls
         down[found.signal] = True
         result: list[int] = down.nonzero()[0].tolist()
         return result

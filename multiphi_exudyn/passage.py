@@ -73,7 +73,10 @@ class Passage(ContactFunctions):
         before, left = np.abs(state.velocity[:free]), np.abs(velocity[:free])
         stopped = left <= RESTING * before  # round-off of rest, which would bounce and rock on until it underflows
         velocity[:free][stopped | (np.linalg.norm(left) <= RESTING * np.linalg.norm(before))] = 0.0
-        after = replace(state, velocity=velocity)
+        still = (velocity[:free] == 0) & (np.abs(state.displacement[:free]) <= ZERO * state.reach[:free])
+        displacement = state.displacement.copy()
+        displacement[:free][still] = 0.0  # where it has come to rest: what is left would swing, and strike again
+        after = replace(state, displacement=displacement, velocity=velocity)
         lost = state.kinetic - after.kinetic
         plastic = self._plastic(lost, rows @ state.velocity, impulses)
         return after, impulses, Loss(impact=plastic, stop_work=plastic - lost)

@@ -59,6 +59,10 @@ class TestFirst:
             assert (found.time, found.signal) == (earliest, np.argmin(order))
             assert finder.evaluations < 1.2 * alone.evaluations
 
+    def test_a_signal_that_is_zero_for_ever_falls_with_no_other(self):
+        finder, both = DescentFinder(basis([1j])), signals([1.0], [0.0])
+        assert finder.simultaneous(both, finder.first(both, 10.0)) == [0]
+
     def test_none_before_the_horizon(self):
         assert cosine(1.0, horizon=1.57) is None
         assert_allclose(cosine(1.0, horizon=1.571), np.pi / 2, rtol=1e-15)

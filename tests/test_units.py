@@ -111,6 +111,24 @@ def test_a_stop_that_is_touched_without_speed_is_not_struck(power):
         assert not [event for event in run.events if event.time == 0.0 and event.impulse != 0.0], (seed, run.events)
 
 
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("power", [-40, -17, 17, 40])
+def test_a_mass_that_a_stop_halts_where_its_spring_is_at_rest_stays_there(power, quantity):
+    """What round-off leaves of its place would strike again, 1e-16 as hard, until nothing is left of it."""
+    mass, springs = np.diag([1.0, 3.0]), np.diag([20.0, 50.0])
+    structure = mp.LinearStructure(mass, springs, points={"a": 0, "b": 1})
+    contacts = [mp.UnilateralContact("a", "a", 0.0), mp.UnilateralContact("b", "b", 0.3)]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    given = Given(model, contacts, 5.0, np.array([0.2, 0.1]), np.array([0.3, 1.0]), [])
+    for case in (given, replace(given, loads=[mp.HarmonicLoad("b", 0.1, 0.3)])):
+        units = Units(**{quantity: 2.0**power})
+        _, run_there = run(case, units)
+        assert run_there.status == "ok"
+        assert [e.kind for e in run_there.events if e.contact == "a"] == ["close", "open"]
+        after = np.linspace(1.0, 5.0, 20) * units.time
+        assert not np.any(run_there.at("a", after))
+
+
 class TestFreeBodiesWithADashpot:
     @pytest.mark.parametrize("unit", [2.0**k for k in (-40, -20, 0, 20, 40)])
     def test_come_to_move_together(self, unit):
