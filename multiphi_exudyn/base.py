@@ -221,7 +221,7 @@ def rays_of(contacts: Sequence[Contact]) -> list[int]:
     return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
 
 
-def cleared(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def cleared(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:
     """Sums with zero where they are round-off of their terms, which add up to ``sizes`` without their signs.
 
     The gap of a contact that another one holds does not move; what is left of it has no sign.

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from multiphi_exudyn.base import cleared
 from multiphi_exudyn.contact_functions import ContactFunctions
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.least_distance import Infeasible
@@ -158,7 +159,7 @@ class Passage(ContactFunctions):
         return after, self._loss(state, after)
 
     def _entered(self, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray) -> State:
-        """A state given in base coordinates, in a level's modes."""
-        vectors = level.level.vectors.T
-        eta = vectors @ (displacement - level.asymptotic.configuration)
+        """A state given in base coordinates, in a level's modes; one at its own rest has no round-off of its place."""
+        vectors, rest = level.level.vectors.T, level.asymptotic.configuration
+        eta = cleared(vectors @ (displacement - rest), np.linalg.norm(displacement) + np.linalg.norm(rest))
         return State(level, eta, vectors @ velocity, (Phase.ARMED,) * len(self._rigid))

@@ -179,7 +179,8 @@ def _campaign(cases, given):
 
 def kernel():
     """Name of the kernels that NumPy's linear algebra runs."""
-    return threadpoolctl.threadpool_info()[0].get("architecture", "unknown")
+    found = (info for info in threadpoolctl.threadpool_info() if info.get("internal_api") == "openblas")
+    return next((info["architecture"] for info in found), "unknown")
 
 
 def _key(cases):

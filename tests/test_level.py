@@ -141,7 +141,7 @@ class TestAsymptoticConfiguration:
         m = MultiPhiModel(structure, [UnilateralContact(f"c{i}", d, 0.0) for i, d in enumerate(directions)], "all")
         rest = m.level(["c0", "c1"]).asymptotic(m.base.modes.shapes.T @ [-746.0, -10.8, -10.2])
         x = m.base.modes.shapes @ rest.configuration
-        assert np.all(np.abs(rows(m) @ x) <= 1e-15 * np.abs(rows(m)) @ np.abs(x))
+        assert np.all(np.abs(rows(m) @ x) <= 4e-15 * np.abs(rows(m)) @ np.abs(x))
 
     def test_of_springs_beside_a_rigid_contact_of_their_direction_is_held_by_it_alone(self):
         """Each spring pushes with what its gap there says, the rigid contact with the rest."""

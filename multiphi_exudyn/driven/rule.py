@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from multiphi_exudyn.base import cleared
 from multiphi_exudyn.driven.excitation import Excitation
 from multiphi_exudyn.driven.flow import Basis
 from multiphi_exudyn.driven.level import DrivenLevel, DrivenTransition
@@ -70,7 +71,9 @@ class DrivenRule(EventRule):
         assert isinstance(level, DrivenLevel)
         (w, w_t, _), modes = self.drive.values, level.plain.level.modes
         vectors, shown = level.plain.level.vectors.T, level.level.vectors[:, modes:]
-        eta = vectors @ (displacement - level.asymptotic.configuration - shown @ w)
+        rest = level.asymptotic.configuration
+        size = np.linalg.norm(displacement) + np.linalg.norm(rest) + np.linalg.norm(shown @ w)
+        eta = cleared(vectors @ (displacement - rest - shown @ w), size)
         eta_t = vectors @ (velocity - level.carried @ w_t)
         return self.state(State(level.plain, eta, eta_t, (Phase.ARMED,) * len(self._rigid)))
 
