@@ -153,8 +153,8 @@ class Motion:
         if asking:
             self._decided.append((self._last_decision, state.level.level.highest_frequency))
             self._last_decision = self.time
-            again = {i for i in asking if phases[i] is Phase.REFUSED} if reached <= finder.instant else set[int]()
-            self._decide(asking, again)
+            at_once = reached <= finder.instant and not self.model.whole  # all modes have an answer
+            self._decide(asking, {i for i in asking if at_once and phases[i] is Phase.REFUSED})
             self._check_chatter()
 
     def _segment(self, started: float, coefficients: np.ndarray, armed_at: float) -> Segment:

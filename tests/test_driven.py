@@ -1,6 +1,7 @@
 """Loads and stops that vary in time: against integrators, closed forms, and the ledger."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -280,18 +281,21 @@ class TestSmoothLoadsHoldTheirToleranceInTheResponse:
 class TestEquivalences:
     @given(seed=st.integers(0, 10**6), kind=st.sampled_from(["mixed", "rigid"]))
     @settings(max_examples=25)
-    @example(seed=2000, kind="mixed")
     @example(seed=4593, kind="rigid")  # comes to rest at its stop where no force presses it
+    @example(seed=471909, kind="rigid")  # two instants at which a contact without force may open and close
     def test_a_harmonic_of_frequency_zero_is_a_constant_load(self, seed, kind):
+        """With all modes: those left out follow a load that varies statically, and a constant one is part of x_inf."""
         model, random = random_model(seed, damping="modal", kind=kind)
+        model = replace(model, modes="all")
         amplitude, x0 = float(random.normal()), np.zeros(model.structure.n)
         constant = mp.simulate(model, 3.0, x0, loads=[mp.ConstantLoad("m0", amplitude)], compiled=False)
         varying = mp.simulate(model, 3.0, x0, loads=[mp.HarmonicLoad("m0", amplitude, 0.0)])
-        t = np.linspace(0, min(constant.t_end, varying.t_end), 50)
-        if np.max(np.abs(constant.velocity(t))) > 1e-12:  # else it is at rest, and only round-off could strike
-            assert [e.kind for e in constant.events] == [e.kind for e in varying.events]
-        if constant.status == varying.status == "ok":
-            assert_allclose(varying.displacement(t), constant.displacement(t), atol=1e-8)
+        assert constant.status == varying.status == "ok"
+        t = np.linspace(0, 3.0, 50)
+        assert_allclose(varying.displacement(t), constant.displacement(t), atol=1e-8)
+        for contact in model.contacts:
+            pushed = [run.contact_impulse(contact.name, 0.0, 3.0) for run in (varying, constant)]
+            assert pushed[0] == pytest.approx(pushed[1], abs=1e-8)
 
     @given(seed=st.integers(0, 10**6))
     @settings(max_examples=25)
