@@ -68,6 +68,7 @@ def runs(system: PublishedSystem) -> Runs:
     reduction = reduce(system.mbs, modes=MODES)
     print(reduction.report)
     alone = mp.simulate(reduction.model, system.end, velocity=reduction.velocity, loads=reduction.loads)
+    print(reduction.report_of(alone))
     return Runs(reduction, alone, put_back(reduction, system.end), OwnRun.of(system), system.point)
 
 

@@ -359,3 +359,14 @@ def test_a_slender_beam_that_bends_is_not_said_to_be_stretched():
         trajectory = run(reduction, 2.0)
         assert np.max(trajectory.at("tip.y", np.linspace(0.0, 2.0, 99))) == pytest.approx(2 * force / 3, rel=0.05)
         assert reduction.check(trajectory).holds is holds
+
+
+def test_a_report_of_a_run_says_what_holds_until_when_and_what_it_warns_of():
+    _, mbs = pendulum(57.0)
+    reduction = reduce(mbs)
+    trajectory = run(reduction, 1.0)
+    linear, horizon, *warned = reduction.report_of(trajectory).splitlines()
+    assert linear.startswith("linear range (does not hold): forces that the model lacks: ")
+    assert horizon == "determined within 1 % until 1 of 1 s"
+    assert warned == [f"warning: {sentence}" for sentence in trajectory.warnings]
+    assert warned[0].startswith("warning: linear range: ")

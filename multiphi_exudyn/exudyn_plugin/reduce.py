@@ -86,6 +86,20 @@ class Reduction:
         assert isinstance(validity, (LinearRange, LinearLimits))
         return validity.check(trajectory)
 
+    def report_of(self, trajectory: Trajectory, tolerance: float = 0.01) -> str:
+        """How far a trajectory of this model can be trusted, a line each: linear range, horizon, warnings.
+
+        tolerance: of the horizon, see ``Trajectory.horizon``.
+        """
+        found = self.check(trajectory)
+        missed = f"forces that the model lacks: {found.error:.2g} of its largest displacement"
+        held, horizon = "holds" if found.holds else "does not hold", trajectory.horizon(tolerance)
+        lines = [
+            f"linear range ({held}): {f'not checked, {found.reason}' if found.reason else missed}",
+            f"determined within {100 * tolerance:g} % until {horizon:.6g} of {trajectory.t_end:g} s",
+        ]
+        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in trajectory.warnings)])
+
 
 def reduce(
     mbs: Any,
