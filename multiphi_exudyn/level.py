@@ -134,18 +134,26 @@ class Level:
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
         supports = self.base.supports(self.indices, self.base.gaps[list(self.indices)])
-        springs = np.flatnonzero(~supports.rigid)
-        return {self.base.label(supports.members[s][0]): self._static_share(supports, s) for s in springs.tolist()}
+        springs, flexibilities = np.flatnonzero(~supports.rigid), self._flexibilities(supports)
+        names = [self.base.label(supports.members[s][0]) for s in springs.tolist()]
+        rows, elastic = supports.directions[:, springs].T, self.base.modes.omega > 0
+        own = np.sum((rows[:, elastic] / self.base.modes.omega[elastic]) ** 2, axis=1)
+        kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
+        left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
+        whole = left + np.sum(np.abs(kept), axis=1)
+        moving = whole > ZERO * own  # what rigid contacts leave of the others is round-off
+        shares = np.divide(left, whole, out=np.zeros(len(left)), where=moving)
+        return dict(zip(names, shares.tolist(), strict=True))
 
-    def _static_share(self, supports: Supports, s: int) -> float:
-        """That part along the support ``s``, zero where rigid contacts leave it nothing but round-off."""
-        row, elastic = supports.directions[:, s], self.base.modes.omega > 0
-        own = float(np.sum((row[elastic] / self.base.modes.omega[elastic]) ** 2))
-        flexibility = float(row @ self.rest(row, np.zeros(len(self.indices)))[1])
-        kept = (row @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
-        left = max(0.0, flexibility - float(np.sum(kept)))
-        whole = left + float(np.sum(np.abs(kept)))
-        return left / whole if whole > ZERO * own else 0.0
+    def _flexibilities(self, supports: Supports) -> np.ndarray:
+        """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
+        stiffness = supports.stiffness
+        if self.base.modes.rigid or np.any(stiffness == 0):
+            rows, gaps = supports.directions.T, np.zeros(len(self.indices))
+            return np.array([row @ self.rest(row, gaps)[1] for row in rows])
+        free = supports.directions.T @ (self.base.modes.omega[:, None] ** -2.0 * supports.directions)
+        yielding = 1 / stiffness
+        return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
 
     @functools.cached_property
     def shapes(self) -> np.ndarray:
