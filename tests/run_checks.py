@@ -96,7 +96,7 @@ def energy(run, segments, scale, samples=5):
     times = np.array([start + inside * (end - start) for start, end in ends])
     left = (run.energy(times.ravel()) - _work(run, times.ravel())).reshape(times.shape)
     rises = np.diff(left.ravel()) if _complete(run) else np.diff(left, axis=1).ravel()
-    returned = max((-event.loss.damping for event in run.events), default=0.0)  # a damper's, closing inside a stop again
+    returned = max((-event.loss.damping for event in run.events), default=0.0)  # by dampers
     worst = float(np.max(rises, initial=0.0)) - max(returned, 0.0)
     return f"energy: rises by {worst:g} J" if worst > NO_TRUNCATION * scale else None
 
