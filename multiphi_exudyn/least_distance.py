@@ -39,6 +39,8 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
     as small as what is left of its row beside theirs may be. The rows with p > 0 are independent of each other. Raises
     Infeasible where no x meets all of them, NumericalFailure where round-off keeps the sets from settling.
     """
+    if len(least) == 1:
+        return _single(rows[0], float(least[0]), float(sizes[0]))
     lengths = np.linalg.norm(rows, axis=1)
     lengths[lengths == 0] = 1.0
     units, wanted, sizes = rows / lengths[:, None], least / lengths, sizes / lengths
@@ -62,6 +64,16 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
             continue
         x, shares = _meeting(units[pushing], wanted[pushing])
     raise NumericalFailure("least distance: round-off decides which inequalities push")
+
+
+def _single(row: np.ndarray, least: float, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """``least_distance`` of one inequality: the step along its row that it lacks."""
+    square = float(row @ row)
+    if least <= ZERO * size:
+        return np.zeros(len(row)), np.zeros(1)
+    if square == 0.0:
+        raise Infeasible([0])
+    return row * (least / square), np.array([least / square])
 
 
 def _entered(
