@@ -27,9 +27,7 @@ __all__ = ["CompiledMotion", "Motion"]
 EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
 CHATTER_WINDOW = 200  # events, for every contact
 ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
-COMPILED_PERIODS = (
-    1e9  # of the highest mode to the end: of more than that only the NumPy loop says that it takes for ever
-)
+COMPILED_PERIODS = 1e9  # of the highest mode to the end: more takes for ever, and only the NumPy loop says so
 
 
 @dataclass
