@@ -92,7 +92,17 @@ class EventRule(Passage):
         return state, loss + lost, changes + made
 
     def decide(self, state: State, asking: set[int], again: Iterable[int] = ()) -> tuple[State, Loss, list[Change]]:
-        """State right after an instant at which these contacts ask to change; ``again``: those refused at it before."""
+        """State right after an instant at which these contacts ask to change; ``again``: those refused at it before.
+
+        Where in the end all contacts are as before, and none was struck, nothing has happened at it.
+        """
+        after, loss, changes = self._decided(state, asking, again)
+        if changes and after.closed == state.closed and not any(c.impulse or c.shared for c in changes):
+            return self._held_back(self._with_phases(state, asking), again), Loss(), []
+        return after, loss, changes
+
+    def _decided(self, state: State, asking: set[int], again: Iterable[int]) -> tuple[State, Loss, list[Change]]:
+        """``decide`` with all that happens on the way."""
         heard, freed = set(asking), self._held(state, asking)
         loss, changes = Loss(), list[Change]()
         if asking:
@@ -266,6 +276,8 @@ class EventRule(Passage):
         released, loss = self._moved(state, self.level(compliant))
         struck, impulses, plastic = self._collided(released, touching)
         same = np.linalg.norm(struck.velocity - released.velocity) <= RESTING * np.linalg.norm(released.velocity)
+        if same:
+            impulses = np.zeros_like(impulses)  # round-off of them: nothing was struck
         closed = self._pressing(released, struck, touching)
         after, dropped = struck, loss + plastic
         while closed:

@@ -21,6 +21,7 @@ __all__ = ["FOLLOWING", "INDEPENDENT", "Infeasible", "least_distance"]
 
 INDEPENDENT = 1e-10  # of its length: what is left of a direction beside others, below which it follows from them
 FOLLOWING = 10 * INDEPENDENT  # of its terms: what an inequality that follows from others may lack beside them
+ALIKE = 1e-10  # of the largest lack: those that lack as much to round-off are one, and the first of them enters
 SETS = 20  # tried for every inequality: far fewer are needed
 
 
@@ -54,7 +55,7 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
             multipliers = np.zeros(len(least))
             multipliers[pushing] = shares
             return x, multipliers / lengths
-        entering = int(np.argmax(lacking))
+        entering = int(np.argmax(lacking >= (1 - ALIKE) * np.max(lacking)))
         try:
             pushing, shares = _entered(units, lacking[entering], pushing, shares, entering)
         except Infeasible:

@@ -143,3 +143,12 @@ def test_says_where_it_does_not_settle(monkeypatch):
     monkeypatch.setattr("multiphi_exudyn.least_distance.SETS", 0)
     with pytest.raises(NumericalFailure, match="round-off decides"):
         least_distance(np.eye(2), np.ones(2), np.ones(2))
+
+
+@pytest.mark.parametrize("nudge", [-1.0, 0.0, 1.0])
+def test_of_inequalities_that_lack_the_same_to_round_off_the_first_pushes(nudge):
+    rows = np.array([[2.0, 1.0], [0.5, 0.25]])
+    least = np.array([3.0, 0.75 * (1 + nudge * np.finfo(float).eps)])
+    _, multipliers = least_distance(rows, least, np.zeros(2))
+    assert multipliers[0] > 0
+    assert multipliers[1] == 0
