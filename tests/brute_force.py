@@ -374,13 +374,14 @@ class _Integration:
         largest = np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.c])
         allowed = np.maximum.accumulate(allowed + self.touch * (np.abs(level.signals) @ largest), axis=0)
         below = s[1:] < -allowed[1:]
-        curved = np.zeros_like(below)
+        curved, bends = np.zeros_like(below), np.zeros((1, s.shape[1]))
         if len(s) > 2:
-            low = (s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:]) & (s[1:-1] < 2 * (s[:-2] - 2 * s[1:-1] + s[2:]))
+            bends = s[:-2] - 2 * s[1:-1] + s[2:]
+            low = (s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:]) & (s[1:-1] < 2 * bends)
             curved[:-1] |= low
             curved[1:] |= low
-        curved[0] |= s[0] < 4 * np.abs(s[1] - s[0])
-        curved[-1] |= s[-1] < 4 * np.abs(s[-1] - s[-2])
+        curved[0] |= s[0] < 4 * np.abs(s[1] - s[0]) + 2 * np.abs(bends[0])
+        curved[-1] |= s[-1] < 4 * np.abs(s[-1] - s[-2]) + 2 * np.abs(bends[-1])
         for j in np.flatnonzero(np.any(below | curved, axis=1)):
             roots = [
                 self._root(level, i, times, states, j, allowed[j + 1, i]) for i in np.flatnonzero(below[j] | curved[j])
