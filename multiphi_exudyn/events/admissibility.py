@@ -1,4 +1,4 @@
-"""Contact functions: what says whether a contact may stay as it is, and which are looked at (events/rule.py).
+"""Admissibility: functions that say whether a contact may stay as it is, and which are looked at (rule.py).
 
     open                 s = g         gap
     closed, compliant    s = -g        penetration

@@ -30,19 +30,19 @@ NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
     """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
     closed = list(indices)
-    supports = base.supports(closed, base.gaps[closed])
+    closed_directions = base.closed_directions(closed, base.gaps[closed])
     if not independent(base, held := [i for i in closed if base.contacts[i].rigid]):
         names = ", ".join(base.contacts[i].name for i in held)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    turned, _ = supports.orthogonal
+    turned, _ = closed_directions.orthogonal
     squares, vectors, accuracy = level_modes(base, turned, modes)
     rigid_body = _rigid_body_modes(base, turned)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    damping = base.resistance(closed)
+    damping = base.damping_matrix(closed)
     squares, vectors = _turned(base, squares, vectors, damping)
     zero = squares == 0
-    _check(base, squares, vectors, supports, accuracy)
+    _check(base, squares, vectors, closed_directions, accuracy)
     gap_rows = drop_round_off(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
     gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
@@ -137,13 +137,13 @@ def _units(directions: np.ndarray) -> np.ndarray:
     return directions / np.where(lengths > 0, lengths, 1.0)
 
 
-def _rigid_body_modes(base: ModalBase, supports: ClosedDirections) -> int:
+def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:
     """Rigid-body motions that no closed contact resists."""
-    rigid = supports.resisting[: base.modes.rigid]
+    rigid = closed_directions.resisting[: base.modes.rigid]
     if rigid.size == 0:
         return base.modes.rigid
     singular = np.linalg.svd(rigid, compute_uv=False)
-    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * supports.size))
+    return base.modes.rigid - int(np.sum(singular > INDEPENDENT * closed_directions.size))
 
 
 def _reaction_rows(
@@ -165,11 +165,11 @@ def _reaction_rows(
 
 
 def _check(
-    base: ModalBase, squares: np.ndarray, vectors: np.ndarray, supports: ClosedDirections, accuracy: float
+    base: ModalBase, squares: np.ndarray, vectors: np.ndarray, closed_directions: ClosedDirections, accuracy: float
 ) -> None:
     """Mass normalisation and interlacing."""
     error = np.max(np.abs(vectors.T @ vectors - np.eye(len(squares))), initial=0.0)
-    stiffening, softening = int(np.sum(supports.stiffness > 0)), int(np.sum(supports.stiffness < 0))
+    stiffening, softening = int(np.sum(closed_directions.stiffness > 0)), int(np.sum(closed_directions.stiffness < 0))
     given = base.modes.omega**2
     slack = INTERLACING * (given + accuracy) + np.finfo(float).eps * np.max(given, initial=0.0)
     below, above = (given - slack)[: len(squares) - softening], (given + slack)[stiffening:]

@@ -1,4 +1,4 @@
-"""Supports: what closed contacts are along each of their directions.
+"""Closed directions: what closed contacts are along each of their directions.
 
 Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
 K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force.
@@ -18,12 +18,12 @@ __all__ = ["ClosedDirections"]
 class ClosedDirections:
     """What closed contacts are along each of their d directions p.
 
-    members: the contacts of each. directions: (m, d). stiffness: K (d,) [N/m], inf where rigid.
+    members: the contacts of each. vectors: p (m, d). stiffness: K (d,) [N/m], inf where rigid.
     offsets: (d,) G / K [m], the gap of a single contact; G [N] where K is zero.
     """
 
     members: tuple[tuple[int, ...], ...]
-    directions: np.ndarray
+    vectors: np.ndarray
     stiffness: np.ndarray
     offsets: np.ndarray
 
@@ -41,18 +41,18 @@ class ClosedDirections:
         rigid = self.rigid
         if np.sum(rigid) < 2:
             return self, np.eye(int(np.sum(rigid)))
-        own = self.directions[:, rigid]
+        own = self.vectors[:, rigid]
         length = float(np.max(np.linalg.norm(own, axis=0))) or 1.0
         q, r = np.linalg.qr(own / length)
-        directions, offsets = self.directions.copy(), self.offsets.copy()
-        directions[:, rigid] = length * q
+        vectors, offsets = self.vectors.copy(), self.offsets.copy()
+        vectors[:, rigid] = length * q
         offsets[rigid] = np.linalg.solve(r.T, offsets[rigid])
-        return ClosedDirections(self.members, directions, self.stiffness, offsets), r
+        return ClosedDirections(self.members, vectors, self.stiffness, offsets), r
 
     @property
     def resisting(self) -> np.ndarray:
         """Directions (m, .) in which there is a stiffness."""
-        return self.directions[:, self.stiffness != 0]
+        return self.vectors[:, self.stiffness != 0]
 
     @property
     def size(self) -> float:

@@ -134,10 +134,10 @@ class Level:
         rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
-        supports = self.base.supports(self.indices, self.base.gaps[list(self.indices)])
-        springs, flexibilities = np.flatnonzero(~supports.rigid), self._flexibilities(supports)
-        names = [self.base.label(supports.members[s][0]) for s in springs.tolist()]
-        rows, elastic = supports.directions[:, springs].T, self.base.modes.omega > 0
+        closed_directions = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)])
+        springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
+        names = [self.base.label(closed_directions.members[s][0]) for s in springs.tolist()]
+        rows, elastic = closed_directions.vectors[:, springs].T, self.base.modes.omega > 0
         own = np.sum((rows[:, elastic] / self.base.modes.omega[elastic]) ** 2, axis=1)
         kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
         left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
@@ -146,13 +146,13 @@ class Level:
         shares = np.divide(left, whole, out=np.zeros(len(left)), where=moving)
         return dict(zip(names, shares.tolist(), strict=True))
 
-    def _flexibilities(self, supports: ClosedDirections) -> np.ndarray:
+    def _flexibilities(self, closed_directions: ClosedDirections) -> np.ndarray:
         """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
-        stiffness = supports.stiffness
+        stiffness = closed_directions.stiffness
         if self.base.modes.rigid or np.any(stiffness == 0):
-            rows, gaps = supports.directions.T, np.zeros(len(self.indices))
+            rows, gaps = closed_directions.vectors.T, np.zeros(len(self.indices))
             return np.array([row @ self.static_response(row, gaps)[1] for row in rows])
-        free = supports.directions.T @ (self.base.modes.omega[:, None] ** -2.0 * supports.directions)
+        free = closed_directions.vectors.T @ (self.base.modes.omega[:, None] ** -2.0 * closed_directions.vectors)
         yielding = 1 / stiffness
         return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
 
@@ -218,12 +218,12 @@ class Level:
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
         base, gaps = self.base, self.base.gaps[list(self.indices)]
-        supports = base.supports(self.indices, gaps)
-        along, configuration, pushing = self._response(supports, load + base.preload)
+        closed_directions = base.closed_directions(self.indices, gaps)
+        along, configuration, pushing = self._response(closed_directions, load + base.preload)
         strain = base.strain(configuration, self.indices)
         return Asymptotic(
             configuration=configuration,
-            forces=self._forces(supports, along, configuration, gaps),
+            forces=self._forces(closed_directions, along, configuration, gaps),
             drive=np.where(self.squares != 0, 0.0, self.vectors.T @ pushing),
             load=self.vectors.T @ load,
             strain=strain,
@@ -232,39 +232,41 @@ class Level:
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
-        supports = self.base.supports(self.indices, gaps)
-        along, configuration, _ = self._response(supports, load)
-        return self._forces(supports, along, configuration, gaps), configuration
+        closed_directions = self.base.closed_directions(self.indices, gaps)
+        along, configuration, _ = self._response(closed_directions, load)
+        return self._forces(closed_directions, along, configuration, gaps), configuration
 
-    def _response(self, supports: ClosedDirections, total: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _response(
+        self, closed_directions: ClosedDirections, total: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(f, y, what drives zero-frequency modes) under a load (m,)."""
         if self.neutral.size:
-            return self._neutral_response(supports, total)
-        along, configuration = static_response(self.base, supports, total)
-        return along, configuration, total + supports.directions @ along
+            return self._neutral_response(closed_directions, total)
+        along, configuration = static_response(self.base, closed_directions, total)
+        return along, configuration, total + closed_directions.vectors @ along
 
     def _neutral_response(
-        self, supports: ClosedDirections, total: np.ndarray
+        self, closed_directions: ClosedDirections, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of some mode exactly."""
-        if np.any(supports.rigid):
+        if np.any(closed_directions.rigid):
             raise NumericalFailure(
                 f"level {', '.join(self.closed)}: negative stiffness cancels that of a mode beside closed rigid "
                 "contacts, so there is no state of rest"
             )
-        pushing = total - supports.directions @ supports.constants
-        _, found = static_response(self.base, supports, total - self.neutral @ (self.neutral.T @ pushing))
+        pushing = total - closed_directions.vectors @ closed_directions.constants
+        _, found = static_response(self.base, closed_directions, total - self.neutral @ (self.neutral.T @ pushing))
         configuration = found - self.neutral @ (self.neutral.T @ found)
         return (
-            -supports.constants - supports.stiffness * (supports.directions.T @ configuration),
+            -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
             configuration,
             pushing,
         )
 
     def _forces(
-        self, supports: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
+        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
     ) -> np.ndarray:
         """lambda (k,) of the closed contacts from the forces along their directions."""
         index, closing = list(self.indices), np.zeros(len(self.base.contacts))
         closing[index] = self.base.directions[:, index].T @ configuration + gaps
-        return self.base.contact_forces(supports, along, closing)[index]
+        return self.base.contact_forces(closed_directions, along, closing)[index]

@@ -42,19 +42,23 @@ LARGE = 150  # modes of a base from which iterations are the cheaper way to the 
 APART = 1e-6  # relative distance of two compliances at least, to count what lies beyond the middle between them
 
 
-def level_modes(base: ModalBase, supports: ClosedDirections, modes: int | None) -> tuple[np.ndarray, np.ndarray, float]:
+def level_modes(
+    base: ModalBase, closed_directions: ClosedDirections, modes: int | None
+) -> tuple[np.ndarray, np.ndarray, float]:
     """omega^2 ascending, modes (m, r), the lowest ``modes`` at least or all, and the mu that limits their accuracy."""
-    if not supports.members:
+    if not closed_directions.members:
         return base.modes.omega[:modes] ** 2, np.eye(base.modes.count, modes), 0.0
-    if modes is not None and _few(base, supports, modes):
-        return _lowest(base, supports, modes)
-    return _modes(base, supports, _null_space(supports.directions[:, supports.rigid]))
+    if modes is not None and _few(base, closed_directions, modes):
+        return _lowest(base, closed_directions, modes)
+    return _modes(base, closed_directions, _null_space(closed_directions.vectors[:, closed_directions.rigid]))
 
 
-def _modes(base: ModalBase, supports: ClosedDirections, free: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _modes(
+    base: ModalBase, closed_directions: ClosedDirections, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
     """omega^2 ascending, modes (m, r) in the motions ``free`` (m, r), and the mu that limits their accuracy."""
-    directions, stiffness = supports.directions, supports.stiffness
-    stiffening, softening = (stiffness > 0) & ~supports.rigid, stiffness < 0
+    directions, stiffness = closed_directions.vectors, closed_directions.stiffness
+    stiffening, softening = (stiffness > 0) & ~closed_directions.rigid, stiffness < 0
     springs = np.sqrt(stiffness[stiffening])[:, None] * (directions[:, stiffening].T @ free)
     omega, rotation = right_singular_vectors(np.vstack([base.modes.omega[:, None] * free, springs]))
     squares, vectors = omega**2, free @ rotation
@@ -63,17 +67,17 @@ def _modes(base: ModalBase, supports: ClosedDirections, free: np.ndarray) -> tup
     return _softened(squares, vectors, (vectors.T @ directions[:, softening]) * np.sqrt(-stiffness[softening]))
 
 
-def _few(base: ModalBase, supports: ClosedDirections, modes: int) -> bool:
+def _few(base: ModalBase, closed_directions: ClosedDirections, modes: int) -> bool:
     """Whether the compliance gives that many modes cheaply."""
-    left = base.modes.count - int(np.sum(supports.rigid))
+    left = base.modes.count - int(np.sum(closed_directions.rigid))
     few = modes <= left and FEW * modes <= base.modes.count
-    return few and not base.modes.rigid and bool(np.all(supports.stiffness >= 0))
+    return few and not base.modes.rigid and bool(np.all(closed_directions.stiffness >= 0))
 
 
-def _lowest(base: ModalBase, supports: ClosedDirections, modes: int) -> tuple[np.ndarray, np.ndarray, float]:
+def _lowest(base: ModalBase, closed_directions: ClosedDirections, modes: int) -> tuple[np.ndarray, np.ndarray, float]:
     """``_modes``, the lowest ones only, by way of the level's compliance."""
-    sprung = supports.stiffness != 0
-    directions, stiffness = supports.directions[:, sprung], supports.stiffness[sprung]
+    sprung = closed_directions.stiffness != 0
+    directions, stiffness = closed_directions.vectors[:, sprung], closed_directions.stiffness[sprung]
     compliance = base.modes.omega**-2.0
     lengths = np.linalg.norm(directions / base.modes.omega[:, None], axis=0)
     bent = compliance[:, None] * directions / lengths
@@ -89,7 +93,7 @@ def _lowest(base: ModalBase, supports: ClosedDirections, modes: int) -> tuple[np
     if pinned.shape[1]:
         held = np.linalg.qr(pinned)[0]
         vectors = vectors - held @ (held.T @ vectors)
-    return _modes(base, supports, np.linalg.qr(vectors)[0])
+    return _modes(base, closed_directions, np.linalg.qr(vectors)[0])
 
 
 def _of_all(compliance: np.ndarray, taken: np.ndarray, modes: int) -> np.ndarray:

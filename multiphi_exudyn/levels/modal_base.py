@@ -1,4 +1,4 @@
-"""Base: the coordinates in which every level is a small dense problem, whatever n is.
+"""Modal base: the coordinates in which every level is a small dense problem, whatever n is.
 
     x = Phi y,   y = Phi^T M x
 
@@ -82,8 +82,8 @@ class ModalBase:
         return np.array([contact.damping for contact in self.contacts])
 
     @functools.cached_property
-    def rays(self) -> list[int]:
-        """``rays_of`` the contacts, all others of one direction up to its sign taken together as well."""
+    def direction_indices(self) -> list[int]:
+        """``direction_indices`` of the contacts, all others of one direction up to its sign taken together as well."""
         first = direction_indices(self.contacts)
         plain = [i for i, c in enumerate(self.contacts) if not isinstance(c, LawSpring)]
         for k, i in enumerate(plain):
@@ -98,15 +98,15 @@ class ModalBase:
         return np.flatnonzero(apart <= PARALLEL * np.max(np.abs(other), axis=0))
 
     @functools.cached_property
-    def signs(self) -> np.ndarray:
-        """Sign (c,) of every contact's direction to the one of its ray."""
-        along = np.sum(self.directions * self.directions[:, self.rays], axis=0)
+    def direction_signs(self) -> np.ndarray:
+        """Sign (c,) of every contact's direction to the one that stands for it."""
+        along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
         return np.where(along < 0, -1, 1)
 
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:
         """Every force law by the position of its first spring."""
-        given = ((i, self.contacts[i]) for i in sorted(set(self.rays)))
+        given = ((i, self.contacts[i]) for i in sorted(set(self.direction_indices)))
         return {i: contact.law for i, contact in given if isinstance(contact, LawSpring)}
 
     def label(self, contact: int) -> str:
@@ -123,7 +123,7 @@ class ModalBase:
         return total
 
     @functools.cached_property
-    def datum(self) -> float:
+    def energy_offset(self) -> float:
         """Strain energy [J] of the constant forces of all force laws at q = 0: a law has none at its centre."""
         return -sum(law.constant * law.centre for law in self.laws.values())
 
@@ -136,9 +136,9 @@ class ModalBase:
         closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
         springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
         bent = 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
-        return bent - float(self.preload @ configuration) + self.datum
+        return bent - float(self.preload @ configuration) + self.energy_offset
 
-    def resistance(self, closed: Sequence[int]) -> np.ndarray:
+    def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
         """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""
         viscous = [i for i in closed if self.dampings[i]]
         if not viscous:
@@ -146,20 +146,22 @@ class ModalBase:
         directions = self.directions[:, viscous]
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
 
-    def supports(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
+    def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
         """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""
-        along = [self.rays[i] for i in closed]
+        along = [self.direction_indices[i] for i in closed]
         if len(set(along)) == len(along):
             index, alone = list(closed), tuple((i,) for i in closed)
-            return ClosedDirections(alone, self.directions[:, along], self.stiffnesses[index], self.signs[index] * gaps)
-        rays: dict[int, list[int]] = {}
+            return ClosedDirections(
+                alone, self.directions[:, along], self.stiffnesses[index], self.direction_signs[index] * gaps
+            )
+        groups: dict[int, list[int]] = {}
         given = dict(zip(closed, gaps.tolist(), strict=True))
         for i in closed:
-            rays.setdefault(self.rays[i], []).append(i)
-        together = [part for members in rays.values() for part in self._held_once(members)]
+            groups.setdefault(self.direction_indices[i], []).append(i)
+        together = [part for members in groups.values() for part in self._held_once(members)]
         stiffness, offsets = np.zeros((2, len(together)))
         for j, members in enumerate(together):
-            k, signed = self.stiffnesses[members], self.signs[members] * [given[i] for i in members]
+            k, signed = self.stiffnesses[members], self.direction_signs[members] * [given[i] for i in members]
             stiffness[j] = np.sum(k)
             rigid = np.isinf(k)
             if len(members) == 1 or np.any(rigid):
@@ -168,7 +170,7 @@ class ModalBase:
             if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
                 stiffness[j] = 0.0
             offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
-        directions = self.directions[:, [self.rays[members[0]] for members in together]]
+        directions = self.directions[:, [self.direction_indices[members[0]] for members in together]]
         return ClosedDirections(tuple(map(tuple, together)), directions, stiffness, offsets)
 
     def _held_once(self, members: list[int]) -> list[list[int]]:
@@ -176,21 +178,23 @@ class ModalBase:
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
-    def contact_forces(self, supports: ClosedDirections, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
-        """lambda (c,) [N] from the forces (d,) along supports and the gaps (c,) there; zero where open.
+    def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
+        """lambda (c,) [N] from the forces (d,) along closed directions and the gaps (c,) there; zero where open.
 
         Springs of one direction have what their gaps say, and a rigid contact among them the rest.
         """
         forces = np.zeros(len(self.contacts))
-        for members, force in zip(supports.members, along.tolist(), strict=True):
+        for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:
                 springs = [i for i in index if i not in held]
-                moved = self.signs[held[0]] * closing[held[0]] if held else 0.0  # round-off of zero
-                forces[springs] = -self.stiffnesses[springs] * (closing[springs] - self.signs[springs] * moved)
-                force -= self.signs[springs] @ forces[springs]
+                moved = self.direction_signs[held[0]] * closing[held[0]] if held else 0.0  # round-off of zero
+                forces[springs] = -self.stiffnesses[springs] * (
+                    closing[springs] - self.direction_signs[springs] * moved
+                )
+                force -= self.direction_signs[springs] @ forces[springs]
                 index = held
-            forces[index] = self.signs[index] * force
+            forces[index] = self.direction_signs[index] * force
         return forces
 
 

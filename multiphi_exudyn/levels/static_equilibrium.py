@@ -84,10 +84,10 @@ def _path(base: ModalBase, closed: set[int], loads: np.ndarray, lifts: np.ndarra
     configurations, functions = [], []
     for load, part in zip(loads, (1.0, 0.0), strict=True):
         gaps = base.gaps + part * lifts
-        supports = base.supports(index, gaps[index])
-        forces, configuration = static_response(base, supports, load)
+        closed_directions = base.closed_directions(index, gaps[index])
+        forces, configuration = static_response(base, closed_directions, load)
         states = base.directions.T @ configuration + gaps
-        pushed = base.contact_forces(supports, forces, states)
+        pushed = base.contact_forces(closed_directions, forces, states)
         for i in index:
             states[i] = pushed[i] if np.isinf(base.stiffnesses[i]) else -states[i]
         configurations.append(configuration)

@@ -1,8 +1,8 @@
-"""Rest: contact forces and configuration under a load, in the coordinates of a base (eq. 38.5, with the static force).
+"""Static response: contact forces and configuration under a load, in the coordinates of a base (38.5, with f_static).
 
     y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
 
-P the directions of the supports, f (d,) the forces along them; e elastic, 0 rigid-body coordinates.
+P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body coordinates.
 """
 
 from __future__ import annotations
@@ -17,33 +17,35 @@ from multiphi_exudyn.mathematics.round_off import drop_round_off
 __all__ = ["static_response"]
 
 
-def static_response(base: ModalBase, supports: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (d,) along the supports and configuration y (m,) at rest, motion nobody resists left out."""
-    turned, mixing = supports.orthogonal
+def static_response(
+    base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (d,) along closed directions and configuration y (m,) at rest, motion nobody resists left out."""
+    turned, mixing = closed_directions.orthogonal
     forces, configuration = _response(base, turned, load)
-    forces[supports.rigid] = np.linalg.solve(mixing, forces[supports.rigid])
+    forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
     return forces, configuration
 
 
-def _response(base: ModalBase, supports: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``rest`` where the directions of rigid contacts are orthogonal."""
     elastic, free = slice(base.modes.rigid, None), slice(base.modes.rigid)
     compliance = base.modes.omega[elastic] ** -2.0
-    touching = supports.directions[elastic]
-    sprung = supports.stiffness != 0  # the others push with G, whatever y is
-    own = np.where(sprung, 1 / np.where(sprung, supports.stiffness, 1.0), 1.0)
+    touching = closed_directions.vectors[elastic]
+    sprung = closed_directions.stiffness != 0  # the others push with G, whatever y is
+    own = np.where(sprung, 1 / np.where(sprung, closed_directions.stiffness, 1.0), 1.0)
     bent = touching.T @ (compliance[:, None] * touching)
-    carried = _range(supports.resisting[free], INDEPENDENT * supports.size)
-    coupling = supports.directions[free].T @ carried
+    carried = _range(closed_directions.resisting[free], INDEPENDENT * closed_directions.size)
+    coupling = closed_directions.vectors[free].T @ carried
     none = np.zeros((carried.shape[1],) * 2)
     matrix = np.block([[sprung[:, None] * bent + np.diag(own), sprung[:, None] * coupling], [coupling.T, none]])
     sizes = _sizes(np.diagonal(bent) + sprung * np.abs(own), coupling)
-    pressed = -supports.offsets - sprung * (touching.T @ (compliance * load[elastic]))
+    pressed = -closed_directions.offsets - sprung * (touching.T @ (compliance * load[elastic]))
     solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]), sizes)
     forces = solution[: len(own)]
     total = drop_round_off(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
     configuration = np.concatenate([carried @ solution[len(own) :], compliance * total])
-    left = supports.offsets + own * forces + sprung * (supports.directions.T @ configuration)
+    left = closed_directions.offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
     further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]), sizes)  # what soft modes magnified
     added = np.concatenate([carried @ further[len(own) :], compliance * (touching @ further[: len(own)])])
     return forces + further[: len(own)], configuration + added

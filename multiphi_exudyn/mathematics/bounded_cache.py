@@ -1,4 +1,4 @@
-"""What was used most recently: a mapping of bounded length that lets the least recently used go.
+"""Bounded cache: a mapping of bounded length that lets the least recently used go.
 
 What is kept here can be made again from its key, to the bit; a bound costs time, and never changes a result.
 """

@@ -1,4 +1,4 @@
-"""Histories: functions of time in pieces, each a polynomial on a carrier.
+"""Piecewise exponentials: functions of time in pieces, each a polynomial on a carrier.
 
     u(t) = Re( exp(mu_i s) sum_d a_id s^d ),   s = t - t_i,   on the piece t_i <= t < t_i+1
 

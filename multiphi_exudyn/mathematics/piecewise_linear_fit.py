@@ -1,4 +1,4 @@
-"""Chords: straight segments between samples of a function, all of the same error.
+"""Piecewise linear fit: straight segments between samples of a function, all of the same error.
 
 Knots are placed so that all segments have the same error: from one end to the next knot as far as that error allows,
 with the smallest error that so many segments can have. The error falls with the square of their number.

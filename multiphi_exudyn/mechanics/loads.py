@@ -24,13 +24,13 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.mechanics.time_functions import (
-    Course,
     Harmonic,
     Sampled,
     Smooth,
     Sweep,
-    check_course,
+    TimeFunction,
     check_numbers,
+    check_time_function,
 )
 
 __all__ = [
@@ -96,7 +96,7 @@ class VaryingLoad(ABC):
 
     @property
     @abstractmethod
-    def course(self) -> Course:
+    def course(self) -> TimeFunction:
         """u(t)."""
 
 
@@ -177,10 +177,10 @@ class StopMotion:
     """
 
     contact: str
-    course: Course
+    course: TimeFunction
 
     def __post_init__(self) -> None:
-        check_course("stop motion", self.course)
+        check_time_function("stop motion", self.course)
         _check_contacts("stop motion contact", [self.contact], "the name of a contact")
 
 
@@ -197,7 +197,7 @@ class BaseMotion:
     fixed_stops: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        check_course("base motion", self.course)
+        check_time_function("base motion", self.course)
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
         _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")

@@ -1,4 +1,4 @@
-"""Courses: how a load, a moving stop or a moving base goes with time.
+"""Functions of time: how a load, a moving stop or a moving base goes with time.
 
     u(t):   Harmonic, Sampled, Smooth, Sweep
 
@@ -23,7 +23,7 @@ from multiphi_exudyn.mathematics.interpolation import FEW_SAMPLES, MANY_SAMPLES,
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
 
-__all__ = ["Course", "Harmonic", "Sampled", "Smooth", "Sweep", "check_course", "check_numbers"]
+__all__ = ["Harmonic", "Sampled", "Smooth", "Sweep", "TimeFunction", "check_numbers", "check_time_function"]
 
 SWEEPS = ("linear", "logarithmic")
 COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: one that is nearer to a line lies on it
@@ -227,7 +227,7 @@ class Sweep:
         )
 
 
-Course: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
+TimeFunction: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
 
 
 def check_numbers(what: str, **given: float) -> None:
@@ -244,7 +244,7 @@ def _check_tolerance(value: float) -> None:
         raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
 
 
-def check_course(what: str, course: Any) -> None:
+def check_time_function(what: str, course: Any) -> None:
     if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
         raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
 

@@ -45,7 +45,7 @@ from test_interface import (
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import Attached
+from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
@@ -507,7 +507,7 @@ def test_what_is_attached_gives_the_mobility_of_the_whole(seed, modes, points, h
     rows, factor = rng.normal(size=(points, modes)), rng.normal(size=(points, points))
     directions = np.linalg.qr(rng.normal(size=(points, points)))[0]
     mass, free = factor @ factor.T, directions[:, held:]
-    body = Attached(mass, free)
+    body = AttachedInertia(mass, free)
     constraints = np.hstack([rows, -np.eye(points)]), np.hstack([np.zeros((held, modes)), directions[:, :held].T])
     jacobian = np.vstack(constraints)
     inertia = np.block([[np.eye(modes), np.zeros((modes, points))], [np.zeros((points, modes)), mass]])
@@ -516,5 +516,5 @@ def test_what_is_attached_gives_the_mobility_of_the_whole(seed, modes, points, h
     expected = np.linalg.lstsq(whole, pushed, rcond=None)[0][:modes]
     if np.linalg.cond(rows @ rows.T + np.eye(points) * 1e-12) > 1e8:
         return  # more constraints than the body has motions
-    found = np.eye(modes) - rows.T @ body.resistance(rows) @ rows
+    found = np.eye(modes) - rows.T @ body.impedance(rows) @ rows
     assert np.max(np.abs(found - expected)) < 1e-8

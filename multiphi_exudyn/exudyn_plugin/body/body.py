@@ -264,7 +264,7 @@ class MultiPhiBody(ExactStep):
         q_t = here.views[1]
         fresh = np.array_equal(here.views[:2], self._given[:2])
         struck = fresh and lost > ROUND_OFF * (lost + 0.5 * float(q_t @ q_t))
-        if struck and np.any(attached.resistance(np.eye(len(attached.mass)))):
+        if struck and np.any(attached.impedance(np.eye(len(attached.mass)))):
             raise MultiPhiValueError(
                 f"start of {self.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
                 "interface, need one that does not strike at the start"

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events.state import Phase, State
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import Attached, Reactions
+from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, Reactions
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import Surroundings
+from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import SystemMatrices
 
 __all__ = ["Coordinates", "flags", "matrices"]
 
@@ -35,8 +35,8 @@ class Coordinates:
         self.items = items
         self.stepped = stepped
         self.interface: Interface | None = None
-        self.surroundings: Surroundings | None = None
-        self.attached: Attached | None = None
+        self.surroundings: SystemMatrices | None = None
+        self.attached: AttachedInertia | None = None
         self._reactions: Reactions | None = None
         self.views: tuple[np.ndarray, ...] = ()
         self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
@@ -65,10 +65,10 @@ class Coordinates:
             places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][places[0] : places[0] + len(places)]
 
-    def beside(self, mbs: Any) -> Surroundings:
+    def beside(self, mbs: Any) -> SystemMatrices:
         """The system around the body."""
         own, interface = range(self._own.start, self._own.stop), self.interface
-        return Surroundings(mbs, own, interface.places if interface else (), interface.ties if interface else ())
+        return SystemMatrices(mbs, own, interface.places if interface else (), interface.ties if interface else ())
 
     def read(self) -> np.ndarray:
         """A copy x = (q, q', q'', 1, f) of the present state, good until the next but one."""

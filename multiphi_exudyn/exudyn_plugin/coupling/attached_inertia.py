@@ -1,4 +1,4 @@
-"""What hangs on points of a body takes part in its impacts: masses and constraints of the system.
+"""Attached inertia: masses and constraints of the system that hang on points of a body take part in its impacts.
 
     min |dv|^2 + dw.M_a dw,   dw = R dv = U u,   H (v + dv) >= 0
 
@@ -28,19 +28,19 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.least_distance import Infeasible
 
-__all__ = ["Attached", "AttachedRule", "Reactions"]
+__all__ = ["AttachedInertia", "AttachedRule", "Reactions"]
 
 IMMOVABLE = 1e-11  # of a contact's mobility: below it what is attached holds it
 
 
 @dataclass(frozen=True)
-class Attached:
+class AttachedInertia:
     """mass: M_a (m, m). free: U (m, k), orthonormal."""
 
     mass: np.ndarray
     free: np.ndarray
 
-    def resistance(self, rows: np.ndarray) -> np.ndarray:
+    def impedance(self, rows: np.ndarray) -> np.ndarray:
         """X (m, m) beside a body whose points have the rows R (m, r)."""
         own = rows @ rows.T
         held = self._held / (np.linalg.norm(own) or 1.0)
@@ -55,7 +55,7 @@ class Attached:
 
     def reactions(self, rows: np.ndarray, impulses: np.ndarray) -> np.ndarray:
         """Impulses (m, k) on the body's points that follow impulses (r, k) on it."""
-        return -self.resistance(rows) @ (rows @ impulses)
+        return -self.impedance(rows) @ (rows @ impulses)
 
     def mobilities(self, directions: np.ndarray, in_base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is left of the mobility of contacts, as shares (k,), and W (k, k): W^T (H B H^T) W = diag(shares).
@@ -85,7 +85,7 @@ class Reactions:
 
     def __init__(
         self,
-        attached: Attached,
+        attached: AttachedInertia,
         base: ModalBase,
         rows: np.ndarray,
         acceleration: np.ndarray,
@@ -122,7 +122,7 @@ class AttachedRule(ForcedRule):
         plain: EventRule,
         force_in: InLevel,
         direct_in: InLevel,
-        attached: Attached,
+        attached: AttachedInertia,
         rows_in: InLevel,
         in_base: np.ndarray,
     ) -> None:
@@ -168,13 +168,13 @@ class AttachedRule(ForcedRule):
     def _mobility_root(self, level: LoadedLevel) -> np.ndarray:
         """F (r, r) of B = F F^T."""
         rows = self._rows_in(level.level.indices)
-        resistance = self._attached.resistance(rows)
-        shares, ways = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ (resistance + resistance.T) @ rows / 2)
+        impedance = self._attached.impedance(rows)
+        shares, ways = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ (impedance + impedance.T) @ rows / 2)
         return np.asarray(ways * np.sqrt(np.maximum(shares, 0.0)))
 
     def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
         before, after = (self._rows_in(level.level.indices) for level in (source, target))
-        return _AttachedTransition(source, target, before, after, self._attached.resistance(after))
+        return _AttachedTransition(source, target, before, after, self._attached.impedance(after))
 
     @staticmethod
     def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
@@ -183,14 +183,14 @@ class AttachedRule(ForcedRule):
 
 @dataclass(frozen=True)
 class _AttachedTransition(Transition):
-    """before, after: R (m, r) in source and target. resistance: X of the target."""
+    """before, after: R (m, r) in source and target. impedance: X of the target."""
 
     before: np.ndarray
     after: np.ndarray
-    resistance: np.ndarray
+    impedance: np.ndarray
 
     @property
     def velocity_matrix(self) -> np.ndarray:
         """eta'_m from eta'_l: what hangs on the points keeps its momentum where modes are left out."""
         missed = self.after @ self.matrix - self.before
-        return np.asarray(self.matrix - self.after.T @ (self.resistance @ missed))
+        return np.asarray(self.matrix - self.after.T @ (self.impedance @ missed))

@@ -1,4 +1,4 @@
-"""Surroundings: the rest of an Exudyn system, as the interface of a body meets it at an event.
+"""System matrices: the rest of an Exudyn system, as the interface of a body meets it at an event.
 
     M a + C^T mu = f(q, v, t),   C a = -d(C v + c_t)/dt at constant v
 
@@ -22,16 +22,16 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import Attached
+from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia
 
-__all__ = ["Surroundings"]
+__all__ = ["SystemMatrices"]
 
 APART = 1e-3  # of a step: between the states of a difference along the motion
 SCALED = 5  # times rows and columns are divided by the root of their largest entry (D. Ruiz 2001)
 NEGLIGIBLE = 1e-10  # of the largest mobility: below it constraints hold a point, and of the largest singular value
 
 
-class Surroundings:
+class SystemMatrices:
     """The system around one body during a run. apart: names of bodies that may not hang on it, by their first position.
 
     own, points: positions of the body's coordinates and of its interface coordinates among those of the system.
@@ -60,12 +60,12 @@ class Surroundings:
         added[:, self._own] -= inertia
         return bool(np.any(added) or np.any(np.delete(jacobian, self._ties, axis=0)[:, self._own]))
 
-    def mark(self) -> Attached:
+    def mark(self) -> AttachedInertia:
         """Take the current state as that of a step without event; what hangs on the points."""
         self._unstruck = self._present()
         return self.hanging(0.0)
 
-    def hanging(self, ago: float) -> Attached:
+    def hanging(self, ago: float) -> AttachedInertia:
         """What hung on the points some time [s] before the state that was marked."""
         q, v = self._unstruck
         here = self.coordinates[0].copy()
@@ -106,7 +106,7 @@ class Surroundings:
         self.coordinates[2][self._others] = found[self._others]
         return found[: len(mass)]
 
-    def _attached(self) -> tuple[Attached, np.ndarray]:
+    def _attached(self) -> tuple[AttachedInertia, np.ndarray]:
         """What hangs on the points at the current state, and S (n, m)."""
         mass, jacobian = self._matrices()
         jacobian = np.delete(jacobian, self._ties, axis=0)
@@ -122,7 +122,7 @@ class Surroundings:
         mass, at = mass[np.ix_(moving, moving)], np.searchsorted(moving, self._points)
         follow = np.zeros((len(self.coordinates[0]), len(at)))
         if not (np.any(mass) or np.any(jacobian)):
-            return Attached(np.zeros((len(at), len(at))), np.eye(len(at))), follow  # nothing hangs there
+            return AttachedInertia(np.zeros((len(at), len(at))), np.eye(len(at))), follow  # nothing hangs there
         ways = _null_space(jacobian)
         shown = ways[at]  # y of the ways that are left
         inertia, heaviest = ways.T @ mass @ ways, float(np.max(np.diagonal(mass)))
@@ -131,7 +131,7 @@ class Surroundings:
         free = directions[:, mobility > NEGLIGIBLE * np.max(mobility, initial=0.0)]
         carried = ways @ flexible @ shown.T @ np.linalg.pinv(shown @ flexible @ shown.T, NEGLIGIBLE, hermitian=True)
         follow[moving] = carried
-        return Attached(carried.T @ mass @ carried, free), follow
+        return AttachedInertia(carried.T @ mass @ carried, free), follow
 
     def _present(self) -> np.ndarray:
         """A copy of q, v (2, n)."""

@@ -20,7 +20,7 @@ from multiphi_exudyn.mechanics.loads import (
     SweepLoad,
 )
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.mechanics.time_functions import Course, Harmonic, Sampled, Sweep
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Sweep, TimeFunction
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
@@ -73,7 +73,7 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Lo
     return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
 
 
-def _course(scene: Scene, field: str, spec: CourseSpec) -> Course:
+def _course(scene: Scene, field: str, spec: CourseSpec) -> TimeFunction:
     return _samples(scene, field, spec) if isinstance(spec, SampledCourse) else _smooth(spec)
 
 

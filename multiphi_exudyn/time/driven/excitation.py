@@ -22,7 +22,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential, differentiated, translated
 from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
-from multiphi_exudyn.mechanics.time_functions import Course, Sampled
+from multiphi_exudyn.mechanics.time_functions import Sampled, TimeFunction
 
 __all__ = ["Drive", "Excitation", "columns", "static_load"]
 
@@ -206,7 +206,7 @@ class _Channels:
         if isinstance(contact, LawSpring):
             raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
 
-    def _move(self, stop: np.ndarray, course: Course) -> None:
+    def _move(self, stop: np.ndarray, course: TimeFunction) -> None:
         """Stops that move by their entries of (c,) times the course."""
         history, nothing = self._history(course), np.zeros(self._model.base.modes.count)
         self._append(nothing, stop, history)
@@ -245,7 +245,7 @@ class _Channels:
     def _no_stop(self) -> np.ndarray:
         return np.zeros(len(self._model.contacts))
 
-    def _history(self, course: Course) -> PiecewiseExponential:
+    def _history(self, course: TimeFunction) -> PiecewiseExponential:
         """The course of the load that is added; what is wrong with it is told with the load's name."""
         try:
             return course.history(self._end, self._finer)

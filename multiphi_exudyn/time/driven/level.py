@@ -121,7 +121,7 @@ class DrivenLevel(LoadedLevel):
         springs = np.where(np.isinf(springs), 0.0, springs)
         gaps = (self.level.gap_rows[index] @ displacement).T + self.gap_constants[index]
         bent = 0.5 * (np.sum((base.modes.omega * y.T) ** 2, axis=-1) + gaps**2 @ springs)
-        return np.asarray(bent - y.T @ base.preload + base.datum)
+        return np.asarray(bent - y.T @ base.preload + base.energy_offset)
 
     def potential(self, displacement: np.ndarray) -> float:
         """Strain energy less the potential f.x of the loads [J] at their present values."""

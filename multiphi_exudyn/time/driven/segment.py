@@ -66,7 +66,7 @@ class DrivenSegment(Segment):
     def _works(self) -> tuple[float, float]:
         """Work [J] of damping and of what varies, by one quadrature."""
         own = self.level.level
-        damped, damping, varying = bool(np.any(own.base.resistance(own.indices))), 0.0, 0.0
+        damped, damping, varying = bool(np.any(own.base.damping_matrix(own.indices))), 0.0, 0.0
         for times, weights in self._quadrature(self.start, self.end):
             xi, xi_t = self.modal(times), self.modal(times, 1)
             varying += float(weights @ self._power(xi, xi_t, times))
