@@ -20,7 +20,7 @@ import skfem
 from meshed_cantilever import HEIGHT, LENGTH, inertia, strain_energy
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.simulate import started
+from multiphi_exudyn.time.simulate import started
 
 STOPS = 100
 GAP, STIFFNESS, LIFT = 1e-4, 3e4, 2e-3  # m, N/m of one stop, m of the tip at the start

@@ -2,12 +2,12 @@
 
 A structure (M, C, K, named points) and its contacts make levels, one for each set of closed contacts, each with its
 own modes and asymptotic configuration; transitions carry the motion from level to level.
+
+Every room imports only from those before it in this order, and so do the files of a room.
+
+Order: errors, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli.
 """
 
-from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.courses import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.errors import (
     MultiPhiError,
     MultiPhiTypeError,
@@ -15,10 +15,16 @@ from multiphi_exudyn.errors import (
     MultiPhiWarning,
     NumericalFailure,
 )
-from multiphi_exudyn.force_law import ForceLaw
-from multiphi_exudyn.frequency_response import FrequencyResponse, frequency_response
-from multiphi_exudyn.level import Level, LevelOverride
-from multiphi_exudyn.loads import (
+from multiphi_exudyn.events.state import Event
+from multiphi_exudyn.levels.level import Level, LevelOverride
+from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.loads import (
     BaseMotion,
     ConstantLoad,
     FunctionLoad,
@@ -28,16 +34,15 @@ from multiphi_exudyn.loads import (
     StopMotion,
     SweepLoad,
 )
-from multiphi_exudyn.matrix_files import read_structure
-from multiphi_exudyn.mode_choice import Tolerance, UpTo
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.section import Section
-from multiphi_exudyn.simulate import simulate
-from multiphi_exudyn.state import Event
-from multiphi_exudyn.steady_state import SteadyState, steady_state
-from multiphi_exudyn.structure import LinearStructure, ModalDamping, RayleighDamping
-from multiphi_exudyn.trajectory import Ledger, Trajectory
-from multiphi_exudyn.truncation import truncation_indicator
+from multiphi_exudyn.mechanics.matrix_files import read_structure
+from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
+from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
+from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.trajectory import Ledger, Trajectory
+from multiphi_exudyn.time.truncation import truncation_indicator
 
 __all__ = [
     "Assembly",

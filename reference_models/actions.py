@@ -2,11 +2,11 @@
 
     f(t) = sum_j p_j u_j(t),   g_i = h_i.x + gap_i - z_i(t)
 
-Loads are those of multiphi_exudyn.loads and mean the same here: a load is its row p and its course u; gravity is
-p = M e; a moving base is the frame x is measured in, so that it acts by its inertia force, p = -M e and u = z'', and
-moves a stop that stays behind by z_i = -(h_i.e) z. This is exact for large displacements too: the mass matrix of
-both beams is constant, and their elastic forces do not change when the frame is shifted. M e is the whole inertia
-only where e is ``FullBeam.transverse``; see there. Loads and motions set in at t = 0.
+Loads are those of multiphi_exudyn.mechanics.loads and mean the same here: a load is its row p and its course u; gravity
+is p = M e; a moving base is the frame x is measured in, so that it acts by its inertia force, p = -M e and u = z'', and
+moves a stop that stays behind by z_i = -(h_i.e) z. This is exact for large displacements too: the mass matrix of both
+beams is constant, and their elastic forces do not change when the frame is shifted. M e is the whole inertia only where
+e is ``FullBeam.transverse``; see there. Loads and motions set in at t = 0.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.history import History
-from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.point_contact import PointContact
 
 __all__ = ["Actions", "Way", "actions_of"]
@@ -31,7 +31,7 @@ BEYOND = 1 + 1e-6  # of the run's end: histories reach past the last step, whose
 class Way:
     """z(t) = sum of factor * history(t) [m], of one stop."""
 
-    parts: tuple[tuple[float, History], ...]
+    parts: tuple[tuple[float, PiecewiseExponential], ...]
 
     def at(self, time: np.ndarray) -> np.ndarray:
         """z (k,) at times (k,)."""
@@ -47,7 +47,7 @@ class Actions:
     """rows: p (m, n) in the structure's coordinates. courses: their u, m histories. ways: z of contacts, by name."""
 
     rows: np.ndarray
-    courses: tuple[History, ...]
+    courses: tuple[PiecewiseExponential, ...]
     ways: Mapping[str, Way]
 
     @property
@@ -65,13 +65,13 @@ def actions_of(
 ) -> Actions:
     """The loads up to t_end [s]; raises MultiPhiValueError or MultiPhiTypeError for one that cannot act here."""
     rows: list[np.ndarray] = []
-    courses: list[History] = []
-    ways: dict[str, list[tuple[float, History]]] = {}
+    courses: list[PiecewiseExponential] = []
+    ways: dict[str, list[tuple[float, PiecewiseExponential]]] = {}
     end = t_end * BEYOND
     for load in loads:
         if isinstance(load, (ConstantLoad, Gravity)):
             rows.append(load.row(structure))
-            courses.append(History.constant(1.0))
+            courses.append(PiecewiseExponential.constant(1.0))
         elif isinstance(load, VaryingLoad):
             rows.append(structure.row(load.at))
             courses.append(load.course.history(end))
@@ -88,7 +88,7 @@ def actions_of(
                     along = float(structure.row(contact.direction) @ moved)
                     ways.setdefault(contact.name, []).append((-along, history))
         else:
-            raise MultiPhiTypeError(f"loads: got {type(load).__name__}, need loads of multiphi_exudyn.loads")
+            raise MultiPhiTypeError(f"loads: got {type(load).__name__}, need loads of multiphi_exudyn.mechanics.loads")
     return Actions(
         np.array(rows).reshape(len(rows), structure.n),
         tuple(courses),

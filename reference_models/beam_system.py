@@ -21,9 +21,9 @@ import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
 
-from multiphi_exudyn.assemble import Tie
-from multiphi_exudyn.beam import Beam, beam_nodes
-from multiphi_exudyn.section import Section
+from multiphi_exudyn.mechanics.assembly import Tie
+from multiphi_exudyn.mechanics.beam import Beam, beam_nodes
+from multiphi_exudyn.mechanics.section import Section
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact

@@ -10,9 +10,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from multiphi_exudyn.assemble import Tie
-from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.assembly import Tie
+from multiphi_exudyn.mechanics.beam import Beam
 
 __all__ = ["NAMELESS", "Beams", "as_beams"]
 

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.level import Level
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["CraigBampton", "craig_bampton", "independent_points"]
 

@@ -23,9 +23,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from multiphi_exudyn.beam import Beam
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.section import Section
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.section import Section
 
 __all__ = ["exact_frequencies"]
 

@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
-from multiphi_exudyn.loads import Load
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import Load
 from reference_models.actions import Actions, actions_of
 from reference_models.beam_system import DEFLECTION, BeamSystem, bending_coordinates, build_beam_system
 from reference_models.beams import Beams, as_beams

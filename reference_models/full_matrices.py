@@ -21,10 +21,10 @@ import numpy as np
 import scipy.sparse
 from scipy.integrate import cumulative_trapezoid
 
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.force_law import Contact, ForceLaw, expanded
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, expanded
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.solver_settings import simulation_settings

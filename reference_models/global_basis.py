@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["global_basis"]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.structure import At
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import At
 from reference_models.beams import Beams
 
 __all__ = ["PointContact", "point_and_coefficient", "point_contacts"]

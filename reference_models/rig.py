@@ -18,11 +18,11 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from multiphi_exudyn.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.section import Section
-from multiphi_exudyn.structure import ModalDamping
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping
+from multiphi_exudyn.mechanics.section import Section
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -18,10 +18,10 @@ import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.event_rule import EventRule
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.state import Phase, Row, State
-from multiphi_exudyn.transition import LoadedLevel
+from multiphi_exudyn.events.rule import EventRule
+from multiphi_exudyn.events.state import Phase, Row, State
+from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["StepwiseHistories", "StepwiseRun", "solve_stepwise"]
 

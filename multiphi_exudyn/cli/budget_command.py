@@ -15,7 +15,7 @@ from multiphi_exudyn.study.running.files import results_folder, write_whole
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
-from multiphi_exudyn.warning_groups import grouped
+from multiphi_exudyn.time.warning_groups import grouped
 
 __all__ = ["run_budget"]
 

@@ -2,20 +2,22 @@
 
 On import the Create function is also bound to Exudyn's systems, as ``mbs.CreateMultiPhiBody(...)``, and SolveDynamic
 checks what the bodies need of the solver.
+
+Order: convert, coupling, body.
 """
 
 from __future__ import annotations
 
-from multiphi_exudyn.exudyn_plugin.binding import bind
-from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.drawing import Drawing
-from multiphi_exudyn.exudyn_plugin.fem_interface import linear_structure_from_fem
-from multiphi_exudyn.exudyn_plugin.linear_range import RangeCheck
-from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
-from multiphi_exudyn.exudyn_plugin.reduce import Item, Reduction, reduce
-from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
-from multiphi_exudyn.exudyn_plugin.solving import install_checks
+from multiphi_exudyn.exudyn_plugin.body.binding import bind
+from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.body.create import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing
+from multiphi_exudyn.exudyn_plugin.body.sensors import BodyHistories, body_histories
+from multiphi_exudyn.exudyn_plugin.body.solving import install_checks
+from multiphi_exudyn.exudyn_plugin.convert.fem_interface import linear_structure_from_fem
+from multiphi_exudyn.exudyn_plugin.convert.linear_range import RangeCheck
+from multiphi_exudyn.exudyn_plugin.convert.linearize import LinearizedStructure, linear_structure_from
+from multiphi_exudyn.exudyn_plugin.convert.reduce import Item, Reduction, reduce
 
 __all__ = [
     "BodyHistories",

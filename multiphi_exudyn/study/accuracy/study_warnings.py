@@ -8,7 +8,7 @@ from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, longes
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from multiphi_exudyn.study.sweep.store import Row
-from multiphi_exudyn.warning_groups import grouped
+from multiphi_exudyn.time.warning_groups import grouped
 
 __all__ = ["warned"]
 

@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.study.comparison.placement import Placement, coefficient, meeting, placements
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.force_law import ForceLaw
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting

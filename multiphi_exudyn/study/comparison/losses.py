@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
-from multiphi_exudyn.warning_groups import kept_back
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.warning_groups import kept_back
 
 __all__ = ["LossTable", "loss_tables"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.placement import Placement, meeting, placements
 from multiphi_exudyn.study.measures.metrics import held_levels

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from multiphi_exudyn.contact import UnilateralContact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from reference_models.beams import Beams
 
 __all__ = ["Placement", "coefficient", "meeting", "placements"]

@@ -1,1 +1,4 @@
-"""How two answers differ: every measure in one place."""
+"""How two answers differ: every measure in one place.
+
+Order: metrics, spectra, response_frequencies, apparent_frequencies, shaker_test, measures.
+"""

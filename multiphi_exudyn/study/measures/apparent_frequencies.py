@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.measures.response_frequencies import level_frequencies, level_name
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Workbench

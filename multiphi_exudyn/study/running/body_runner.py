@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from multiphi_exudyn.exudyn_plugin import BodyHistories
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.scene_file import UserObjectModel

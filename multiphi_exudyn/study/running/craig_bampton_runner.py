@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from multiphi_exudyn.model import MultiPhiModel
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.running.energy_gain import energy_gain
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import damping_matrix
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.running.run_alone import Task
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scene_file import ReducedModel

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.simulate import simulate
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.scene_file import GlobalBasisModel, ReducedModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
-from multiphi_exudyn.trajectory import Trajectory
-from multiphi_exudyn.truncation import truncation_indicator
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.truncation import truncation_indicator
 from reference_models.global_basis import global_basis
 
 __all__ = ["ENERGY_INTERVAL", "run_global_basis", "run_reduced"]

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.loads import Load
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.simulate import simulate
-from multiphi_exudyn.structure import LinearStructure
-from multiphi_exudyn.warning_groups import kept_back
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.warning_groups import kept_back
 
 __all__ = ["Task", "run_alone"]
 

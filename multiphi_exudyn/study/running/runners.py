@@ -23,7 +23,7 @@ from multiphi_exudyn.study.scene.scene_file import (
 )
 from multiphi_exudyn.study.scene.scenes import ModelSpec
 from multiphi_exudyn.study.scene.workbench import Workbench
-from multiphi_exudyn.warning_groups import kept_back
+from multiphi_exudyn.time.warning_groups import kept_back
 
 __all__ = ["label_of", "run_model"]
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.assemble import Assembly, assemble
-from multiphi_exudyn.beam import Beam, Clamp, PointMass, planar_beam
-from multiphi_exudyn.section import Section
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.mechanics.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
+from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.beams import Beams
 from reference_models.full_beam import FullBeam, FullBeamSettings
 

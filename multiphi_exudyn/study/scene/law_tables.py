@@ -3,7 +3,7 @@
     force on the structure -F(q) along the row p of ``at``, a point name or {point: coefficient};   q = p.x [m]
 
 A positive slope of F is a spring that pulls back. A shape is followed by straight segments on its ``span``, to a
-``tolerance`` or by so many ``segments`` (multiphi_exudyn.force_law); the full beam has the shape itself.
+``tolerance`` or by so many ``segments`` (multiphi_exudyn.mechanics.force_law); the full beam has the shape itself.
 """
 
 from __future__ import annotations

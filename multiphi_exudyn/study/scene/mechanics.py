@@ -15,14 +15,16 @@ from typing import TypeVar
 import numpy as np
 import scipy.sparse
 
-from multiphi_exudyn.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.force_law import ForceLaw
-from multiphi_exudyn.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
-from multiphi_exudyn.matrix_files import read_array, read_arrays, read_structure
-from multiphi_exudyn.section import Section
-from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
+from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
+from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.fields import numbered
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (

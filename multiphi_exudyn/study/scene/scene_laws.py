@@ -1,4 +1,4 @@
-"""The force laws of a scene file as force laws of multiphi_exudyn.force_law, and in words."""
+"""The force laws of a scene file as force laws of multiphi_exudyn.mechanics.force_law, and in words."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.force_law import ForceLaw, expanded
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw, expanded
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.law_tables import CubicLawSpec, HertzLawSpec, LawSpec, TableLawSpec
 from multiphi_exudyn.study.scene.scene_file import CraigBamptonModel, FullModel, StepwiseModel

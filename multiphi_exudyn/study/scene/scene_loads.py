@@ -1,4 +1,4 @@
-"""The loads of a scene file as loads of multiphi_exudyn.loads, and in words.
+"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and in words.
 
 Weight and base motion act along a unit rigid-body motion of the structure; a beam's is its transverse one, which
 depends on its mesh and is given here by who has the mesh.
@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from multiphi_exudyn.courses import Course, Harmonic, Sampled, Sweep
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.loads import (
+from multiphi_exudyn.mechanics.loads import (
     BaseMotion,
     ConstantLoad,
     Gravity,
@@ -20,7 +19,8 @@ from multiphi_exudyn.loads import (
     StopMotion,
     SweepLoad,
 )
-from multiphi_exudyn.structure import At
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Sweep, TimeFunction
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
@@ -73,7 +73,7 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Lo
     return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
 
 
-def _course(scene: Scene, field: str, spec: CourseSpec) -> Course:
+def _course(scene: Scene, field: str, spec: CourseSpec) -> TimeFunction:
     return _samples(scene, field, spec) if isinstance(spec, SampledCourse) else _smooth(spec)
 
 

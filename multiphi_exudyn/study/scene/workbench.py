@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.optimize
 
-from multiphi_exudyn.beam import beam_nodes
-from multiphi_exudyn.contact import UnilateralContact
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.force_law import ForceLaw
-from multiphi_exudyn.level import LevelOverride
-from multiphi_exudyn.loads import Load
-from multiphi_exudyn.mode_choice import Tolerance
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import At, LinearStructure
+from multiphi_exudyn.levels.level import LevelOverride
+from multiphi_exudyn.levels.mode_choice import Tolerance
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.beam import beam_nodes
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics

@@ -1,1 +1,5 @@
-"""Stability: a catalogue of extreme cases, every model run through each of them, and what each answer is worth."""
+"""Stability: a catalogue of extreme cases, every model run through each of them, and what each answer is worth.
+
+Order: case, outcome, brute_force, judgement, structures, starts, beams, laws, driven, systems, catalogue, native_run,
+exudyn_runs, catalogue_run, summary, text_table, stability_report.
+"""

@@ -10,13 +10,13 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.beam import Beam, PointMass, planar_beam
-from multiphi_exudyn.section import Section
-from multiphi_exudyn.simulate import simulate
-from multiphi_exudyn.structure import LinearStructure
+from multiphi_exudyn.mechanics.beam import Beam, PointMass, planar_beam
+from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import pulled, rig_problem, stop
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_contact
 
 __all__ = ["CASES"]

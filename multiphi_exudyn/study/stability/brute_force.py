@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.force_law import Contact
-from multiphi_exudyn.loads import BaseMotion, Load, StopMotion
-from multiphi_exudyn.state import Phase
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.loads import BaseMotion, Load, StopMotion
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = [
     "ContactSamples",

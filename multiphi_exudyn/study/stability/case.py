@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.force_law import Contact, ForceLaw, expanded
-from multiphi_exudyn.loads import ConstantLoad, Gravity, Load
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import LinearStructure
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, expanded
+from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["STATIC_LOADS", "Case", "Problem", "Pull"]
 

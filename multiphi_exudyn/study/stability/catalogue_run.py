@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.exudyn_runs import (
@@ -19,7 +18,8 @@ from multiphi_exudyn.study.stability.exudyn_runs import (
 )
 from multiphi_exudyn.study.stability.native_run import Native, run_native
 from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
-from multiphi_exudyn.warning_groups import kept_back
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.warning_groups import kept_back
 
 __all__ = ["FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
 

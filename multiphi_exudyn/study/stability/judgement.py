@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.force_law import Contact, ForceLaw
+from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
     SegmentTable,
@@ -28,7 +28,7 @@ from multiphi_exudyn.study.stability.brute_force import (
     truncated,
 )
 from multiphi_exudyn.study.stability.case import Problem
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["BEYOND", "RESIDUAL", "Judgement", "judge"]
 

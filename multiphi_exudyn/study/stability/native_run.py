@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.simulate import simulate
 from multiphi_exudyn.study.running.timing import timed
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.outcome import FAILED, OK, Outcome
 from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Native", "run_native"]
 

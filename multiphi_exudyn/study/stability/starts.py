@@ -10,7 +10,7 @@ import numpy as np
 
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import STOP, chain, oscillator, rig_problem, stop
-from multiphi_exudyn.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.exact import BilinearOscillator, PlasticImpact
 
 __all__ = ["CASES"]

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.beam import Beam
-from multiphi_exudyn.contact import UnilateralContact
-from multiphi_exudyn.model import MultiPhiModel
-from multiphi_exudyn.structure import LinearStructure, Matrix, ModalDamping, RayleighDamping
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact

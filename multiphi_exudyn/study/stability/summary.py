@@ -8,7 +8,7 @@ from typing import Any
 
 from multiphi_exudyn.study.stability.judgement import BEYOND, RESIDUAL
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
-from multiphi_exudyn.warning_groups import grouped
+from multiphi_exudyn.time.warning_groups import grouped
 
 __all__ = ["ModelSummary", "contents", "failures", "headline", "summaries", "warned"]
 

@@ -1,4 +1,7 @@
-"""Sweeps that lose nothing: one function over many cases, each finished run a row of a file."""
+"""Sweeps that lose nothing: one function over many cases, each finished run a row of a file.
+
+Order: time_limit, log, store, executors, run, sweep.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,0 @@
-"""Runs under loads, stops and bases that vary in time: the same method with what varies as coordinates of its own."""

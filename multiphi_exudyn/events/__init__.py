@@ -1,0 +1,7 @@
+"""Events: when a contact closes or opens, which level follows, and with what state (eq. 38.6).
+
+A transition takes a state from one level into another. Signals of the state say whether a contact may stay as it is
+(admissibility). The rule decides from them, and is the same in every driver of the model.
+
+Order: transition, state, admissibility, passage, rule.
+"""

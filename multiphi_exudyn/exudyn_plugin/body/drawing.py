@@ -1,0 +1,154 @@
+"""Drawing of a Multi-Phi body in Exudyn's renderer: a polyline of thick bars, and a block for every stop.
+
+    p_j = P_j + scale (w_j.x) d,      stop of contact i at point j:  P_j - scale (gap_i / c) d   where h_i = c w_j
+
+P (k, 3) positions [m]; w (k, n) rows of the deflections [m]; d direction; x (n,) the present displacement.
+
+Exudyn calls the function that is made here only while it redraws; a run that nobody looks at does none of this.
+Contacts whose direction is not that of one point (between two points, of a force law) have no block. A stop that
+moves is drawn where it is at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn import graphics
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.body.sensors import rebuilt
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.arguments import is_real, real_array
+from multiphi_exudyn.mechanics.beam import Beam, beam_deflections
+
+__all__ = ["Drawing", "check_drawing", "graphics_of"]
+
+PARALLEL = 1e-9  # relative: a contact's direction is that of a point up to the rounding of its coefficients
+SIDES = 12  # of a bar: looks round, costs little
+BLOCK = 4.0  # edge of a stop's block in radii of the bars
+BODY, OPEN, CLOSED = (0.0, 0.447, 0.698, 1.0), (0.6, 0.6, 0.6, 1.0), (0.835, 0.369, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """How a body looks. positions (k, 3) [m] of its points, in the order of the line through them;
+    rows (k, n) of their deflections; direction (3,) of a positive deflection, a unit vector;
+    scale: of deflections and gaps in the picture; radius [m] of the bars.
+    """
+
+    positions: np.ndarray
+    rows: np.ndarray
+    direction: np.ndarray
+    scale: float = 1.0
+    radius: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for field, axes, columns in (("positions", 2, 3), ("rows", 2, None), ("direction", 1, 3)):
+            needed = "(3,)" if axes == 1 else f"(k, {columns or 'n'})"
+            given = np.array(real_array(f"drawing {field}", getattr(self, field), f"an array {needed}"))
+            if given.ndim != axes or (columns and given.shape[-1] != columns):
+                raise MultiPhiValueError(f"drawing {field}: got shape {given.shape}, need {needed}")
+            object.__setattr__(self, field, given)
+        if len(self.positions) != len(self.rows) or len(self.rows) < 2:
+            received = f"drawing rows: got {len(self.rows)} rows for {len(self.positions)} positions"
+            raise MultiPhiValueError(f"{received}, need one each, at least two")
+        if not math.isclose(float(np.linalg.norm(self.direction)), 1.0, rel_tol=PARALLEL):
+            raise MultiPhiValueError(f"drawing direction: got {self.direction.tolist()}, need a unit vector")
+        for field in ("scale", "radius"):
+            value = getattr(self, field)
+            if not is_real(value):
+                raise MultiPhiTypeError(f"drawing {field}: got {value!r}, need a number")
+            if not (math.isfinite(value) and value > 0):
+                raise MultiPhiValueError(f"drawing {field}: got {value!r}, need a finite value > 0")
+
+    @classmethod
+    def of_beam(cls, beam: Beam, elements: int = 57, scale: float = 1.0, radius: float = 1e-3) -> Drawing:
+        """The drawing of ``planar_beam(beam, elements)``: along x, deflections along y,
+        as Exudyn's own planar beams."""
+        x, rows = beam_deflections(beam, elements)
+        zero = np.zeros_like(x)
+        return cls(np.column_stack((x, zero, zero)), rows, np.array([0.0, 1.0, 0.0]), scale, radius)
+
+    def line(self, deflections: np.ndarray) -> np.ndarray:
+        """Positions (k, 3) [m] in the picture for deflections (k,) [m]."""
+        return self.positions + self.scale * deflections[:, None] * self.direction
+
+    def stop(self, direction: np.ndarray, gap: float) -> np.ndarray | None:
+        """Centre (3,) [m] of the block of a contact h.x + gap, None if no single point strikes it."""
+        along = np.linalg.norm(self.rows, axis=1) * np.linalg.norm(direction)
+        struck = np.flatnonzero((along > 0) & (np.abs(self.rows @ direction) >= (1 - PARALLEL) * along))
+        if not len(struck):
+            return None
+        j = struck[0]
+        coefficient = float(self.rows[j] @ direction / (self.rows[j] @ self.rows[j]))
+        surface = self.positions[j] - self.scale * gap / coefficient * self.direction
+        return np.asarray(surface - math.copysign((1 + BLOCK / 2) * self.radius, coefficient) * self.direction)
+
+
+def check_drawing(drawing: Any, model: MultiPhiModel) -> None:
+    """Raises unless ``drawing`` is None or one of this model's structure."""
+    if drawing is None:
+        return
+    if not isinstance(drawing, Drawing):
+        raise MultiPhiTypeError(f"drawing: got {type(drawing).__name__}, need a Drawing or None")
+    if drawing.rows.shape[1] != model.structure.n:
+        received = f"drawing rows: got {drawing.rows.shape[1]} columns"
+        raise MultiPhiValueError(f"{received}, need {model.structure.n}, the structure's degrees of freedom")
+
+
+def graphics_of(body: MultiPhiBody, drawing: Drawing) -> Callable[[Any, int], list[dict[str, Any]]]:
+    """A graphicsDataUserFunction of the body's object."""
+    stops = _stops(body.model, drawing)
+
+    def draw(mbs: Any, itemNumber: int) -> list[dict[str, Any]]:
+        deflections, closed = _shown_state(mbs, body, drawing.rows)
+        blocks = [_block(centre, bool(closed[i]), drawing.radius) for i, centre in stops.items()]
+        return _bars(drawing.line(deflections), drawing.radius) + blocks
+
+    return draw
+
+
+def _stops(model: MultiPhiModel, drawing: Drawing) -> dict[int, np.ndarray]:
+    """Contact's index -> centre (3,) of its block."""
+    in_laws = {i for chain in model.chains for i in chain}
+    centres = {
+        i: drawing.stop(model.structure.row(contact.direction), contact.gap)
+        for i, contact in enumerate(model.contacts)
+        if i not in in_laws
+    }
+    return {i: centre for i, centre in centres.items() if centre is not None}
+
+
+def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Deflections (k,) [m] and closed contacts (c,) in the state that is on the screen."""
+    outputs, shown = exu.OutputVariableType, exu.ConfigurationType.Visualization
+    kinds = outputs.Coordinates, outputs.Coordinates_t, outputs.Coordinates_tt
+    stored = [np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericODE2"], kind, shown)) for kind in kinds]
+    closed = np.zeros(0, bool)
+    if "nGenericData" in body.items:
+        values = mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, shown)
+        closed = values[: len(body.model.contacts)] > 0.5
+    time = np.array([mbs.systemData.GetTime(shown)])
+    none = np.zeros((body.coordinates.points, 1))  # forces on points are not drawn
+    moved, *_ = rebuilt(body, rows, closed[None, :], time, np.concatenate(stored)[None, :], none)
+    return moved[:, 0], closed
+
+
+def _bars(line: np.ndarray, radius: float) -> list[dict[str, Any]]:
+    return [
+        graphics.Cylinder(a.tolist(), (b - a).tolist(), radius, color=list(BODY), nTiles=SIDES)
+        for a, b in pairwise(line)
+    ]
+
+
+def _block(centre: np.ndarray, closed: bool, radius: float) -> dict[str, Any]:
+    edge = [BLOCK * radius] * 3
+    block: dict[str, Any] = graphics.Brick(centre.tolist(), edge, color=list(CLOSED if closed else OPEN))
+    return block

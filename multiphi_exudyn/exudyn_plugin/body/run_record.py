@@ -1,0 +1,32 @@
+"""Record of a run in Exudyn: what a body has to know of it to say how far it can be trusted (reliability.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from multiphi_exudyn.events.state import Event, Loss, State
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.time.reliability import RunSummary
+
+__all__ = ["RunRecord"]
+
+
+class RunRecord:
+    """Levels that a run has been in, what it lost at its start, and its largest energy [J] there and after events."""
+
+    def __init__(self, start: State, lost: Loss) -> None:
+        self._levels: dict[tuple[int, ...], Level] = {}
+        self._lost = lost
+        self._energy = 0.0
+        self.see(start, lost.total)
+
+    def see(self, state: State, lost: float = 0.0) -> None:
+        """Count a state among those of the run; lost: energy [J] that it had before besides."""
+        self._levels.setdefault(state.closed, state.level.level)
+        energy = state.kinetic + float(state.level.strain(state.displacement))
+        self._energy = max(self._energy, energy + lost)
+
+    def of(self, events: Iterable[Event]) -> RunSummary:
+        """The summary with what was lost at these events."""
+        lost = sum((event.loss for event in events), self._lost)
+        return RunSummary(tuple(self._levels.values()), lost, self._energy)

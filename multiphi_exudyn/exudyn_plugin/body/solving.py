@@ -1,0 +1,52 @@
+"""SolveDynamic with Multi-Phi bodies: what they need of the solver is checked before it starts.
+
+Inside a run Exudyn wraps what a body raises in an error of its own, which blames the user's functions. Called as a
+method of the system or from the module, SolveDynamic checks before, and what a body raises in a run comes out as it is.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import exudyn as exu
+
+from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.exudyn_plugin.body.switching import BODIES, check_solver
+
+__all__ = ["install_checks"]
+
+IMPLICIT = (exu.DynamicSolverType.GeneralizedAlpha, exu.DynamicSolverType.TrapezoidalIndex2)
+_CHECKED = "_multiPhiChecked"  # marks a function that checks already
+
+
+def install_checks() -> None:
+    """Let Exudyn's SolveDynamic check what Multi-Phi bodies need; systems without them are solved as before."""
+    for place in (exu.MainSystem, exu):
+        present = place.SolveDynamic
+        if not hasattr(present, _CHECKED):
+            place.SolveDynamic = _checked(present)
+
+
+def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(solve)
+    def solve_dynamic(
+        mbs: Any, simulationSettings: Any = None, solverType: Any = None, *given: Any, **named: Any
+    ) -> Any:
+        bodies = mbs.variables.get(BODIES)
+        if bodies is not None and bodies.installed(mbs):
+            settings = exu.SimulationSettings() if simulationSettings is None else simulationSettings
+            kind = settings.timeIntegration.solverType if solverType is None else solverType
+            check_solver(kind in IMPLICIT, kind.name, bodies)
+            for body in bodies.values():
+                body.check_integration(settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
+        try:
+            return solve(mbs, simulationSettings, solverType, *given, **named)
+        except Exception as error:
+            if isinstance(error.__cause__, MultiPhiError):
+                raise error.__cause__ from None
+            raise
+
+    setattr(solve_dynamic, _CHECKED, True)
+    return solve_dynamic

@@ -1,0 +1,112 @@
+"""A finite element model in Exudyn's FEMinterface (from Abaqus, Ansys, NGsolve) as a linear structure.
+
+    M_free x'' + C x' + K_free x = f,   x the displacements [m] of the nodes that are not fixed
+
+The matrices of a FEMinterface have no supports; degree of freedom 3 i + c is component c (0, 1, 2 for x, y, z) of
+node i, nodes counted from 0. Fixed nodes are left out; the matrices stay sparse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.sparse
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["linear_structure_from_fem"]
+
+Nodes: TypeAlias = "int | str"  # a node, or the name of a node set
+
+COMPONENTS = 3  # of the displacement of a node
+
+
+def linear_structure_from_fem(
+    fem: Any,
+    fixed: Iterable[int] | str = (),
+    points: Mapping[str, tuple[Nodes, int]] | None = None,
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+) -> LinearStructure:
+    """The structure of an ``exudyn.FEM.FEMinterface``, which is left as it was.
+
+    fixed: node numbers, or the name of a node set. points: name -> (node number, component); with the name of a node
+    set the mean of its nodes by their weights, as a contact or load over a face needs it. damping: as
+    ``LinearStructure`` takes it, in the free degrees of freedom.
+
+    Raises MultiPhiValueError or MultiPhiTypeError for matrices that are missing or do not fit the nodes, for nodes,
+    sets and components that do not exist, and for a point that is fixed.
+    """
+    mass, stiffness = _matrices(fem)
+    held = _fixed_nodes(fem, fixed, mass.shape[0] // COMPONENTS)
+    moving = np.ones((mass.shape[0] // COMPONENTS, COMPONENTS), bool)
+    moving[held] = False
+    free = np.flatnonzero(moving)
+    rows = {name: _row(fem, name, given, moving) for name, given in ({} if points is None else points).items()}
+    return LinearStructure(mass[free][:, free], stiffness[free][:, free], damping, rows)
+
+
+def _matrices(fem: Any) -> tuple[Any, Any]:
+    nodes = getattr(fem, "nodes", None)
+    if not isinstance(nodes, Mapping):
+        raise MultiPhiTypeError(f"fem: got {type(fem).__name__}, need an exudyn.FEM.FEMinterface")
+    if list(nodes) != ["Position"]:
+        raise MultiPhiValueError(f"fem: got nodes of the types {list(nodes)}, need ['Position']")
+    size = COMPONENTS * len(nodes["Position"])
+    for name in ("massMatrix", "stiffnessMatrix"):
+        matrix: Any = getattr(fem, name, None)
+        if not scipy.sparse.issparse(matrix):
+            raise MultiPhiTypeError(f"fem.{name}: got {type(matrix).__name__}, need a scipy.sparse matrix")
+        if matrix.shape != (size, size):
+            raise MultiPhiValueError(f"fem.{name}: got shape {matrix.shape}, need {(size, size)} for its nodes")
+    return scipy.sparse.csr_array(fem.massMatrix), scipy.sparse.csr_array(fem.stiffnessMatrix)
+
+
+def _fixed_nodes(fem: Any, fixed: Iterable[int] | str, count: int) -> np.ndarray:
+    if isinstance(fixed, str):
+        return _node_set(fem, "fixed", fixed)[0]
+    if not isinstance(fixed, Iterable):
+        raise MultiPhiTypeError(f"fixed: got {type(fixed).__name__}, need node numbers or the name of a node set")
+    return np.array([_number("fixed", node, count) for node in fixed], int)
+
+
+def _node_set(fem: Any, name: str, wanted: str) -> tuple[np.ndarray, np.ndarray]:
+    """Node numbers (k,) and weights (k,), their sum 1, of a node set."""
+    for given in fem.nodeSets:
+        if given["Name"] == wanted:
+            nodes = [_number(f"node set {wanted!r}", node, len(fem.nodes["Position"])) for node in given["NodeNumbers"]]
+            weights = np.asarray(given["NodeWeights"], float)
+            if weights.shape != (len(nodes),) or not np.sum(weights) > 0:
+                raise MultiPhiValueError(f"node set {wanted!r}: got weights {weights}, need {len(nodes)} of sum > 0")
+            return np.array(nodes, int), weights / np.sum(weights)
+    known = ", ".join(given["Name"] for given in fem.nodeSets) or "none"
+    raise MultiPhiValueError(f"{name}: got {wanted!r}, need one of the node sets: {known}")
+
+
+def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
+    """Row (n,) of (node or node set, component); moving: (nodes, 3) bool, n of them true."""
+    called = f"points[{name!r}]"
+    if not (isinstance(given, tuple) and len(given) == 2):
+        raise MultiPhiTypeError(f"{called}: got {given!r}, need (node number or node set, component)")
+    component = _number(f"{called} component", given[1], COMPONENTS)
+    row = np.zeros(moving.shape)
+    if isinstance(given[0], str):
+        nodes, weights = _node_set(fem, called, given[0])
+        np.add.at(row[:, component], nodes, weights)
+    else:
+        row[_number(called, given[0], len(moving)), component] = 1.0
+    if not np.any(row[moving]):
+        raise MultiPhiValueError(f"{called}: got {given!r}, which is fixed, need a point that can move")
+    return row[moving]
+
+
+def _number(name: str, given: Any, count: int) -> int:
+    if isinstance(given, bool) or not isinstance(given, (int, np.integer)):
+        raise MultiPhiTypeError(f"{name}: got {given!r}, need a number from 0 to {count - 1}")
+    if not 0 <= given < count:
+        raise MultiPhiValueError(f"{name}: got {given}, need 0 <= number < {count}")
+    return int(given)

@@ -1,0 +1,183 @@
+"""Linear range: whether a reduced motion stays where the linearisation of its Exudyn system holds.
+
+At a few instants the system is asked for its accelerations in the model's motion (linearisation.py); the largest error
+found is relative to the motion's largest displacement. A system cannot be pickled: a pickled check keeps for the lowest
+modes the amplitude up to which each of them alone, with the velocity that belongs to it, stays within ``TOLERANCE``.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.exudyn_plugin.convert.linearisation import Extent, Linearisation
+from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
+
+TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
+SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
+ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
+SAMPLES = 256  # times at which the largest displacement and velocity are looked for
+PROBED = 12  # lowest modes of which limits are kept: those that move far
+LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of the largest coordinate of the system
+
+
+@dataclass(frozen=True)
+class RangeCheck:
+    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none."""
+
+    times: np.ndarray
+    errors: np.ndarray
+    reason: str = ""
+
+    @property
+    def error(self) -> float:
+        """The largest error, nan where nothing could be checked."""
+        return math.nan if self.reason else float(np.max(self.errors, initial=0.0))
+
+    @property
+    def holds(self) -> bool:
+        """Whether the motion stayed within the linear range; False where nothing could be checked."""
+        return self.error <= TOLERANCE
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What a user must not miss."""
+        if self.reason:
+            return (f"linear range: not checked, {self.reason}",)
+        if self.holds:
+            return ()
+        found = self.times[np.argmax(self.errors > TOLERANCE)]
+        away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
+        return (
+            f"linear range: the motion has left it by t = {found:.3g} s: forces of the Exudyn system that the model "
+            f"lacks move it {away} of its largest displacement away; make the motion smaller, or solve the system",
+        )
+
+
+def _told(left_out: Sequence[str]) -> Iterator[str]:
+    for part in left_out:
+        yield f"left out: {part}; this motion is without it"
+
+
+class LinearRange:
+    """Validity of a model that ``reduce`` made: asks its system, and names what was left out (grouped sentences).
+
+    Pickled it becomes ``LinearLimits``; a copy asks the same system.
+    """
+
+    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str]) -> None:
+        self._mbs, self._linear, self._left_out = mbs, linear, tuple(left_out)
+
+    def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
+        """Sentences for ``Trajectory.warnings``."""
+        return (*_told(self._left_out), *self.check(trajectory).sentences)
+
+    def __copy__(self) -> LinearRange:
+        return self
+
+    def __deepcopy__(self, memo: Any) -> LinearRange:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LinearLimits, (self._left_out, *self._limits)
+
+    def check(self, trajectory: Trajectory) -> RangeCheck:
+        """The error of a trajectory of this model at a few instants."""
+        samples, z, z_t = _sampled(trajectory)
+        linear = self._linear
+        sizes, speeds = linear.size(z), linear.size(z_t)
+        spread = np.linspace(0.0, trajectory.t_end, SPREAD + 1)[1:]
+        times = np.unique([*spread, samples[np.argmax(sizes)], samples[np.argmax(speeds)]])
+        reach = float(np.max(np.abs(linear.basis @ z)))
+        if not reach > ROUND_OFF * linear.largest:
+            return RangeCheck(times, np.zeros(len(times)))
+        if reason := self._changed():
+            return RangeCheck(times, np.zeros(len(times)), reason)
+        extent = Extent(reach, float(np.max(sizes)), float(np.max(speeds) / np.max(sizes)))
+        known = [contact.name for contact in trajectory.model.contacts if contact.name in linear.contacts]
+        with linear.beside(self._mbs) as compared:
+            errors = [
+                compared.error(
+                    trajectory.displacement(t),
+                    trajectory.velocity(t),
+                    extent,
+                    TOLERANCE,
+                    t,
+                    {name: float(trajectory.contact_force(name, t)) for name in known},
+                )
+                for t in times
+            ]
+        return RangeCheck(times, np.array(errors))
+
+    def _changed(self) -> str:
+        """Why the system is no longer the one that was reduced, as far as its size tells; empty if it is."""
+        if not self._mbs.systemIsConsistent:
+            return "the Exudyn system has been changed and not assembled since it was reduced"
+        now, before = self._mbs.systemData.ODE2Size(), len(self._linear.displacement)
+        if now != before:
+            return f"the Exudyn system has {now} coordinates, and had {before} when it was reduced"
+        return ""
+
+    @functools.cached_property
+    def _limits(self) -> tuple[np.ndarray, np.ndarray, str]:
+        """Rows and limits of LinearLimits, or why there are none."""
+        linear, reason = self._linear, self._changed()
+        squares, shapes = linear.modes
+        rows = (linear.mass @ shapes[:, :PROBED]).T
+        limits = [] if reason else [self._limit(squares[i], shapes[:, i]) for i in range(len(rows))]
+        return rows, np.array(limits), reason
+
+    def _limit(self, square: float, shape: np.ndarray) -> float:
+        """The largest amplitude of a mode of omega^2 found linear, by bisection; infinite if the largest tried is."""
+        unit = (self._linear.largest or 1.0) / float(np.max(np.abs(self._linear.basis @ shape)))
+        if self._is_linear(square, shape, 2.0**LARGEST * unit):
+            return math.inf
+        linear, beyond = SMALLEST, LARGEST
+        while beyond - linear > 1:
+            tried = (linear + beyond) // 2
+            if self._is_linear(square, shape, 2.0**tried * unit):
+                linear = tried
+            else:
+                beyond = tried
+        return 2.0**linear * unit
+
+    def _is_linear(self, square: float, shape: np.ndarray, size: float) -> bool:
+        """Whether a mode of omega^2 stays linear at a modal amplitude and the velocity that belongs to it."""
+        loaded = float(np.linalg.norm(self._linear.modes[1].T @ self._linear.static))
+        rate = math.sqrt(max(square, loaded / size))
+        if rate == 0.0:
+            return True  # nothing acts on it
+        extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
+        with self._linear.beside(self._mbs) as compared:
+            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE) <= TOLERANCE
+
+
+class LinearLimits:
+    """What a pickled check keeps: rows (k, n) of the lowest modes' coordinates, and their limits (k,), or why not."""
+
+    def __init__(self, left_out: Sequence[str], rows: np.ndarray, limits: np.ndarray, reason: str) -> None:
+        self._left_out, self._rows, self._limits, self._reason = tuple(left_out), rows, limits, reason
+
+    def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
+        """Sentences for ``Trajectory.warnings``."""
+        return (*_told(self._left_out), *self.check(trajectory).sentences)
+
+    def check(self, trajectory: Trajectory) -> RangeCheck:
+        """The error at many times, every mode alone: TOLERANCE at its limit, in proportion to its amplitude."""
+        samples, z, _ = _sampled(trajectory)
+        if self._reason:
+            return RangeCheck(samples, np.zeros(SAMPLES), self._reason)
+        return RangeCheck(samples, TOLERANCE * np.max(np.abs(self._rows @ z) / self._limits[:, None], axis=0))
+
+
+def _sampled(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (SAMPLES,) over the run, displacements and velocities (n, SAMPLES)."""
+    samples = np.linspace(0.0, trajectory.t_end, SAMPLES)
+    return samples, trajectory.displacement(samples), trajectory.velocity(samples)

@@ -1,0 +1,225 @@
+"""Linearisation of an Exudyn system: its (M, C, K) about the current state, and its contacts.
+
+    q = q_0 + S z,   M = S^T M_q S,  C = S^T C_q S,  K = S^T K_q S
+
+q [m, rad, ...] are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions the
+constraints leave free (orthonormal columns, from the constraint Jacobian at q_0), z the coordinates of
+the linear structure. The state must be an equilibrium of everything but the contacts and the constraint
+forces: a linear structure has no constant force. What a linear structure cannot hold is not looked for
+beyond that: user functions and other nonlinear forces enter by their tangent at q_0, loads only by
+their geometric stiffness (geometric_stiffness.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current
+from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
+    generalised_forces,
+    geometric_stiffness,
+    static_solver,
+)
+from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation
+from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import checked_matrices
+from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["LinearizedStructure", "linear_structure_from"]
+
+EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
+PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearizedStructure(LinearStructure):
+    """A linear structure that knows the Exudyn coordinates it came from.
+
+    coordinates: S, (n_full, n), with q - q_0 = S z; a copy, read-only. S^T S is the identity, so a
+    matrix A in z acts in Exudyn's coordinates as S A S^T.
+    """
+
+    coordinates: np.ndarray
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        coordinates = np.array(self.coordinates, dtype=float)
+        if coordinates.ndim != 2 or coordinates.shape[1] != self.n:
+            raise MultiPhiValueError(f"coordinates: got shape {coordinates.shape}, need (n_full, {self.n})")
+        coordinates.flags.writeable = False
+        object.__setattr__(self, "coordinates", coordinates)
+
+
+def linear_structure_from(
+    mbs: Any,
+    points: Mapping[str, Any] | None = None,
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+) -> tuple[LinearizedStructure, tuple[UnilateralContact, ...]]:
+    """Linearise an assembled Exudyn system about its current state; the system is left as it was.
+
+    points: name -> marker index, or (node index, coordinate number). A marker of one coordinate gives the
+    point ``name``; a marker with a position gives ``name.x``, ``name.y``, ``name.z``, a marker of several
+    coordinates ``name.0``, ``name.1``, ... Without ``points`` every marker is named so by its own name and
+    every node coordinate as ``<node name>.<coordinate number>``; those that cannot move are left out.
+    damping: in the coordinates z or by ratios; None takes what the system's own dampers give.
+
+    Every active ObjectContactCoordinate comes back as a UnilateralContact of the object's name: its row,
+    the gap [m] at the linearisation point and its stiffness [N/m]; none of them is part of the stiffness.
+
+    Raises MultiPhiValueError for a contact, a state or a matrix that a linear structure cannot hold.
+    """
+    check_system(mbs)
+    objects = _contact_objects(mbs)
+    with initial_is_current(mbs):
+        gaps = [_gap(mbs, index) for index in objects]
+        with _inactive(mbs, objects):
+            mass, stiffness, dampers, basis = projected_matrices(mbs)
+            _check_equilibrium(mbs, stiffness, basis)
+        rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
+        contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
+    if damping is None and np.any(dampers):
+        damping = dampers
+    structure = LinearizedStructure(mass, stiffness, damping, rows, coordinates=basis)
+    return structure, contacts
+
+
+def check_system(mbs: Any) -> None:
+    if not mbs.systemIsConsistent:
+        raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
+    if len(mbs.systemData.GetODE2Coordinates()) == 0:
+        raise MultiPhiValueError("mbs: got no ODE2 coordinates, need at least one")
+    if len(mbs.systemData.GetODE1Coordinates()) > 0:
+        raise MultiPhiValueError("mbs: got ODE1 coordinates, need a system of second order only")
+    if mbs.NumberOfGeneralContacts() > 0:
+        raise MultiPhiValueError("mbs: got a GeneralContact, need ObjectContactCoordinate items only")
+
+
+def _contact_objects(mbs: Any) -> list[Any]:
+    """Indices of the active contacts; raises for one that is not a unilateral spring of one coordinate."""
+    found = []
+    for i in range(mbs.systemData.NumberOfObjects()):
+        index = exu.ObjectIndex(i)
+        item = mbs.GetObject(index)
+        if not item["objectType"].startswith("Contact") or not item["activeConnector"]:
+            continue
+        if item["objectType"] != "ContactCoordinate":
+            raise MultiPhiValueError(
+                f"contact {item['name']!r}: got Object{item['objectType']}, need ObjectContactCoordinate"
+            )
+        _check_law(item)
+        found.append(index)
+    return found
+
+
+def _check_law(item: Mapping[str, Any]) -> None:
+    needed = {"contactDamping": 0.0, "contactStiffnessExponent": 1.0, "impactModel": 0}
+    for name, value in needed.items():
+        if item[name] != value:
+            raise MultiPhiValueError(
+                f"contact {item['name']!r} {name}: got {item[name]!r}, need {value!r} (a linear spring)"
+            )
+
+
+@contextmanager
+def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
+    """Switch the contacts off and, whatever happens, on again."""
+    try:
+        for index in objects:
+            mbs.SetObjectParameter(index, "activeConnector", False)
+        yield
+    finally:
+        for index in objects:
+            mbs.SetObjectParameter(index, "activeConnector", True)
+
+
+def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """M, K, C in z, (n, n), and the basis S, (n_full, n)."""
+    geared = _geared_springs(mbs)
+    with _slack(mbs, geared):
+        result = mbs.ComputeLinearizedSystem(
+            projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
+        )
+    mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
+    basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
+    for item in geared.values():
+        first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
+        row = (item["factor1"] * second - item["factor0"] * first) @ basis
+        stiffness += item["stiffness"] * np.outer(row, row)
+        damping += item["damping"] * np.outer(row, row)
+    stiffness += basis.T @ geometric_stiffness(mbs) @ basis
+    if basis.shape[1] == 0:
+        raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
+    return (*checked_matrices(mbs, mass, stiffness, damping, basis), basis)
+
+
+def linearised(mbs: Any, time: float) -> Linearisation:
+    """The system about its initial state, at a time [s], without contacts and loads by functions of time."""
+    mass, stiffness, damping, basis = projected_matrices(mbs)
+    data, initial = mbs.systemData, exu.ConfigurationType.Initial
+    displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+    static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
+    largest = float(np.max(np.abs(data.GetODE2Coordinates(exu.ConfigurationType.Reference) + displacement)))
+    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest)
+
+
+def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
+    """Springs of coordinates with factors, of which Exudyn's tangent does not hold the factors."""
+    items = {i: mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())}
+    geared = {i: item for i, item in items.items() if (item.get("factor0", 1.0), item.get("factor1", 1.0)) != (1, 1)}
+    geared = {
+        i: item for i, item in geared.items() if item.get("activeConnector") and "springForceUserFunction" in item
+    }
+    for item in geared.values():
+        if item["springForceUserFunction"]:
+            raise MultiPhiValueError(f"spring {item['name']!r}: got a user function and factors, need one of both")
+    return geared
+
+
+@contextmanager
+def _slack(mbs: Any, springs: Mapping[int, Mapping[str, Any]]) -> Iterator[None]:
+    """Take stiffness and damping from springs and, whatever happens, give them back."""
+    try:
+        for i in springs:
+            for name in ("stiffness", "damping"):
+                mbs.SetObjectParameter(exu.ObjectIndex(i), name, 0.0)
+        yield
+    finally:
+        for i, item in springs.items():
+            for name in ("stiffness", "damping"):
+                mbs.SetObjectParameter(exu.ObjectIndex(i), name, item[name])
+
+
+def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
+    unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # what constraint forces cannot balance
+    elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
+    if np.max(unbalanced) > EQUILIBRIUM * elastic + PICOMETRE * np.max(np.abs(stiffness)):
+        raise MultiPhiValueError(
+            f"mbs: its state without contacts is out of balance by {np.max(unbalanced):g} N (or N m), need "
+            "an equilibrium with open contacts: take loads off, or solve the static problem first"
+        )
+
+
+def forces(mbs: Any) -> np.ndarray:
+    """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
+    with static_solver(mbs) as solver:
+        return generalised_forces(mbs, solver)
+
+
+def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:
+    item = mbs.GetObject(index)
+    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) @ basis for m in item["markerNumbers"])
+    return UnilateralContact(item["name"], second - first, gap, float(item["contactStiffness"]))
+
+
+def _gap(mbs: Any, index: Any) -> float:
+    return float(mbs.GetObjectOutput(index, exu.OutputVariableType.Distance))

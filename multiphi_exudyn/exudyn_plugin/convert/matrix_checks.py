@@ -1,0 +1,84 @@
+"""What makes the matrices of an Exudyn system no linear structure, told by the coordinates it comes from.
+
+M positive definite, K positive semidefinite, all symmetric, in z with q = q_0 + S z; S (n_full, n). The coordinate of
+the largest part in S z names the cause: by its node, its number there and the bodies of that node.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+import scipy.linalg
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mathematics.modes import complete_modes
+
+__all__ = ["checked_matrices", "coordinate_name"]
+
+ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
+MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
+
+
+def checked_matrices(
+    mbs: Any, mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, basis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, K, C (n, n), made symmetric to the bit; raises MultiPhiValueError that names items and coordinates."""
+    given = {"mass": mass, "stiffness": stiffness, "damping": damping}
+    mass, stiffness, damping = (_symmetric(mbs, name, matrix, basis) for name, matrix in given.items())
+    values, vectors = scipy.linalg.eigh(mass)
+    if values[0] <= MASSLESS * values[-1]:
+        where = _of_largest(mbs, basis @ vectors[:, 0])
+        raise MultiPhiValueError(
+            f"mass: got {_kind(values[0], values[-1])} mass at {where}, need a mass there or a constraint that holds it"
+        )
+    try:
+        complete_modes(mass, stiffness)
+    except MultiPhiValueError as error:
+        values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
+        raise MultiPhiValueError(
+            f"stiffness: got a negative one (omega^2 = {values[0]:.3g} 1/s2), mainly of "
+            f"{_of_largest(mbs, basis @ vectors[:, 0])}, need a state that is stable"
+        ) from error
+    return mass, stiffness, damping
+
+
+def _kind(lowest: float, largest: float) -> str:
+    return "a negative" if lowest < -MASSLESS * largest else "no"
+
+
+def _symmetric(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    skew = matrix - matrix.T
+    if np.max(np.abs(skew)) > ASYMMETRY * np.max(np.abs(matrix)):
+        full = np.abs(basis @ skew @ basis.T)
+        first, second = (coordinate_name(mbs, int(i)) for i in np.unravel_index(np.argmax(full), full.shape))
+        raise MultiPhiValueError(
+            f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), got entries that differ by "
+            f"{np.max(np.abs(skew)) / np.max(np.abs(matrix)):.2g} of the largest between {first} and {second}, need a "
+            "symmetric one"
+        )
+    return (matrix + matrix.T) / 2
+
+
+def _of_largest(mbs: Any, vector: np.ndarray) -> str:
+    return coordinate_name(mbs, int(np.argmax(np.abs(vector))))
+
+
+def coordinate_name(mbs: Any, index: int) -> str:
+    """ "coordinate 1 of node 'n' (ObjectMassPoint2D 'bob')" of an ODE2 coordinate of the system."""
+    for i in range(mbs.systemData.NumberOfNodes()):
+        node = mbs.GetNode(exu.NodeIndex(i))
+        if not {"initialVelocities", "initialCoordinates_t"} & node.keys():  # no node with ODE2 coordinates
+            continue
+        first, count = mbs.GetNodeODE2Index(exu.NodeIndex(i)), len(node["initialCoordinates"])
+        if first <= index < first + count:
+            bodies = ", ".join(_bodies(mbs, i))
+            return f"coordinate {index - first} of node {node['name']!r}" + (f" ({bodies})" if bodies else "")
+    return f"coordinate {index} of the system"
+
+
+def _bodies(mbs: Any, node: int) -> list[str]:
+    items = [mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())]
+    found = [item for item in items if node in [int(n) for n in item.get("nodeNumbers", [item.get("nodeNumber", -1)])]]
+    return [f"Object{item['objectType']} {item['name']!r}" for item in found]

@@ -1,0 +1,199 @@
+"""Reduction of an Exudyn system: its linearisation at the current state, its contacts and stops, as a model.
+
+    q = q_0 + S z,   M z'' + C z' + K z = p + (contact forces),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
+
+q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
+friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
+is a constant load: a state out of balance starts to move as the system does. K holds what constraint forces and weights
+give (geometric_stiffness.py). A LoadCoordinate by a function of time is a FunctionLoad, t = 0 being the
+system's current time. What is no part of the model is in ``left_out``, with the reason.
+
+Exudyn's contact dampers pull at separation; those of the model do not (contact.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, smooth
+from multiphi_exudyn.exudyn_plugin.convert.items import (
+    Item,
+    grouped,
+    has_contact,
+    has_stops,
+    left_out_functions,
+    left_out_objects,
+    load_item,
+    missing_parts,
+    taken_objects,
+    user_function,
+)
+from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, LinearRange, RangeCheck
+from multiphi_exudyn.exudyn_plugin.convert.linearize import LinearizedStructure, check_system, linearised
+from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
+from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_loads
+from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.loads import ConstantLoad, Load
+from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["Item", "Reduction", "reduce"]
+
+HELD = 1e-9  # of a row's largest entry before projection: a contact that moves less is held by constraints
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What ``reduce`` made of a system.
+
+    model: structure, contacts, modes. velocity: z'(0), (n,); the displacement z(0) is zero. loads: p, none if zero,
+    and those by functions of time.
+    taken: every item of the model. left_out: what is no part of it, with the reason.
+    """
+
+    model: MultiPhiModel
+    velocity: np.ndarray
+    loads: tuple[Load, ...]
+    taken: tuple[Item, ...]
+    left_out: tuple[tuple[Item, str], ...]
+
+    @property
+    def structure(self) -> LinearizedStructure:
+        """M, C, K, the points and S."""
+        structure = self.model.structure
+        assert isinstance(structure, LinearizedStructure)
+        return structure
+
+    @property
+    def report(self) -> str:
+        """What was taken and what was left out, items of one type and one fate a line."""
+        size = f"{self.structure.n} degrees of freedom, {len(self.model.contacts)} contacts, modes: {self.model.modes}"
+        taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
+        left = [f"  {line}" for line in grouped(self.left_out)]
+        return "\n".join([size, "taken", *taken, "left out", *(left or ["  nothing"])])
+
+    def check(self, trajectory: Trajectory) -> RangeCheck:
+        """How far a trajectory of this model left the linear range (linear_range.py); its warnings say so too."""
+        validity = self.model.validity
+        assert isinstance(validity, (LinearRange, LinearLimits))
+        return validity.check(trajectory)
+
+    def report_of(self, trajectory: Trajectory, tolerance: float = 0.01) -> str:
+        """How far a trajectory of this model can be trusted, a line each: linear range, horizon, warnings.
+
+        tolerance: of the horizon, see ``Trajectory.horizon``.
+        """
+        found = self.check(trajectory)
+        missed = f"forces that the model lacks: {found.error:.2g} of its largest displacement"
+        held, horizon = "holds" if found.holds else "does not hold", trajectory.horizon(tolerance)
+        lines = [
+            f"linear range ({held}): {f'not checked, {found.reason}' if found.reason else missed}",
+            f"determined within {100 * tolerance:g} % until {horizon:.6g} of {trajectory.t_end:g} s",
+        ]
+        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in trajectory.warnings)])
+
+
+def reduce(
+    mbs: Any,
+    modes: int | str | UpTo | Tolerance = 12,
+    points: Mapping[str, Any] | None = None,
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+    strict: bool = False,
+) -> Reduction:
+    """Reduce an assembled Exudyn system at its current state; the system is left as it was.
+
+    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them.
+    points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
+    ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``.
+
+    strict: whether to refuse a system of which something is left out, instead of a warning of every run.
+
+    Raises MultiPhiValueError for a system without a symmetric linearisation of second order.
+    """
+    check_system(mbs)
+    objects, loads = items_of(mbs)
+    now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
+    with initial_is_current(mbs):
+        gaps = {i: _distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
+        with smooth(mbs, objects, loads):
+            linear = linearised(mbs, now)
+            varying = timed_loads(mbs, loads, now)
+        rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
+        full_contacts = [c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i])]
+    full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
+    timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
+    own = linear.damping if np.any(linear.damping) else None
+    given = own if damping is None else damping
+    structure = LinearizedStructure(linear.mass, linear.stiffness, given, rows, coordinates=linear.basis)
+    contacts = [replace(c, direction=_projected(full_rows[c.name], linear.basis)) for c in full_contacts]
+    moving = [c for c in contacts if np.any(structure.row(c.direction))]
+    names = {c.name for c in moving}
+    taken = (*taken_objects(objects, names), *_taken_loads(loads, timed))
+    left_out = (
+        *left_out_objects(objects, names),
+        *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
+        *left_out_functions(mbs),
+    )
+    missing = missing_parts(left_out)
+    if strict and missing:
+        raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
+    linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed)
+    validity = LinearRange(mbs, linear, missing)
+    return Reduction(
+        MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
+        linear.basis.T @ linear.velocity,
+        (
+            *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
+            *(each for load in timed.values() for each in function_loads(load, linear.basis)),
+        ),
+        taken,
+        left_out,
+    )
+
+
+def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) -> Iterator[Item]:
+    for i, load in enumerate(loads):
+        if i in timed:
+            yield load_item(i, load, "load by its function of time")
+        elif not user_function(load):
+            held = " in its present direction" if load.get("bodyFixed", False) else ""
+            yield load_item(i, load, f"constant load{held}")
+
+
+def _modes(modes: int | str | UpTo | Tolerance, most: int) -> int | str | UpTo | Tolerance:
+    return "all" if isinstance(modes, int) and modes > most else modes
+
+
+def _distance(mbs: Any, index: int, item: Mapping[str, Any]) -> float:
+    """Gap [m] of a contact, or what the limits of a limit stop are compared with."""
+    outputs = exu.OutputVariableType
+    variable = outputs.Displacement if has_stops(item) else outputs.Distance
+    return float(mbs.GetObjectOutput(exu.ObjectIndex(index), variable))
+
+
+def _contacts(mbs: Any, index: int, item: Mapping[str, Any], distance: float) -> Iterator[UnilateralContact]:
+    """Contacts of an object, their directions as rows (n_full,)."""
+    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
+    if not has_stops(item):
+        law = float(item["contactStiffness"]), float(item["contactDamping"])
+        yield UnilateralContact(item["name"], second - first, distance, *law)
+        return
+    row = item["factor1"] * second - item["factor0"] * first
+    law = float(item["limitStopsStiffness"]), float(item["limitStopsDamping"])
+    yield UnilateralContact(f"{item['name']}.upper", -row, item["limitStopsUpper"] - distance, *law)
+    yield UnilateralContact(f"{item['name']}.lower", row, distance - item["limitStopsLower"], *law)
+
+
+def _projected(row: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """A row in z; zero if constraints hold it."""
+    projected: np.ndarray = row @ basis
+    return projected if np.max(np.abs(projected)) > HELD * np.max(np.abs(row), initial=1.0) else 0 * projected

@@ -1,0 +1,183 @@
+"""Interface coordinates: points of a body that connectors, loads and sensors of an Exudyn system can act on.
+
+    y = R q + c,   0 = f + reaction of the tie,   p = R^T f
+
+y displacements (or rotations) of the points, each the coordinate of a massless NodeGenericODE2, so that
+MarkerNodeCoordinate(node, 0) works as for any other item. R (m, s) rows of the points in the modes of the present
+level, c (m,) its asymptotic configuration there [m]; f (m,) what acts on y [N], p its modal force. One
+ObjectConnectorCoordinateVector per point holds the equation. At a transition R and c are exchanged and y, y', y'' are
+written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
+velocity (stepped_level.py).
+
+f comes from the multipliers of the ties, so points may depend on each other, and a rigid contact may hold one. Within
+the step of an event the f of its mean acts before the event, and after it with what the event changes in reactions,
+loads, connectors and inertia (exact_step.py): exact for a force that is constant, of second order for one that varies
+(single halvings of the step scatter about it, as the place of an event in its step changes too). The modes are those of
+free points: one whose motion is prescribed takes more of them.
+
+An impact on a rigid contact is one of the body with all that masses and constraints tie to its points
+(attached_inertia.py); springs and dampers are no part of it, being finite. What they do within the step of an event has
+to be resolved by it, stiff ones by a short step; a run in which it is not ends with an error (exact_step.py). A point
+that a closed rigid
+contact holds may carry anything but a further constraint: Exudyn then has two for one coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector, SensorObject
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.coupling.modal_force import shift
+from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
+
+__all__ = ["Interface", "interface_rows"]
+
+
+def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[str, At]) -> dict[str, np.ndarray]:
+    """Rows (n,) by the names of interface coordinates, from names of points or {name: point or row}."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
+    points = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
+    for name in points:
+        if not isinstance(name, str):
+            raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
+    rows = {name: structure.row(at) for name, at in points.items()}
+    for name, row in rows.items():
+        if not np.any(row):
+            raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
+    return rows
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """y = R q + c in one level. rows: R (m, s). offset: c (m,).
+
+    direct: L (k, m), what f adds to the forces of the closed contacts beside its modes' share.
+    """
+
+    rows: np.ndarray
+    offset: np.ndarray
+    direct: np.ndarray
+
+
+class Interface:
+    """The interface coordinates of one body in one system.
+
+    nodes: NodeIndex by name. sensors: of f, by name. ties: the objects that hold the equation. most: levels of which R
+    and c are kept.
+    """
+
+    def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray], most: int) -> None:
+        self.nodes: dict[str, Any] = {}
+        self.sensors: dict[str, Any] = {}
+        self._name = name
+        self._rows = np.array(list(rows.values()))
+        self._names = tuple(rows)
+        self.ties: list[Any] = []
+        self._known: BoundedCache[tuple[int, ...], _Reading] = BoundedCache(most)
+        self._mbs = mbs
+
+    def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
+        """Add nodes and ties for a body whose node holds q, q' (s,) in a level."""
+        found, mbs = self.of(stepped), self._mbs
+        own = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node))
+        for name, row, constant in zip(self._names, found.rows, found.offset, strict=True):
+            point = mbs.AddNode(
+                NodeGenericODE2(
+                    name=f"Node:{self._name}.{name}",
+                    referenceCoordinates=[0.0],
+                    initialCoordinates=[row @ q + constant],
+                    initialCoordinates_t=[row @ q_t],
+                    numberOfODE2Coordinates=1,
+                )
+            )
+            marker = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=point))
+            tie = ObjectConnectorCoordinateVector(
+                name=f"{self._name}.{name}",
+                markerNumbers=[own, marker],
+                scalingMarker0=row[None, :],
+                scalingMarker1=np.eye(1),
+                offset=[constant],
+            )
+            self.nodes[name] = point
+            self.ties.append(mbs.AddObject(tie))
+            self.sensors[name] = mbs.AddSensor(
+                SensorObject(
+                    name=f"Sensor:{self._name}.{name}",
+                    objectNumber=self.ties[-1],
+                    outputVariableType=exu.OutputVariableType.Force,
+                    storeInternal=True,
+                    writeToFile=False,
+                )
+            )
+
+    def of(self, stepped: SteppedLevel) -> _Reading:
+        """R and c of a level."""
+        return self._known.get_or_build(stepped.closed, lambda: self._read(stepped))
+
+    def _read(self, stepped: SteppedLevel) -> _Reading:
+        level = stepped.loaded.level
+        rows = np.zeros((len(self._rows), stepped.size))
+        in_base = self.in_base(level.base)
+        rows[:, : level.modes] = drop_round_off(in_base @ level.vectors, np.abs(in_base) @ np.abs(level.vectors))
+        direct = _reactions(level, in_base, rows[:, : level.modes])
+        return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, direct)
+
+    def in_base(self, base: ModalBase) -> np.ndarray:
+        """The points (m, b) in base coordinates."""
+        return np.asarray(self._rows @ base.modes.shapes)
+
+    def attach(self, state: Mapping[str, np.ndarray]) -> None:
+        """Views of the interface coordinates in the system's current state; they hold for one run."""
+        self.places = np.array([self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()])
+        self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        self.multipliers = [row for tie in self.ties for row in self._mbs.systemData.GetObjectLTGAE(tie)]
+        self._forces = state["AECoords"]
+
+    @property
+    def forces(self) -> np.ndarray:
+        """f (m,) in the system's current state."""
+        return np.asarray(self._forces[self.multipliers])
+
+    def load(self, stepped: SteppedLevel) -> None:
+        """Give the ties R and c of a level."""
+        found = self.of(stepped)
+        for tie, row, constant in zip(self.ties, found.rows, found.offset, strict=True):
+            self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
+            self._mbs.SetObjectParameter(tie, "offset", [constant])
+
+    def write(self, stepped: SteppedLevel, coordinates: Iterable[np.ndarray]) -> None:
+        """Write y, y', y'' of q, q', q'' (s,)."""
+        found = self.of(stepped)
+        for view, values, constant in zip(self._views, coordinates, (found.offset, 0.0, 0.0), strict=True):
+            view[self.places] = found.rows @ values + constant
+
+    def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
+        """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""
+        modal, points = np.split(force, [given.size])
+        return np.concatenate([modal + points @ (self.of(wanted).rows - self.of(given).rows), points])
+
+
+def _reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Reactions (k, m) of closed rigid contacts to unit forces on points, less those to the forces on the modes.
+
+    in_base, rows: the points in base coordinates (m, b) and in the level's modes (m, r).
+    """
+    gaps, found = np.zeros(len(level.indices)), np.zeros((len(level.indices), len(rows)))
+    rigid = np.isinf(level.base.stiffnesses[list(level.indices)])
+    if np.any(rigid):
+        whole = np.array([level.static_response(load, gaps)[0] for load in in_base]).T
+        modal = level.force_rows @ np.array([shift(level, row) for row in rows]).T
+        found[rigid] = (whole - modal)[rigid]
+    return found

@@ -1,0 +1,272 @@
+"""Level: the linear system that holds while a set of contacts is closed, in its own modes (eqs. 38.2 to 38.5).
+
+    x = Phi_l eta + x_inf,l                                                           (38.4)
+    eta'' + Phi_l^T C Phi_l eta' + diag(omega_l^2) eta = Phi_l^T (f - f_static)       (38.3)
+
+The asymptotic configuration x_inf,l holds gaps and static loads (static_response.py). Where no closed contact resists a
+rigid-body motion, the load on it drives the level's zero-frequency modes. The total stiffness of a force law may be
+negative, and
+the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ exp(+-|omega| t)).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.levels.closed_directions import ClosedDirections
+from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.static_response import static_response
+from multiphi_exudyn.mathematics.first_descent import DescentFinder
+from multiphi_exudyn.mathematics.free_response import ModalResponse, modal_response
+from multiphi_exudyn.mathematics.modes import NEAR
+from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mechanics.arguments import real_array
+
+__all__ = ["Asymptotic", "Level", "LevelOverride"]
+
+
+@dataclass(frozen=True)
+class LevelOverride:
+    """Frequencies [Hz] and damping ratios that replace the computed ones of a level's lowest modes.
+
+    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical
+    (M, C, K): such a level does not interlace, and a transition into it need not lower the energy. Static deflections
+    stay the computed ones, also those that a slowly varying load goes through.
+    """
+
+    frequencies: Sequence[float] | None = None
+    ratios: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "ratios"):
+            if (given := getattr(self, name)) is not None:
+                values = real_array(f"level override {name}", given, "a list of numbers")
+                if values.ndim != 1:
+                    raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
+                object.__setattr__(self, name, tuple(values.tolist()))
+
+
+@dataclass(frozen=True)
+class Asymptotic:
+    """What a level's modes cannot represent: its state of rest under gaps and static loads.
+
+    configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
+    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
+    y_inf [J], and the same less f.y_inf.
+    """
+
+    configuration: np.ndarray
+    forces: np.ndarray
+    drive: np.ndarray
+    load: np.ndarray
+    strain: float
+    potential: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level; see the module's docstring. Built by ``MultiPhiModel.level``.
+
+    closed: names of its closed contacts. indices: the same as positions in the base. base: its coordinates.
+    squares: omega^2 (r,) [rad2/s2], ascending, negative for growing modes. vectors: modes in base coordinates (m, r),
+    orthonormal. damping: (r, r) [1/s].
+    gap_rows: (c, r), gap_i = gap_rows[i].eta + ... for every contact of the model.
+    force_rows, force_rate_rows: (k, r), contact force of the closed contacts from eta and eta'.
+    neutral: (m, z), the zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
+    computed: omega^2 (r,) of M and K themselves; ``squares`` differ where they are overridden.
+    kept_beyond: number of modes beyond those asked for, kept so that no cluster of modes of one frequency is cut.
+    """
+
+    closed: tuple[str, ...]
+    indices: tuple[int, ...]
+    base: ModalBase
+    squares: np.ndarray
+    vectors: np.ndarray
+    damping: np.ndarray
+    gap_rows: np.ndarray
+    force_rows: np.ndarray
+    force_rate_rows: np.ndarray
+    neutral: np.ndarray
+    computed: np.ndarray
+    kept_beyond: int
+
+    @property
+    def modes(self) -> int:
+        """Number of modes r."""
+        return len(self.squares)
+
+    @functools.cached_property
+    def omega(self) -> np.ndarray:
+        """Rates (r,) [rad/s] of oscillation, or of growth where ``squares`` is negative."""
+        return np.sqrt(np.abs(self.squares))
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Undamped natural frequencies (r,) [Hz]; for a growing mode minus its rate of growth over 2 pi."""
+        return np.sign(self.squares) * self.omega / (2 * math.pi)
+
+    @functools.cached_property
+    def highest_frequency(self) -> float:
+        """The highest of them [Hz], zero where there is none."""
+        return float(np.max(self.frequencies, initial=0.0))
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """Damping ratios (r,), diagonal of the projected damping over 2 |omega|; zero for rigid-body modes."""
+        doubled = np.where(self.omega > 0, 2 * self.omega, np.inf)
+        return np.diagonal(self.damping) / doubled
+
+    @property
+    def speed_rows(self) -> np.ndarray:
+        """Gap velocities (c, r) from eta', as impacts see them."""
+        return self.gap_rows
+
+    @functools.cached_property
+    def static_shares(self) -> dict[str, float]:
+        """For every closed compliant contact, the part of its flexibility h.K_l^-1 h that the kept modes leave out.
+
+        rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
+        No gap moves beside a closed rigid contact of the same direction: there is none of those.
+        """
+        closed_directions = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)])
+        springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
+        names = [self.base.label(closed_directions.members[s][0]) for s in springs.tolist()]
+        rows, elastic = closed_directions.vectors[:, springs].T, self.base.modes.omega > 0
+        own = np.sum((rows[:, elastic] / self.base.modes.omega[elastic]) ** 2, axis=1)
+        kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
+        left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
+        whole = left + np.sum(np.abs(kept), axis=1)
+        moving = whole > ZERO * own  # what rigid contacts leave of the others is round-off
+        shares = np.divide(left, whole, out=np.zeros(len(left)), where=moving)
+        return dict(zip(names, shares.tolist(), strict=True))
+
+    def _flexibilities(self, closed_directions: ClosedDirections) -> np.ndarray:
+        """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
+        stiffness = closed_directions.stiffness
+        if self.base.modes.rigid or np.any(stiffness == 0):
+            rows, gaps = closed_directions.vectors.T, np.zeros(len(self.indices))
+            return np.array([row @ self.static_response(row, gaps)[1] for row in rows])
+        free = closed_directions.vectors.T @ (self.base.modes.omega[:, None] ** -2.0 * closed_directions.vectors)
+        yielding = 1 / stiffness
+        return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
+
+    @functools.cached_property
+    def shapes(self) -> np.ndarray:
+        """Mass-normalised mode shapes (n, r)."""
+        return self.base.modes.shapes @ self.vectors
+
+    @functools.cached_property
+    def asymptotic_configuration(self) -> np.ndarray:
+        """x_inf (n,) [m, rad] without loads."""
+        unloaded = self.asymptotic(np.zeros(self.base.modes.count))
+        return self.base.modes.shapes @ unloaded.configuration
+
+    @functools.cached_property
+    def response(self) -> ModalResponse:
+        """Closed form of the level's motion."""
+        return modal_response(self.squares, self.damping)
+
+    @functools.cached_property
+    def finder(self) -> DescentFinder:
+        """Certified event location on the level's exponentials."""
+        return DescentFinder(self.response.basis)
+
+    def forget_samples(self) -> None:
+        """Let go of the samples for event location, most of what a level takes; they are made again when needed."""
+        vars(self).pop("finder", None)
+
+    def apart(self, modes: int) -> int | None:
+        """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
+        steps = np.diff(self.squares[modes - 1 :])
+        clear = np.flatnonzero(steps > NEAR * np.abs(self.squares[modes:]))
+        return modes + int(clear[0]) if clear.size else None
+
+    def truncated(self, asked: int) -> Level:
+        """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
+        modes = self.apart(asked) or self.modes
+        return replace(
+            self,
+            kept_beyond=modes - asked,
+            squares=self.squares[:modes],
+            vectors=self.vectors[:, :modes],
+            damping=self.damping[:modes, :modes],
+            gap_rows=self.gap_rows[:, :modes],
+            force_rows=self.force_rows[:, :modes],
+            force_rate_rows=self.force_rate_rows[:, :modes],
+            computed=self.computed[:modes],
+        )
+
+    def overridden(self, override: LevelOverride) -> Level:
+        """The same mode shapes with given frequencies and ratios."""
+        squares, damping = self.squares.copy(), self.damping.copy()
+        if override.frequencies is not None:
+            given = 2 * math.pi * np.asarray(override.frequencies, dtype=float)[: self.modes]
+            squares[: len(given)] = given**2
+        if override.ratios is not None:
+            ratios = np.asarray(override.ratios, dtype=float)[: self.modes]
+            damping[: len(ratios), :] = damping[:, : len(ratios)] = 0.0
+            doubled = 2 * np.sqrt(np.abs(squares[: len(ratios)]))
+            damping[np.arange(len(ratios)), np.arange(len(ratios))] = ratios * doubled
+        return replace(self, squares=squares, damping=damping)
+
+    def asymptotic(self, load: np.ndarray) -> Asymptotic:
+        """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
+        base, gaps = self.base, self.base.gaps[list(self.indices)]
+        closed_directions = base.closed_directions(self.indices, gaps)
+        along, configuration, pushing = self._response(closed_directions, load + base.preload)
+        strain = base.strain(configuration, self.indices)
+        return Asymptotic(
+            configuration=configuration,
+            forces=self._forces(closed_directions, along, configuration, gaps),
+            drive=np.where(self.squares != 0, 0.0, self.vectors.T @ pushing),
+            load=self.vectors.T @ load,
+            strain=strain,
+            potential=strain - float(load @ configuration),
+        )
+
+    def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
+        closed_directions = self.base.closed_directions(self.indices, gaps)
+        along, configuration, _ = self._response(closed_directions, load)
+        return self._forces(closed_directions, along, configuration, gaps), configuration
+
+    def _response(
+        self, closed_directions: ClosedDirections, total: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(f, y, what drives zero-frequency modes) under a load (m,)."""
+        if self.neutral.size:
+            return self._neutral_response(closed_directions, total)
+        along, configuration = static_response(self.base, closed_directions, total)
+        return along, configuration, total + closed_directions.vectors @ along
+
+    def _neutral_response(
+        self, closed_directions: ClosedDirections, total: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of some mode exactly."""
+        if np.any(closed_directions.rigid):
+            raise NumericalFailure(
+                f"level {', '.join(self.closed)}: negative stiffness cancels that of a mode beside closed rigid "
+                "contacts, so there is no state of rest"
+            )
+        pushing = total - closed_directions.vectors @ closed_directions.constants
+        _, found = static_response(self.base, closed_directions, total - self.neutral @ (self.neutral.T @ pushing))
+        configuration = found - self.neutral @ (self.neutral.T @ found)
+        return (
+            -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
+            configuration,
+            pushing,
+        )
+
+    def _forces(
+        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
+    ) -> np.ndarray:
+        """lambda (k,) of the closed contacts from the forces along their directions."""
+        index, closing = list(self.indices), np.zeros(len(self.base.contacts))
+        closing[index] = self.base.directions[:, index].T @ configuration + gaps
+        return self.base.contact_forces(closed_directions, along, closing)[index]

@@ -1,0 +1,244 @@
+"""Modal base: the coordinates in which every level is a small dense problem, whatever n is.
+
+    x = Phi y,   y = Phi^T M x
+
+Phi (n, m) are the open structure's own modes, so the mass is the identity and the stiffness diag(Omega^2). They are all
+of them where that is affordable, else the lowest ones and the static shapes of contacts and points. A set of closed
+contacts then adds
+
+    closed rigid contacts      H_r^T y = -gap
+    closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from multiphi_exudyn.levels.closed_directions import ClosedDirections
+from multiphi_exudyn.mathematics.modes import Modes, complete_modes, lowest_modes
+from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, LawSpring
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["BASE_MARGIN", "ModalBase", "build_base", "direction_indices"]
+
+BASE_MARGIN = 4  # modes of an incomplete base for each mode of a level taken from it
+COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and static shapes
+PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
+CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
+
+
+@dataclass(frozen=True)
+class ModalBase:
+    """The structure and its contacts in coordinates y of its own modes, x = Phi y.
+
+    modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, c).
+    contacts: as given. complete: whether m = n. mass: M (n, n), the structure's own.
+    """
+
+    modes: Modes
+    points: np.ndarray
+    damping: np.ndarray
+    directions: np.ndarray
+    contacts: tuple[Contact, ...]
+    complete: bool
+    mass: Matrix
+
+    def coordinates(self, x: np.ndarray) -> np.ndarray:
+        """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), zero where it is round-off.
+
+        Of a mode that alone moves a contact it would give one at rest a speed.
+        """
+        shapes = self.modes.shapes.T
+        return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
+
+    @functools.cached_property
+    def gaps(self) -> np.ndarray:
+        """Initial gaps (c,) [m]."""
+        return np.array([contact.gap for contact in self.contacts])
+
+    @functools.cached_property
+    def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """|H| (m, c) and |gaps| (c,): with them a gap's round-off is judged."""
+        return np.abs(self.directions), np.abs(self.gaps)
+
+    @functools.cached_property
+    def stiffnesses(self) -> np.ndarray:
+        """Contact stiffnesses (c,) [N/m], inf where rigid."""
+        return np.array([contact.stiffness for contact in self.contacts])
+
+    @functools.cached_property
+    def dampings(self) -> np.ndarray:
+        """Contact dampings (c,) [N s/m]."""
+        return np.array([contact.damping for contact in self.contacts])
+
+    @functools.cached_property
+    def direction_indices(self) -> list[int]:
+        """``direction_indices`` of the contacts, all others of one direction up to its sign taken together as well."""
+        first = direction_indices(self.contacts)
+        plain = [i for i, c in enumerate(self.contacts) if not isinstance(c, LawSpring)]
+        for k, i in enumerate(plain):
+            before = [j for j in plain[:k] if first[j] == j]
+            first[i] = next((before[same] for same in self._parallel(i, before)), i)
+        return first
+
+    def _parallel(self, i: int, others: list[int]) -> np.ndarray:
+        """Which of these contacts have the direction of one up to its sign, and the same measure of a gap along it."""
+        one, other = self.directions[:, [i]], self.directions[:, others]
+        apart = np.minimum(np.max(np.abs(one - other), axis=0), np.max(np.abs(one + other), axis=0))
+        return np.flatnonzero(apart <= PARALLEL * np.max(np.abs(other), axis=0))
+
+    @functools.cached_property
+    def direction_signs(self) -> np.ndarray:
+        """Sign (c,) of every contact's direction to the one that stands for it."""
+        along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
+        return np.where(along < 0, -1, 1)
+
+    @functools.cached_property
+    def laws(self) -> dict[int, ForceLaw]:
+        """Every force law by the position of its first spring."""
+        given = ((i, self.contacts[i]) for i in sorted(set(self.direction_indices)))
+        return {i: contact.law for i, contact in given if isinstance(contact, LawSpring)}
+
+    def label(self, contact: int) -> str:
+        """What a contact is called: its name, for a spring of a force law the law's."""
+        given = self.contacts[contact]
+        return given.law.name if isinstance(given, LawSpring) else given.name
+
+    @functools.cached_property
+    def preload(self) -> np.ndarray:
+        """Load (m,) of the constant forces of all force laws."""
+        total = np.zeros(self.modes.count)
+        for i, law in self.laws.items():
+            total += law.constant * law.springs[0].side * self.directions[:, i]
+        return total
+
+    @functools.cached_property
+    def energy_offset(self) -> float:
+        """Strain energy [J] of the constant forces of all force laws at q = 0: a law has none at its centre."""
+        return -sum(law.constant * law.centre for law in self.laws.values())
+
+    def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray | None = None) -> float:
+        """Strain energy [J] of y (m,), of the compliant ones among these closed contacts, and of constant forces.
+
+        gaps: (c,) of all contacts, None for their own.
+        """
+        index = list(closed)
+        closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
+        springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
+        bent = 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
+        return bent - float(self.preload @ configuration) + self.energy_offset
+
+    def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
+        """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""
+        viscous = [i for i in closed if self.dampings[i]]
+        if not viscous:
+            return self.damping
+        directions = self.directions[:, viscous]
+        return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
+
+    def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
+        """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""
+        along = [self.direction_indices[i] for i in closed]
+        if len(set(along)) == len(along):
+            index, alone = list(closed), tuple((i,) for i in closed)
+            return ClosedDirections(
+                alone, self.directions[:, along], self.stiffnesses[index], self.direction_signs[index] * gaps
+            )
+        groups: dict[int, list[int]] = {}
+        given = dict(zip(closed, gaps.tolist(), strict=True))
+        for i in closed:
+            groups.setdefault(self.direction_indices[i], []).append(i)
+        together = [part for members in groups.values() for part in self._held_once(members)]
+        stiffness, offsets = np.zeros((2, len(together)))
+        for j, members in enumerate(together):
+            k, signed = self.stiffnesses[members], self.direction_signs[members] * [given[i] for i in members]
+            stiffness[j] = np.sum(k)
+            rigid = np.isinf(k)
+            if len(members) == 1 or np.any(rigid):
+                offsets[j] = signed[np.argmax(rigid)]
+                continue
+            if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
+                stiffness[j] = 0.0
+            offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
+        directions = self.directions[:, [self.direction_indices[members[0]] for members in together]]
+        return ClosedDirections(tuple(map(tuple, together)), directions, stiffness, offsets)
+
+    def _held_once(self, members: list[int]) -> list[list[int]]:
+        """Contacts of one direction, every rigid one but the first on its own."""
+        further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
+        return [[i for i in members if i not in further], *([i] for i in further)]
+
+    def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
+        """lambda (c,) [N] from the forces (d,) along closed directions and the gaps (c,) there; zero where open.
+
+        Springs of one direction have what their gaps say, and a rigid contact among them the rest.
+        """
+        forces = np.zeros(len(self.contacts))
+        for members, force in zip(closed_directions.members, along.tolist(), strict=True):
+            index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
+            if len(index) > 1:
+                springs = [i for i in index if i not in held]
+                moved = self.direction_signs[held[0]] * closing[held[0]] if held else 0.0  # round-off of zero
+                forces[springs] = -self.stiffnesses[springs] * (
+                    closing[springs] - self.direction_signs[springs] * moved
+                )
+                force -= self.direction_signs[springs] @ forces[springs]
+                index = held
+            forces[index] = self.direction_signs[index] * force
+        return forces
+
+
+def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> ModalBase:
+    """The base of a structure: all its modes where that is affordable, else enough for ``modes`` of any level."""
+    rows = np.array([structure.row(contact.direction) for contact in contacts]).reshape(-1, structure.n)
+    points = structure.point_rows
+    complete = structure.n <= COMPLETE or modes == "all"
+    if complete:
+        found = complete_modes(_dense(structure.mass), _dense(structure.stiffness))
+    else:
+        count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
+        distinct = rows[sorted(set(direction_indices(contacts)))]
+        found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))
+    found = found.turned(points)
+    return ModalBase(
+        modes=found,
+        points=points @ found.shapes,
+        damping=_base_damping(structure, found),
+        directions=drop_round_off(found.shapes.T @ rows.T, np.abs(found.shapes.T) @ np.abs(rows.T)),
+        contacts=tuple(contacts),
+        complete=complete,
+        mass=structure.mass,
+    )
+
+
+def direction_indices(contacts: Sequence[Contact]) -> list[int]:
+    """For every contact itself, or its law's first spring, which has the same direction up to its sign."""
+    first: dict[ForceLaw, int] = {}
+    return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
+
+
+def _dense(matrix: Matrix) -> np.ndarray:
+    return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+
+
+def _base_damping(structure: LinearStructure, modes: Modes) -> np.ndarray:
+    """Phi^T C Phi (m, m)."""
+    given = structure.damping
+    if given is None:
+        return np.zeros((modes.count, modes.count))
+    if isinstance(given, ModalDamping):
+        return np.diag(2 * given.of(modes.count) * modes.omega)
+    if isinstance(given, RayleighDamping):
+        return np.diag(given.alpha + given.beta * modes.omega**2)
+    projected = modes.shapes.T @ (given @ modes.shapes)
+    return (projected + projected.T) / 2

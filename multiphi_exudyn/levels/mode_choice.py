@@ -1,0 +1,143 @@
+"""Choice of modes: how many a level has, where it is not said by a number.
+
+UpTo         all up to a cut-off frequency
+Tolerance    as many as a truncation error of the run needs (truncation.py)
+None         as many as hold the static response of contacts and points, a choice made without a run:
+             all of them up to SMALL degrees of freedom, else the smallest r, FEWEST <= r <= MOST, with
+
+    rho = 1 - (sum over r modes of (h.psi / omega)^2) / (h.K_l^-1 h) < CONTACT_SHARE
+
+in the level l that every compliant contact makes alone, for a force law in that of its largest stiffness, and
+
+    1 - (sum over r modes of (p.phi / Omega)^2) / (p.K^-1 p) <= POINT_SHARE
+
+in the open level for every named point, rigid-body modes left out. A closed rigid contact does not move, so nothing is
+said of it by a static response: with one r is at least RIGID. Where the base does not hold all modes it is that of
+FIRST modes; contacts, not points, may ask for a larger one.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "Tolerance", "UpTo", "chosen_modes", "is_count"]
+
+SMALL = 30  # degrees of freedom up to which all modes are kept: they cost less than a choice
+FEWEST = 6  # modes: a start or a load may move what no contact and no point tells of
+RIGID = 12  # modes beside a rigid stop, where the error of the rig's displacements is 1 % and hardly falls with more
+FIRST = 12  # modes that an incomplete base is built for before more are known to be needed
+SERVED = 22  # modes that a base of FIRST modes serves: BASE_MARGIN of its own for each
+MOST = 60  # modes: levels beyond it take longer than most models are worth
+CONTACT_SHARE = 0.1  # of a closed level's flexibility at its contact: peak forces of the rig are right to 1 % below it
+POINT_SHARE = 0.01  # of the open level's flexibility at a point
+
+
+@dataclass(frozen=True)
+class UpTo:
+    """Every level with its modes up to a cut-off frequency [Hz], at least one and at most ``most``.
+
+    A closed contact raises frequencies, so no level has more modes than the open one.
+    """
+
+    frequency: float
+    most: int = MOST
+
+    def __post_init__(self) -> None:
+        _check_limits(self, "frequency", self.frequency, self.most)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Wanted truncation error of a run, from which its cut-off frequency follows.
+
+    error: of ``truncation_indicator``, an estimate of the relative error of displacements; 0.01 is 1 %.
+    most: modes that a level is given at most.
+    """
+
+    error: float
+    most: int = MOST
+
+    def __post_init__(self) -> None:
+        _check_limits(self, "error", self.error, self.most)
+
+
+def chosen_modes(
+    structure: LinearStructure,
+    base: ModalBase,
+    chains: Sequence[Sequence[int]],
+    level: Callable[[tuple[int, ...], int], Level],
+) -> int:
+    """The number of modes r for ``None``; see the module's docstring.
+
+    chains: positions of every force law's springs on either side, from its centre outward. level: of closed contacts by
+    their positions, with its lowest so many modes at least or all that it has.
+    """
+    count = max(FEWEST, base.modes.rigid + 1)
+    if any(contact.rigid for contact in base.contacts):
+        count = max(count, RIGID)
+    rows = np.array([structure.row(name) for name in structure.points]).reshape(-1, structure.n)
+    of_points = _of_points(base, rows @ base.modes.shapes)
+    count = max(count, of_points if base.complete else min(of_points, SERVED))
+    most = min(MOST, base.modes.count)
+    for closed in _alone(base, chains):
+        if count >= most:
+            break
+        count = _of_contact(level, closed, count, most)
+    return min(count, most)
+
+
+def _of_points(base: ModalBase, rows: np.ndarray) -> int:
+    """Smallest number of modes that hold the flexibility at the points (k, m) but for POINT_SHARE."""
+    elastic = base.modes.omega > 0
+    flexibility = (rows[:, elastic] / base.modes.omega[elastic]) ** 2
+    held = np.cumsum(flexibility, axis=1)
+    missing = held[:, -1:] - held > POINT_SHARE * held[:, -1:]
+    return base.modes.rigid + 1 + int(np.max(np.sum(missing, axis=1), initial=0))
+
+
+def _alone(base: ModalBase, chains: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
+    """Positions of closed contacts: every compliant one alone, every side of a force law where it is stiffest."""
+    single = [(i,) for i, c in enumerate(base.contacts) if isinstance(c, UnilateralContact) and not c.rigid]
+    stiffest = [
+        tuple(sorted(chain[: 1 + int(np.argmax(np.cumsum(base.stiffnesses[list(chain)])))])) for chain in chains
+    ]
+    return single + stiffest
+
+
+def _of_contact(level: Callable[[tuple[int, ...], int], Level], closed: tuple[int, ...], fewest: int, most: int) -> int:
+    """Smallest number of modes from ``fewest`` on that hold the flexibility of closed contacts, ``most`` where none."""
+    asked = min(max(FIRST, fewest), most)
+    while asked < most and not _held(level(closed, asked).truncated(asked)):
+        asked = min(2 * asked, most)
+    found = level(closed, asked)
+    counts = range(fewest, asked)
+    return fewest + bisect.bisect_left(counts, True, key=lambda r: _held(found.truncated(r)))
+
+
+def _held(level: Level) -> bool:
+    return max(level.static_shares.values(), default=0.0) < CONTACT_SHARE
+
+
+def is_count(value: object) -> bool:
+    """Whether a value is a whole number."""
+    return is_real(value) and isinstance(value, (int, np.integer))
+
+
+def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -> None:
+    kind = type(given).__name__
+    if not is_real(value) or not is_count(most):
+        raise MultiPhiTypeError(f"{kind}: got {value!r} and {most!r}, need a number and an integer")
+    if not (math.isfinite(value) and value > 0 and most >= 1):
+        raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {name} > 0 and most >= 1")

@@ -1,0 +1,334 @@
+"""The reduced model: a structure, its contacts, and the levels they make, built as they are needed."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.levels.level import Level, LevelOverride
+from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base, direction_indices
+from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
+from multiphi_exudyn.levels.static_equilibrium import equilibrium, pressing
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.first_descent import TABLE_NUMBERS, TABLES
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["MultiPhiModel"]
+
+CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
+FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
+RULES = 8  # static loads for which a model keeps what simulations have made of its levels
+SIGNAL_TABLES = 16  # kept of a level: sets of phases of its contacts; few come back
+
+
+@dataclass(frozen=True)
+class MultiPhiModel:
+    """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
+
+    structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws; kept with every law by its
+    chain of springs. With c contacts there are 2^c levels, and for every law as many times that as it has segments, of
+    which only those asked for are built.
+    modes: r of every level, all that it has where they are fewer, or "all"; or ``UpTo`` a frequency; None: chosen from
+    static responses, without a run (mode_choice.py); or a ``Tolerance``: the first run under ``simulate`` decides, once
+    for this model, and every later one has the modes of ``decided``. ``most_modes`` tells the number. Levels are
+    truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
+    overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
+    validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
+    hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
+    rules: what simulations keep for later ones, by static load, at most ``RULES``.
+
+    Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
+    asked for, to the bit. Where a number of modes, or a cut-off, would part modes of one frequency, a level keeps all
+    of them (``Level.kept_beyond``), and a run says so.
+    """
+
+    structure: LinearStructure
+    contacts: Sequence[Given] = ()
+    modes: int | str | UpTo | Tolerance | None = None
+    overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
+    validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
+    _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    rules: BoundedCache[bytes, Any] = field(
+        init=False, default_factory=lambda: BoundedCache(RULES), repr=False, compare=False
+    )
+    _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.structure, LinearStructure):
+            raise MultiPhiTypeError(f"structure: got {type(self.structure).__name__}, need a LinearStructure")
+        object.__setattr__(self, "contacts", _contacts(self.contacts))
+        names = [contact.name for contact in self.contacts]
+        if len(set(names)) < len(names):
+            raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
+        for contact in self.contacts:
+            if not np.any(self.structure.row(contact.direction)):
+                raise MultiPhiValueError(f"contact {contact.name!r} direction: got a zero row, need a direction")
+        self._check_modes()
+        _check_overrides(self.overrides)
+        ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
+        object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
+        if not self._can_share():
+            object.__setattr__(self, "_shared", self._unbuilt)
+
+    @functools.cached_property
+    def base(self) -> ModalBase:
+        """Coordinates common to all levels, built on first use."""
+        base = self._shared_base()
+        if self.modes is None and not self._serves(base, self.most_modes):
+            object.__setattr__(self, "_shared", {**self._unbuilt, "chosen": self.most_modes})
+            base = self._shared_base()
+        return base
+
+    def _shared_base(self) -> ModalBase:
+        """The base of all models that share levels with this one."""
+        if "base" not in self._shared:
+            given = self._shared.get("chosen", FIRST) if self.modes is None else self.most_modes
+            self._shared["base"] = build_base(self.structure, self.contacts, given or "all")
+        base: ModalBase = self._shared["base"]
+        return base
+
+    @property
+    def _unbuilt(self) -> dict[str, Any]:
+        return {"structure": self.structure, "contacts": self.contacts}
+
+    @staticmethod
+    def _serves(base: ModalBase, modes: int | None) -> bool:
+        """Whether levels with so many modes may be taken from a base."""
+        return base.complete or (modes is not None and BASE_MARGIN * modes <= base.modes.count)
+
+    @functools.cached_property
+    def force_laws(self) -> tuple[ForceLaw, ...]:
+        """The force laws among what was given."""
+        return tuple(dict.fromkeys(contact.law for contact in self.contacts if isinstance(contact, LawSpring)))
+
+    @functools.cached_property
+    def chains(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of every law's springs on either side of its centre, from there outward."""
+        sides: dict[tuple[ForceLaw, int], list[int]] = {}
+        for i, contact in enumerate(self.contacts):
+            if isinstance(contact, LawSpring):
+                sides.setdefault((contact.law, contact.side), []).append(i)
+        return tuple(map(tuple, sides.values()))
+
+    @property
+    def levels_possible(self) -> int:
+        """Number of levels: 2 for every contact times the segments of every law."""
+        plain = len(self.contacts) - sum(map(len, self.chains))
+        return 2**plain * math.prod(law.levels for law in self.force_laws)
+
+    @property
+    def directions(self) -> int:
+        """Number of directions in which there are contacts; a law has one."""
+        return len(set(direction_indices(self.contacts)))
+
+    @property
+    def most_modes(self) -> int | None:
+        """The largest number of modes that a level is asked for, chosen where none was given; None: it has all of them.
+
+        Of a Tolerance that has not decided yet it is the number that its runs begin with.
+        """
+        if self.modes is None:
+            return self._chosen
+        if self.decided is not None:
+            return self.decided.most_modes
+        if isinstance(self.modes, str):
+            return None
+        most = self.modes.most if isinstance(self.modes, (UpTo, Tolerance)) else int(self.modes)
+        most = min(most, FIRST) if isinstance(self.modes, Tolerance) else most
+        return most if most < self.structure.n else None
+
+    @property
+    def _chosen(self) -> int | None:
+        """The number of modes where none was given."""
+        if self.structure.n <= SMALL:
+            return None
+        if "chosen" not in self._shared:
+            given = self.structure, self._shared_base(), self.chains, self._with_modes
+            self._shared["chosen"] = chosen_modes(*given)
+        chosen: int = self._shared["chosen"]
+        return chosen
+
+    @property
+    def whole(self) -> bool:
+        """Whether no level leaves out a mode of the structure."""
+        return self.most_modes is None and not isinstance(self.modes, UpTo) and self.base.complete
+
+    @property
+    def decided(self) -> MultiPhiModel | None:
+        """Of a model with a Tolerance: the same with the modes that its first run has decided on, None before."""
+        return self._decisions[0] if self._decisions else None
+
+    def decide(self, chosen: MultiPhiModel) -> None:
+        """Keep what the first run of a model with a Tolerance has decided on."""
+        self._decisions[:] = [chosen]
+
+    @property
+    def levels_built(self) -> int:
+        """Number of levels built so far, those built again included."""
+        return self._levels.kept
+
+    @property
+    def levels_kept(self) -> int:
+        """Number of levels that are kept."""
+        return len(self._levels)
+
+    @property
+    def highest_frequency(self) -> float:
+        """The highest frequency [Hz] of the levels that are kept."""
+        return max((level.highest_frequency for _, level in self._levels.items()), default=0.0)
+
+    @property
+    def keeps_clusters(self) -> bool:
+        """Whether one of the levels that are kept has modes beyond those asked for."""
+        return any(level.kept_beyond for _, level in self._levels.items())
+
+    @functools.cached_property
+    def most_levels(self) -> int:
+        """Number of levels that are kept: what ``CACHE_BYTES`` hold, with what is kept beside them."""
+        return self._most_kept(self.most_modes or self.base.modes.count)
+
+    def _most_kept(self, r: int) -> int:
+        """Number of levels with r modes that ``CACHE_BYTES`` hold."""
+        m, c = self._shared_base().modes.count, len(self.contacts)
+        of_a_mode = m + 20 * r + 2 * c + TABLES * TABLE_NUMBERS + 2 * SIGNAL_TABLES * c
+        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
+
+    @functools.cached_property
+    def _levels(self) -> BoundedCache[tuple[int, ...], Level]:
+        return BoundedCache(self.most_levels, self._forget)
+
+    def _forget(self, indices: tuple[int, ...], level: Level) -> None:
+        """What is made of a level goes with it; a trajectory may still hold the level itself."""
+        level.forget_samples()
+        for _, rule in self.rules.items():
+            rule.forget(indices)
+
+    def index(self, name: str) -> int:
+        """Position of a contact."""
+        for i, contact in enumerate(self.contacts):
+            if contact.name == name:
+                return i
+        known = ", ".join(contact.name for contact in self.contacts) or "none"
+        raise MultiPhiValueError(f"contact: got {name!r}, need one of: {known}")
+
+    def level(self, closed: Iterable[str] = ()) -> Level:
+        """The level with these contacts closed, built on first use."""
+        if isinstance(closed, str) or not isinstance(closed, Iterable):
+            raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names")
+        return self.level_at(tuple(sorted({self.index(name) for name in closed})))
+
+    def level_at(self, indices: tuple[int, ...]) -> Level:
+        """The level of closed contacts given by ascending positions."""
+        found = self._levels.find(indices)
+        if found is not None:
+            return found
+        level = self._full(indices)
+        level = level.truncated(self._modes_of(level))
+        override = self.overrides.get(level.closed)
+        return self._levels.keep(indices, level if override is None else level.overridden(override))
+
+    def _full(self, indices: tuple[int, ...]) -> Level:
+        """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
+        return self._with_modes(indices, self.most_modes or self.base.modes.count)
+
+    def _with_modes(self, indices: tuple[int, ...], modes: int) -> Level:
+        """A level with its lowest so many modes at least, or all that it has."""
+        base = self._shared_base()
+        shared: BoundedCache[tuple[int, ...], Level] = self._shared.setdefault(
+            "levels", BoundedCache(self._most_kept(modes))
+        )
+        most = base.modes.count - int(np.sum(np.isinf(base.stiffnesses[list(indices)])))
+        needed, found, further = min(modes, most), shared.find(indices), 1
+        while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
+            wanted = needed + further
+            found = shared.keep(indices, build_level(base, indices, wanted if wanted < most else None))
+            further *= 2
+        return found
+
+    def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
+
+        The configuration that the contacts admit nearest to the one without them, in the energy of structure and
+        contact springs: those that press make the level whose state of rest it is. With force laws it is the
+        equilibrium that is reached when the forces are applied slowly (static_equilibrium.py). Needs a structure
+        without rigid-body modes. Raises NumericalFailure where force laws let the structure snap through on the way.
+        """
+        base = self.base
+        if base.modes.rigid:
+            raise MultiPhiValueError(
+                f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
+            )
+        load = self.base_load(forces)
+        if self.force_laws:
+            return base.modes.shapes @ equilibrium(base, load)
+        compliance = base.modes.omega**-2.0
+        gaps = base.directions.T @ (compliance * load) + base.gaps
+        bending = base.directions.T / base.modes.omega
+        closed = pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
+        level = build_level(base, tuple(int(i) for i in np.flatnonzero(closed)))
+        return base.modes.shapes @ level.asymptotic(load).configuration
+
+    def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Forces [N] at points as a load (m,) in base coordinates."""
+        if not isinstance(forces, Mapping):
+            raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
+        row = self.structure.row(forces) if forces else np.zeros(self.structure.n)
+        return self.base.modes.shapes.T @ row
+
+    def _can_share(self) -> bool:
+        """Whether the levels built for another number of modes serve this model too."""
+        if self._shared.get("structure") is not self.structure or self._shared["contacts"] != self.contacts:
+            return False
+        base = self._shared.get("base")
+        if base is None or self.modes is None:
+            return base is not None
+        return self._serves(base, self.most_modes)
+
+    def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
+        return tuple(self.contacts[i].name for i in indices)
+
+    def _modes_of(self, full: Level) -> int:
+        """Number of modes that are asked for of a level that has been built with all it may have."""
+        most = min(self.most_modes or full.modes, full.modes)
+        if not isinstance(self.modes, UpTo):
+            return most
+        return min(max(1, int(np.searchsorted(full.frequencies, self.modes.frequency, side="right"))), most)
+
+    def _check_modes(self) -> None:
+        if self.modes is None or isinstance(self.modes, (UpTo, Tolerance)) or str(self.modes) == "all":
+            return
+        needed = "need an integer >= 1, 'all', UpTo, Tolerance or None"
+        if not is_count(self.modes):
+            raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
+        if int(self.modes) < 1:
+            raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
+
+
+def _contacts(given: Any) -> tuple[Contact, ...]:
+    """Contacts, every law by its chain of springs."""
+    needed = "UnilateralContact or ForceLaw"
+    if not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
+    items = tuple(given)
+    for item in items:
+        if not isinstance(item, (UnilateralContact, ForceLaw, LawSpring)):
+            raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
+    return expanded(items)
+
+
+def _check_overrides(given: Any) -> None:
+    needed = "need {(names of closed contacts, ...): LevelOverride}"
+    if not isinstance(given, Mapping):
+        raise MultiPhiTypeError(f"overrides: got {type(given).__name__}, {needed}")
+    for key, value in given.items():
+        if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
+            raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")

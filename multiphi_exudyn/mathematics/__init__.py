@@ -1,0 +1,9 @@
+"""Mathematics: what the method computes with, of matrices and functions of time; it knows no structure.
+
+Modes and their exact free and forced response as sums of exponentials; the certified search for the instant at which
+such a sum first falls through zero; functions of time as piecewise exponentials and as pieces of straight lines; the
+shortest vector that linear inequalities allow; what round-off is.
+
+Order: round_off, bounded_cache, modes, exponentials, free_response, forced_response, root_search, first_descent,
+least_distance, corners, interpolation, piecewise_exponential, piecewise_linear_fit.
+"""

@@ -1,0 +1,130 @@
+"""Forced response of modal equations in closed form: a load that is a polynomial on a carrier.
+
+    eta'' + D eta' + diag(omega^2) eta = Re( exp(mu t) sum_d p_d u^d ),   eta = Re( exp(mu t) sum_k x_k u^k )
+
+u = t/T, T the horizon, is solved mode by mode, D diagonal or not, as the sum of first-order equations of its poles s,
+
+    z' = s z + exp(mu t) p(t),   z = exp(mu t) w,   w' = (s - mu) w + p(t)
+
+w is a polynomial of u. Far from the pole (|s - mu| T large) it is the finite one,
+
+    w_k = ((k + 1) w_k+1 / T - p_k) / (s - mu),   k = D, ..., 0
+
+and near to it, at resonance included, that of the motion from rest, a Taylor series that is cut at round-off:
+
+    w_k+1 = T ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
+
+Two poles that (nearly) coincide, of a critically damped or a rigid-body mode, are solved as one equation of second
+order in the same two ways. Nothing grows beyond the load's own size, whatever the distance from a pole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.mathematics.free_response import ModalResponse
+
+__all__ = ["particular"]
+
+TAYLOR = 1e-18  # of a Taylor series: terms below it are left out
+NEAREST_FAR = 0.5  # |s - mu| T from which the finite polynomial is taken for a constant p,
+PER_DEGREE = 0.5  # and more for each degree of p: D! / (|s - mu| T)^D is what the finite polynomial loses
+COINCIDING = 2e-2  # of |s|: poles closer than this are solved together
+
+
+def particular(
+    squares: np.ndarray, damping: np.ndarray, response: ModalResponse, rate: complex, forces: np.ndarray, horizon: float
+) -> np.ndarray:
+    """One particular response x (K + 1, r) to modal forces p (D + 1, r) on the carrier ``rate``, good for [0, horizon].
+
+    Both are coefficients of powers of t / horizon.
+    squares: omega^2 (r,). damping: D (r, r). response: the closed form of the free motion.
+    """
+    if not np.any(forces):
+        return np.zeros((1, len(squares)), complex)
+    if response.diagonal:
+        return _uncoupled(squares, np.diagonal(damping) / 2, rate, forces, horizon)
+    alone = (squares == 0) & ~np.any(damping, axis=1)
+    free = _uncoupled(squares[alone], np.zeros(int(np.sum(alone))), rate, forces[:, alone], horizon)
+    poles = np.flatnonzero(np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0))
+    maps = response.from_velocity[poles] / 2
+    shapes, rates = response.shapes[:, poles], response.basis.rates[poles]
+    own = _first_order(rates - rate, forces @ maps.T, horizon) @ shapes.T
+    mirrored = _first_order(rates.conj() - rate, forces @ maps.conj().T, horizon) @ shapes.conj().T
+    total = _padded(own, len(mirrored)) + _padded(mirrored, len(own))
+    if np.any(alone):
+        total = _padded(total, len(free))
+        total[: len(free), alone] = free
+    return total
+
+
+def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float) -> np.ndarray:
+    """x (K + 1, r) of modes with poles -delta +- sqrt(delta^2 - omega^2)."""
+    root = np.sqrt((delta**2 - squares).astype(complex))
+    together = 2 * np.abs(root) <= COINCIDING * np.sqrt(np.abs(squares))
+    both = _second_order(squares[together], delta[together], rate, forces[:, together], horizon)
+    apart = ~together
+    fast = -(delta[apart] + root[apart])
+    slow = squares[apart] / fast
+    weighted = forces[:, apart] / (2 * root[apart])
+    poles = np.concatenate([slow, fast]) - rate
+    each = _first_order(poles, np.hstack([weighted, -weighted]), horizon)
+    x = np.zeros((max(len(both), len(each)), len(squares)), complex)
+    x[: len(both), together] = both
+    x[: len(each), apart] = each[:, : len(fast)] + each[:, len(fast) :]
+    return x
+
+
+def _first_order(distance: np.ndarray, forces: np.ndarray, horizon: float) -> np.ndarray:
+    """w (K + 1, q) of w' = distance w + p(t)."""
+    degree = len(forces) - 1
+    far = np.abs(distance) * horizon >= NEAREST_FAR + PER_DEGREE * degree
+    near = ~far
+    reach = float(np.max(np.abs(distance[near]), initial=0.0)) * horizon
+    w = np.zeros((_terms(degree, reach, 1) if np.any(near) else degree + 1, len(distance)), complex)
+    for k in range(degree, -1, -1):
+        above = (k + 1) / horizon * w[k + 1, far] if k < degree else 0.0
+        w[k, far] = (above - forces[k, far]) / distance[far]
+    if np.any(near):
+        for k in range(len(w) - 1):
+            given = forces[k, near] if k <= degree else 0.0
+            w[k + 1, near] = (distance[near] * w[k, near] + given) * horizon / (k + 1)
+    return w
+
+
+def _second_order(
+    squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float
+) -> np.ndarray:
+    """w (K + 1, q) of w'' + 2 (delta + mu) w' + (omega^2 + 2 delta mu + mu^2) w = p(t), poles close together."""
+    degree = len(forces) - 1
+    slope, value = 2 * (delta + rate), squares + 2 * delta * rate + rate**2
+    distance = np.sqrt(np.abs(value))
+    far = distance * horizon >= NEAREST_FAR + PER_DEGREE * (degree + 1)
+    near = ~far
+    reach = float(np.max(np.maximum(distance, np.abs(slope))[near], initial=0.0)) * horizon
+    w = np.zeros((_terms(degree, reach, 2) if np.any(near) else degree + 1, len(squares)), complex)
+    for k in range(degree, -1, -1):
+        first = (k + 1) / horizon * w[k + 1, far] if k < degree else 0.0
+        second = (k + 2) * (k + 1) / horizon**2 * w[k + 2, far] if k < degree - 1 else 0.0
+        w[k, far] = (forces[k, far] - slope[far] * first - second) / value[far]
+    if np.any(near):
+        for k in range(len(w) - 2):
+            given = forces[k, near] if k <= degree else 0.0
+            pulled = slope[near] * (k + 1) / horizon * w[k + 1, near] + value[near] * w[k, near]
+            w[k + 2, near] = (given - pulled) * horizon**2 / ((k + 1) * (k + 2))
+    return w
+
+
+def _terms(degree: int, reach: float, order: int) -> int:
+    """Coefficients of a Taylor series up to round-off, reach = |distance| T."""
+    term, count = 1.0, 0
+    while term > TAYLOR:
+        count += 1
+        term *= reach / count
+    return degree + 1 + order + count
+
+
+def _padded(x: np.ndarray, rows: int) -> np.ndarray:
+    """x with zero rows below, at least ``rows``."""
+    missing = max(0, rows - len(x))
+    return np.pad(x, ((0, missing), (0, 0))) if missing else x

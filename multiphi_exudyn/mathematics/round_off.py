@@ -1,0 +1,32 @@
+"""Round-off: which sums of floating-point numbers are zero, and which have a sign.
+
+    |sum a_j| <= ZERO sum |a_j|   is round-off: the sum has no sign
+
+A sum is judged by the sizes of its own terms, so other units of time, length and mass change no decision.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["CLEAR", "ZERO", "drop_round_off", "sign_of"]
+
+ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
+CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
+
+
+def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:
+    """Sums with zero where they are round-off of their terms, which add up to ``sizes`` without their signs.
+
+    The gap of a contact that another one holds does not move; what is left of it has no sign.
+    """
+    return np.where(np.abs(sums) <= ZERO * sizes, 0.0, sums)
+
+
+def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
+    """Sign of a sum, zero where it is round-off of its terms and of ``size``."""
+    values = terms.tolist()
+    value = sum(values) + constant
+    if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant) + size):
+        return 0
+    return 1 if value > 0 else -1

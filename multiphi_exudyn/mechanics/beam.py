@@ -1,0 +1,206 @@
+"""Straight planar Timoshenko beam bending in x-z, as a linear structure.
+
+Two-node elements (section.py). Each node carries the deflection w [m], positive along +z, and the rotation theta [rad],
+positive where w grows with x (theta = dw/dx without shear).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import Matrix, is_real
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.section import Section, check_numbers, element_mass, element_stiffness
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["Beam", "Clamp", "PointMass", "beam_nodes", "planar_beam"]
+
+COINCIDENT = 1e-9  # of the beam's length: positions closer than this are one node
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A mass [kg] with rotary inertia [kg m2] fixed to the beam at ``at`` [m]."""
+
+    at: float
+    mass: float
+    inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_numbers("point mass", at=self.at, mass=self.mass, inertia=self.inertia)
+        if not (math.isfinite(self.mass + self.inertia) and min(self.mass, self.inertia) >= 0):
+            raise MultiPhiValueError(f"point mass: got mass {self.mass!r}, inertia {self.inertia!r}, need values >= 0")
+        if not math.isfinite(self.at):
+            raise MultiPhiValueError(f"point mass: got at {self.at!r}, need a place on the beam in m")
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """The support of the beam's first end: stiffness against w [N/m] and against theta [N m/rad].
+
+    Infinite (the default) is an ideally rigid clamp, zero a free end.
+    """
+
+    translation: float = math.inf
+    rotation: float = math.inf
+
+    def __post_init__(self) -> None:
+        check_numbers("clamp", translation=self.translation, rotation=self.rotation)
+        if not (self.translation >= 0 and self.rotation >= 0):
+            raise MultiPhiValueError(
+                f"clamp: got translation {self.translation!r}, rotation {self.rotation!r}, need values >= 0"
+            )
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Description of a straight planar beam; every model of it is built from this one object.
+
+    sections: pieces that follow each other without a gap. points: name -> x [m].
+    """
+
+    sections: Sequence[Section]
+    points: Mapping[str, float] = field(default_factory=dict)
+    masses: Sequence[PointMass] = ()
+    clamp: Clamp = field(default_factory=Clamp)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sections", _each_a("sections", self.sections, Section))
+        object.__setattr__(self, "masses", _each_a("masses", self.masses, PointMass))
+        object.__setattr__(self, "points", _positions(self.points))
+        if not isinstance(self.clamp, Clamp):
+            raise MultiPhiTypeError(f"clamp: got {type(self.clamp).__name__}, need a Clamp")
+        if not self.sections:
+            raise MultiPhiValueError("sections: got none, need at least one Section")
+        for left, right in pairwise(self.sections):
+            if abs(left.end - right.start) > COINCIDENT * self.length:
+                raise MultiPhiValueError(
+                    f"sections: one ends at {left.end:g} m, the next starts at {right.start:g} m; need no gap"
+                )
+        places = {f"points[{name!r}]": x for name, x in self.points.items()}
+        places |= {f"point mass {i}": mass.at for i, mass in enumerate(self.masses)}
+        for name, x in places.items():
+            if not self.start <= x <= self.end:
+                raise MultiPhiValueError(f"{name}: got x = {x!r} m, need {self.start:g} <= x <= {self.end:g}")
+
+    @property
+    def start(self) -> float:
+        """Position of the clamped end [m]."""
+        return self.sections[0].start
+
+    @property
+    def end(self) -> float:
+        """Position of the far end [m]."""
+        return self.sections[-1].end
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        return self.end - self.start
+
+    def section_at(self, x: float) -> Section:
+        """The section that holds x [m] (at a boundary: the one behind it)."""
+        return next((s for s in self.sections if x < s.end), self.sections[-1])
+
+
+def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
+    """Node positions [m], ascending: a node at every named point, mass and section end.
+
+    ``elements`` is the number of elements aimed at; the pieces between the fixed places are divided
+    into equal elements no longer than length / elements, so there can be a few more.
+    """
+    if not isinstance(beam, Beam):
+        raise MultiPhiTypeError(f"beam: got {type(beam).__name__}, need a Beam")
+    if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)):
+        raise MultiPhiTypeError(f"elements: got {elements!r}, need an integer >= 1")
+    if elements < 1:
+        raise MultiPhiValueError(f"elements: got {elements}, need an integer >= 1")
+    places = np.sort(
+        np.array(
+            [beam.start]
+            + [s.end for s in beam.sections]
+            + list(beam.points.values())
+            + [mass.at for mass in beam.masses]
+        )
+    )
+    places = places[np.concatenate(([True], np.diff(places) > COINCIDENT * beam.length))]
+    longest = beam.length / elements
+    pieces = [
+        np.linspace(left, right, math.ceil((right - left) / longest - 1e-9) + 1)[:-1]
+        for left, right in pairwise(places)
+    ]
+    return np.concatenate([*pieces, [beam.end]])
+
+
+def planar_beam(
+    beam: Beam, elements: int = 57, damping: Matrix | ModalDamping | RayleighDamping | None = None
+) -> LinearStructure:
+    """The beam as a LinearStructure; its points are the deflections w [m] at ``beam.points``.
+
+    DoFs: (w, theta) of every node from the clamped end, those held by a rigid clamp left out.
+    """
+    if not isinstance(beam, Beam):
+        raise MultiPhiTypeError(f"beam: got {type(beam).__name__}, need a Beam")
+    nodes = beam_nodes(beam, elements)
+    mass = np.zeros((2 * len(nodes), 2 * len(nodes)))
+    stiffness = np.zeros_like(mass)
+    for i, (left, right) in enumerate(pairwise(nodes)):
+        dofs = slice(2 * i, 2 * i + 4)
+        section = beam.section_at((left + right) / 2)
+        mass[dofs, dofs] += element_mass(section, right - left)
+        stiffness[dofs, dofs] += element_stiffness(section, right - left)
+    for point_mass in beam.masses:
+        dof = 2 * _node_at(nodes, point_mass.at)
+        mass[dof, dof] += point_mass.mass
+        mass[dof + 1, dof + 1] += point_mass.inertia
+    for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)):
+        if not math.isinf(spring):
+            stiffness[dof, dof] += spring
+    rows = _dof_rows(beam, nodes)
+    free = np.flatnonzero(np.any(rows, axis=1))
+    points = {name: rows[2 * _node_at(nodes, x)] for name, x in beam.points.items()}
+    return LinearStructure(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)], damping, points)
+
+
+def beam_deflections(beam: Beam, elements: int = 57) -> tuple[np.ndarray, np.ndarray]:
+    """Node positions x (k,) [m] and the rows (k, n) of their deflections w in ``planar_beam(beam, elements)``."""
+    nodes = beam_nodes(beam, elements)
+    return nodes, _dof_rows(beam, nodes)[::2]
+
+
+def _dof_rows(beam: Beam, nodes: np.ndarray) -> np.ndarray:
+    """Rows (2 k, n) of (w, theta) of every node in the free DoFs; zero where a rigid clamp holds."""
+    held = [dof for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)) if math.isinf(spring)]
+    return np.delete(np.eye(2 * len(nodes)), held, axis=1)
+
+
+def _node_at(nodes: np.ndarray, x: float) -> int:
+    return int(np.argmin(np.abs(nodes - x)))
+
+
+def _each_a(name: str, given: Any, kind: type) -> tuple[Any, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need a sequence of {kind.__name__}")
+    items = tuple(given)
+    for i, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise MultiPhiTypeError(f"{name}[{i}]: got {type(item).__name__}, need a {kind.__name__}")
+    return items
+
+
+def _positions(points: Any) -> dict[str, float]:
+    if not isinstance(points, Mapping):
+        raise MultiPhiTypeError(f"points: got {type(points).__name__}, need {{name: position in m}}")
+    for name, x in points.items():
+        if not isinstance(name, str) or not name:
+            raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
+        if not is_real(x):
+            raise MultiPhiTypeError(f"points[{name!r}]: got {x!r}, need a position in m")
+    return dict(points)

@@ -1,0 +1,77 @@
+"""Damping of a structure by its modes or by its matrices, beside a matrix C of its own.
+
+C = M Phi diag(2 zeta omega) Phi^T M   (ModalDamping),   C = alpha M + beta K   (RayleighDamping)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import is_real, real_array
+
+__all__ = ["ModalDamping", "RayleighDamping"]
+
+
+@dataclass(frozen=True)
+class ModalDamping:
+    """Damping ratios of the structure's modes, lowest first: C = M Phi diag(2 zeta omega) Phi^T M.
+
+    Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are
+    those that it does not see.
+
+    ratios: fractions of critical damping (0.01 is 1 %), one per mode from the lowest, or a single number for all modes.
+    beyond: the ratio of every mode that is not listed; None: not said, they are undamped and a run that has such modes
+    warns of it.
+    """
+
+    ratios: Sequence[float] | float
+    beyond: float | None = None
+
+    def __post_init__(self) -> None:
+        if is_real(self.ratios):
+            if self.beyond is not None:
+                raise MultiPhiValueError(f"ratios: got {self.ratios!r} and beyond, need a list of ratios beside beyond")
+            object.__setattr__(self, "beyond", self.ratios)
+            object.__setattr__(self, "ratios", (self.ratios,))
+        values = real_array("ratios", self.ratios, "a ratio or a list of ratios")
+        if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values < 0):
+            raise MultiPhiValueError(f"ratios: got {self.ratios!r}, need a finite ratio >= 0 or a list of them")
+        object.__setattr__(self, "ratios", tuple(values.tolist()))
+        if self.beyond is not None:
+            _check_not_negative("beyond", self.beyond)
+
+    @property
+    def listed(self) -> np.ndarray:
+        """The ratios that were given, one per mode from the lowest, (k,)."""
+        return np.asarray(self.ratios, dtype=float)
+
+    def of(self, count: int) -> np.ndarray:
+        """Ratios of the lowest ``count`` modes, (count,)."""
+        ratios = np.full(count, self.beyond or 0.0)
+        listed = self.listed[:count]
+        ratios[: len(listed)] = listed
+        return ratios
+
+
+@dataclass(frozen=True)
+class RayleighDamping:
+    """C = alpha M + beta K, alpha in 1/s, beta in s."""
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_not_negative("alpha", self.alpha)
+        _check_not_negative("beta", self.beta)
+
+
+def _check_not_negative(name: str, value: Any) -> None:
+    if not is_real(value):
+        raise MultiPhiTypeError(f"{name}: got {value!r}, need a number")
+    if not (np.isfinite(value) and value >= 0):
+        raise MultiPhiValueError(f"{name}: got {value!r}, need a finite value >= 0")

@@ -1,0 +1,275 @@
+"""Force law: a local continuous nonlinearity as a chain of levels.
+
+    force on the structure -F(q) along p,   q = p.x
+
+F is followed by straight segments between knots on the law itself. With a central knot q_m this is a sum of one-sided
+springs, each a compliant contact, whose closed sets are nested:
+
+    F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q),   q_j >= q_m >= q'_j
+
+dk_j [N/m] is the change of slope at a knot, negative where the law softens. Knots where the slope does not change are
+left out. F(q_m) is a constant force of every level. q_m is the zero of F nearest to q = 0, without any the place
+nearest to q = 0. Strain energy is the integral of the segmented law from q_m. Beyond the span its last segments go on.
+
+Where the knots stand is in piecewise_linear_fit.py.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import At
+
+__all__ = ["Contact", "ForceLaw", "Given", "LawSpring", "expanded"]
+
+Function = Callable[[Any], Any]
+
+SAMPLES = 2**14  # of a law on either side of its central knot; knots stand on samples
+STRAIGHT = 1e-12  # of the largest slope: a smaller change of slope is round-off
+ZERO_FORCE = 1e-14  # of the largest force: the law vanishes there
+
+
+@dataclass(frozen=True, eq=False)
+class ForceLaw:
+    """A local force-displacement law; see the module's docstring.
+
+    at: the row p, as a point name, {point: coefficient} or an (n,) row.
+    law: F(q) [N] as a function of q [m], of a number or of (k,) numbers; or a table, two (k,) arrays: q ascending, F.
+    tolerance: largest error of the segments, of the largest absolute F on the span; or segments: their number.
+    name: of the law. span: (q_lo, q_hi) [m] on which a function is followed.
+    A table's lines are the segments: it takes no tolerance, segments or span.
+
+    knots, forces: the ends of the segments (k,) and F there. centre: q_m. error: of the segments, relative as above.
+    Two laws are equal only if they are the same object.
+    """
+
+    at: At
+    law: Function | Sequence[Any]
+    tolerance: float | None = None
+    name: str = "law"
+    span: tuple[float, float] | None = None
+    segments: int | None = None
+    knots: np.ndarray = field(init=False, repr=False)
+    forces: np.ndarray = field(init=False, repr=False)
+    centre: float = field(init=False, repr=False)
+    error: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise MultiPhiTypeError(f"force law name: got {self.name!r}, need a non-empty string")
+        knots, forces, centre, error = self._followed() if callable(self.law) else self._tabulated()
+        slopes = np.diff(forces) / np.diff(knots)
+        if not np.any(slopes):
+            raise MultiPhiValueError(f"{self._called} law: got a constant force, need one that changes (or a load)")
+        for name, value in (("knots", knots), ("forces", forces), ("centre", centre), ("error", error)):
+            object.__setattr__(self, name, value)
+
+    def force(self, q: float | np.ndarray) -> np.ndarray:
+        """The segmented law at q, (k,) [N]."""
+        lines = np.clip(np.searchsorted(self.knots, q, side="right") - 1, 0, len(self.knots) - 2)
+        return np.asarray(self.forces[lines] + self.slopes[lines] * (q - self.knots[lines]))
+
+    @functools.cached_property
+    def slopes(self) -> np.ndarray:
+        """Stiffness of the segments (k - 1,) [N/m]."""
+        return np.asarray(np.diff(self.forces) / np.diff(self.knots))
+
+    @property
+    def constant(self) -> float:
+        """F(q_m) [N]."""
+        return float(self.force(self.centre))
+
+    @property
+    def levels(self) -> int:
+        """Number of levels it makes: segments of different slope."""
+        at_centre = sum(spring.gap == spring.side * self.centre for spring in self.springs)
+        return len(self.springs) + (at_centre < 2)
+
+    @functools.cached_property
+    def springs(self) -> tuple[LawSpring, ...]:
+        """The chain of one-sided springs: those above q_m from it outward, then those below it."""
+        slopes, knots, middle = self.slopes, self.knots, int(np.searchsorted(self.knots, self.centre))
+        up, down = max(len(slopes) - middle, 1), max(middle, 1)  # where q_m is an end, its line goes on beyond it
+        above = np.diff(slopes[-up:], prepend=0.0), knots[middle : middle + up]
+        below = np.diff(slopes[:down][::-1], prepend=0.0), knots[middle + 1 - down : middle + 1][::-1]
+        return (*self._chain(*above, 1), *self._chain(*below, -1))
+
+    def _chain(self, changes: np.ndarray, places: np.ndarray, side: int) -> list[LawSpring]:
+        bent = np.abs(changes) > STRAIGHT * np.max(np.abs(self.slopes))
+        sign = "+" if side > 0 else "-"
+        return [
+            LawSpring(f"{self.name}{sign}{i}", _times(self.at, -side), side * float(q), float(k), self, side)
+            for i, (k, q) in enumerate(zip(changes[bent], places[bent], strict=True), start=1)
+        ]
+
+    # ------------------------------------------------------------------ segments
+
+    @property
+    def _called(self) -> str:
+        return f"force law {self.name!r}"
+
+    def _tabulated(self) -> tuple[np.ndarray, np.ndarray, float, float]:
+        given = {"tolerance": self.tolerance, "segments": self.segments, "span": self.span}
+        for name, value in given.items():
+            if value is not None:
+                raise MultiPhiValueError(f"{self._called} {name}: got {value!r} for a table, need none")
+        try:
+            knots, forces = (np.array(column, dtype=float) for column in self.law)  # type: ignore[union-attr]
+        except (TypeError, ValueError) as error:
+            needed = "need a function, or two arrays: q ascending, and F"
+            raise MultiPhiTypeError(f"{self._called} law: got {type(self.law).__name__}, {needed}") from error
+        if knots.ndim != 1 or knots.shape != forces.shape or len(knots) < 2:
+            raise MultiPhiValueError(
+                f"{self._called} law: got shapes {knots.shape} and {forces.shape}, need (k,) twice"
+            )
+        if not (np.all(np.isfinite(knots)) and np.all(np.isfinite(forces)) and np.all(np.diff(knots) > 0)):
+            raise MultiPhiValueError(f"{self._called} law: got a table of q and F, need finite numbers and q ascending")
+        centre = _centre(knots, forces)
+        if centre not in knots:
+            place = int(np.searchsorted(knots, centre))
+            value = float(np.interp(centre, knots, forces))
+            knots, forces = np.insert(knots, place, centre), np.insert(forces, place, value)
+        return knots, forces, centre, 0.0
+
+    def _followed(self) -> tuple[np.ndarray, np.ndarray, float, float]:
+        low, high = self._checked_span()
+        wanted = self._checked_accuracy()
+        q = np.linspace(low, high, SAMPLES + 1)
+        centre = _centre(q, self._sampled(q))
+        sides = [
+            q for q in (np.linspace(low, centre, SAMPLES + 1), np.linspace(centre, high, SAMPLES + 1)) if q[-1] > q[0]
+        ]
+        values = [self._sampled(side) for side in sides]
+        largest = max(float(np.max(np.abs(value))) for value in values)
+        if isinstance(wanted, int):
+            chosen = with_segments(sides, values, max(wanted, len(sides)), 2 * largest)
+        else:
+            chosen = self._within(sides, values, wanted * largest)
+        knots = np.concatenate([side[index[first:]] for first, (side, index) in _numbered(sides, chosen)])
+        forces = np.concatenate([value[index[first:]] for first, (value, index) in _numbered(values, chosen)])
+        between = np.concatenate([(side[1:] + side[:-1]) / 2 for side in sides])
+        off = np.max(np.abs(self._sampled(between) - np.interp(between, knots, forces)))
+        return knots, forces, centre, float(off / largest) if largest else 0.0
+
+    def _within(self, sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
+        count = sum(len(index) - 1 for index in spread(sides, values, error))
+        if count > MOST_SEGMENTS:
+            raise MultiPhiValueError(
+                f"{self._called} tolerance: got {self.tolerance!r}, which needs more than {MOST_SEGMENTS} segments, "
+                "need a larger one"
+            )
+        return with_segments(sides, values, count, error)
+
+    def _checked_span(self) -> tuple[float, float]:
+        span = self.span
+        if not (isinstance(span, (tuple, list, np.ndarray)) and len(span) == 2 and all(map(is_real, span))):
+            raise MultiPhiTypeError(f"{self._called} span: got {span!r}, need (q_lo, q_hi) for a function")
+        low, high = float(span[0]), float(span[1])
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise MultiPhiValueError(f"{self._called} span: got {span!r}, need finite q_lo < q_hi")
+        return low, high
+
+    def _checked_accuracy(self) -> int | float:
+        """Number of segments (int), or the tolerance."""
+        if (self.tolerance is None) == (self.segments is None):
+            received = f"got tolerance {self.tolerance!r} and segments {self.segments!r}"
+            raise MultiPhiValueError(f"{self._called}: {received}, need exactly one of them for a function")
+        if self.segments is None:
+            if not is_real(self.tolerance):
+                raise MultiPhiTypeError(f"{self._called} tolerance: got {self.tolerance!r}, need a number")
+            if not (self.tolerance is not None and 0 < self.tolerance < 1):
+                raise MultiPhiValueError(f"{self._called} tolerance: got {self.tolerance!r}, need 0 < tolerance < 1")
+            return float(self.tolerance)
+        if not isinstance(self.segments, (int, np.integer)) or isinstance(self.segments, bool):
+            raise MultiPhiTypeError(f"{self._called} segments: got {self.segments!r}, need an integer")
+        if not 2 <= self.segments <= MOST_SEGMENTS:
+            raise MultiPhiValueError(f"{self._called} segments: got {self.segments!r}, need 2 to {MOST_SEGMENTS}")
+        return int(self.segments)
+
+    def _sampled(self, q: np.ndarray) -> np.ndarray:
+        """F at (k,) places, from a function of arrays or of numbers."""
+        assert callable(self.law), "a table has no samples"
+        try:
+            values = np.asarray(self.law(q), dtype=float)
+        except (TypeError, ValueError):
+            values = np.array([], dtype=float)
+        if values.shape != q.shape:
+            values = self._one_by_one(q)
+        if not np.all(np.isfinite(values)):
+            worst = float(q[np.argmin(np.isfinite(values))])
+            raise MultiPhiValueError(
+                f"{self._called} law: gives no finite force at q = {worst:g}, need one on the span"
+            )
+        return values
+
+    def _one_by_one(self, q: np.ndarray) -> np.ndarray:
+        assert callable(self.law), "a table has no samples"
+        try:
+            return np.array([float(self.law(place)) for place in q.tolist()])
+        except (TypeError, ValueError, ArithmeticError) as error:
+            raise MultiPhiTypeError(f"{self._called} law: fails ({error}), need a function of q [m] in N") from error
+
+
+@dataclass(frozen=True, eq=False)
+class LawSpring:
+    """One spring of a law's chain: a compliant contact whose stiffness [N/m] may be negative.
+
+    name, direction, gap, stiffness: as of a UnilateralContact. law: whose chain; side: +1 above q_m, -1 below it.
+    """
+
+    name: str
+    direction: At
+    gap: float
+    stiffness: float
+    law: ForceLaw
+    side: int
+    rigid: bool = field(default=False, init=False)
+    damping: float = field(default=0.0, init=False)
+
+
+Contact: TypeAlias = UnilateralContact | LawSpring
+Given: TypeAlias = Any  # UnilateralContact or ForceLaw when it is given, Contact once it is expanded
+
+
+def expanded(given: Sequence[Given]) -> tuple[Contact, ...]:
+    """Contacts, every law by its chain of springs."""
+    contacts: list[Contact] = []
+    for item in given:
+        contacts.extend(item.springs if isinstance(item, ForceLaw) else (item,))
+    return tuple(contacts)
+
+
+def _times(at: At, factor: float) -> At:
+    """factor p."""
+    if isinstance(at, str):
+        return {at: factor}
+    if isinstance(at, Mapping):
+        return {name: factor * coefficient for name, coefficient in at.items()}
+    return factor * np.asarray(at)
+
+
+def _centre(q: np.ndarray, forces: np.ndarray) -> float:
+    """The zero of the lines through (q, F) nearest to q = 0; without any, the place nearest to q = 0."""
+    nearest = float(np.clip(0.0, q[0], q[-1]))
+    small = np.abs(forces) <= ZERO_FORCE * np.max(np.abs(forces))
+    if abs(np.interp(nearest, q, forces)) <= ZERO_FORCE * np.max(np.abs(forces)):
+        return nearest
+    crossing = np.flatnonzero(np.sign(forces[:-1]) * np.sign(forces[1:]) < 0)
+    rise = forces[crossing + 1] - forces[crossing]
+    zeros = np.concatenate([q[small], q[crossing] - forces[crossing] * (q[crossing + 1] - q[crossing]) / rise])
+    return float(zeros[np.argmin(np.abs(zeros))]) if len(zeros) else nearest
+
+
+def _numbered(columns: list[np.ndarray], chosen: list[np.ndarray]) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
+    """(1 where a column begins with the sample that ends the one before, else 0; column and its knots)."""
+    return [(min(i, 1), pair) for i, pair in enumerate(zip(columns, chosen, strict=True))]

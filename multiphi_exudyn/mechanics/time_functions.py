@@ -1,0 +1,277 @@
+"""Functions of time: how a load, a moving stop or a moving base goes with time.
+
+    u(t):   Harmonic, Sampled, Smooth, Sweep
+
+Each becomes a piecewise exponential (piecewise_exponential.py), to which the response is known in closed form. A
+harmonic and straight lines between samples are exact as they stand; a smooth function and a sweep are interpolated, to
+their tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.arguments import is_real, real_array
+
+__all__ = ["Harmonic", "Sampled", "Smooth", "Sweep", "TimeFunction", "check_numbers", "check_time_function"]
+
+SWEEPS = ("linear", "logarithmic")
+COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: one that is nearer to a line lies on it
+TIGHTEST = 1e-12  # tolerance of a course: below it lies the round-off of its polynomials
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """u(t) = amplitude cos(2 pi frequency_hz t + phase)."""
+
+    amplitude: float
+    frequency_hz: float
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_numbers("harmonic", amplitude=self.amplitude, frequency_hz=self.frequency_hz, phase=self.phase)
+        if self.frequency_hz < 0:
+            raise MultiPhiValueError(f"harmonic frequency_hz: got {self.frequency_hz!r}, need a frequency >= 0 Hz")
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """The course up to ``end`` [s]."""
+        return PiecewiseExponential.harmonic(self.amplitude, 2 * math.pi * self.frequency_hz, self.phase)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """u'' up to ``end`` [s]."""
+        return self.history(end).derivative.derivative
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Straight lines between samples: time (k,) ascending [s], values (k,); zero before the first, after the last."""
+
+    time: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        time, values = _samples("time", self.time), _samples("values", self.values)
+        if time.shape != values.shape or len(time) < 2:
+            raise MultiPhiValueError(
+                f"samples: got {len(time)} times and {len(values)} values, need two or more of each, as many of both"
+            )
+        if not np.all(np.diff(time) > 0):
+            worst = int(np.argmin(np.diff(time)))
+            raise MultiPhiValueError(
+                f"samples: got time {time[worst + 1]:g} s after {time[worst]:g} s, need ascending times"
+            )
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def from_csv(cls, path: str | Path, column: int = 1) -> Sampled:
+        """Two or more columns of numbers, time [s] first; lines that begin with # are skipped."""
+        if not is_real(column) or int(column) != column:
+            raise MultiPhiTypeError(f"samples: got column {column!r} of {path}, need a whole number >= 1")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of an empty file
+                table = np.loadtxt(path, delimiter=",", ndmin=2)
+            if not 1 <= column < table.shape[1]:
+                raise MultiPhiValueError(f"got column {column}, need 1 to {table.shape[1] - 1}")
+            return cls(table[:, 0], table[:, int(column)])
+        except (OSError, TypeError, ValueError) as error:
+            cause = " ".join(str(error).split())
+            raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {cause}") from error
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """The course up to ``end`` [s]; samples on the line of their neighbours make no piece of their own."""
+        bends = _bends(self.time, self.values)
+        return PiecewiseExponential.sampled(self.time[bends], self.values[bends])
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """u(t) = function(t), a function of time [s] that takes (k,) times or single ones, smooth but for single instants.
+
+    tolerance: of the response, relative to its largest value; see simulate.
+    breaks: instants [s] at which the function or a derivative jumps; jumps and kinks that are seen are found without.
+    A function is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a
+    function of single times, unless ``breaks`` enclose it.
+    """
+
+    function: Callable[[Any], Any]
+    tolerance: float = 1e-9
+    breaks: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise MultiPhiTypeError(f"function: got {self.function!r}, need a function of time")
+        _check_tolerance(self.tolerance)
+        object.__setattr__(self, "breaks", _breaks(self.breaks))
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """The course up to ``end`` [s], to tolerance / finer of its largest value."""
+        many = self._together(np.array([0.0, end])) is not None
+        seen = Samples.of(self._values, end, MANY_SAMPLES if many else FEW_SAMPLES)
+        return PiecewiseExponential.smooth(self._values, end, self.tolerance / finer * seen.largest, seen, self.breaks)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """u'' up to ``end`` [s], of the polynomials that stand for u: less certain than they are."""
+        return self.history(end, finer).derivative.derivative
+
+    def _values(self, times: np.ndarray) -> np.ndarray:
+        values = self._together(times)
+        if values is None:
+            values = np.array([self._value(t) for t in times.tolist()])
+        if not np.all(np.isfinite(values)):
+            worst = float(times[int(np.argmin(np.isfinite(values)))])
+            raise MultiPhiValueError(f"function: gives a value that is not finite at t = {worst:g} s, need finite ones")
+        return values.astype(float)
+
+    def _together(self, times: np.ndarray) -> np.ndarray | None:
+        """All values by one call, None for a function that takes one time only, as math.sin and branches do."""
+        try:
+            values = np.asarray(self.function(times))
+        except Exception:
+            return None  # whatever is wrong shows again with a single time
+        return values if values.shape == times.shape and values.dtype.kind in "biuf" else None
+
+    def _value(self, time: float) -> float:
+        """The value at one time [s]."""
+        try:
+            value = self.function(time)
+        except Exception as error:
+            cause = " ".join(f"{type(error).__name__} {error}".split())
+            raise MultiPhiValueError(f"function: got {cause} at t = {time:g} s, need a number") from error
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
+        if not is_real(value):
+            raise MultiPhiTypeError(f"function: got {type(value).__name__} at t = {time:g} s, need a number")
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """u(t) = amplitude cos(phase(t)), whose frequency goes from start_hz to end_hz in ``duration`` [s], then zero.
+
+        linear        f = start + (end - start) t / T
+        logarithmic   f = start (end / start)^(t / T)
+
+    tolerance: of the response, relative to its largest value; see simulate.
+    """
+
+    amplitude: float
+    start_hz: float
+    end_hz: float
+    duration: float
+    law: str = "linear"
+    tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        given = {"start_hz": self.start_hz, "end_hz": self.end_hz, "duration": self.duration}
+        check_numbers("sweep", amplitude=self.amplitude, **given)
+        for name, value in given.items():
+            if not value > 0:
+                raise MultiPhiValueError(f"sweep {name}: got {value!r}, need a value > 0")
+        if not (isinstance(self.law, str) and self.law in SWEEPS):
+            raise MultiPhiValueError(f"sweep law: got {self.law!r}, need one of: {', '.join(SWEEPS)}")
+        _check_tolerance(self.tolerance)
+
+    def frequency(self, t: np.ndarray) -> np.ndarray:
+        """f (k,) [Hz]."""
+        if self.law == "linear":
+            return self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration)
+        return np.asarray(self.start_hz * np.exp(self._octaves * (t / self.duration)))
+
+    def phase(self, t: np.ndarray) -> np.ndarray:
+        """2 pi integral of f (k,) [rad]."""
+        if self.law == "linear" or self._octaves == 0:
+            cycles = (self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration) / 2) * t
+        else:
+            cycles = self.start_hz * self.duration / self._octaves * np.expm1(self._octaves * (t / self.duration))
+        return np.asarray(2 * math.pi * cycles)
+
+    @property
+    def _octaves(self) -> float:
+        return math.log(self.end_hz / self.start_hz)
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """The course up to ``end`` [s], to tolerance / finer of its amplitude."""
+        return self._modulated(lambda t: np.full_like(t, self.amplitude), abs(self.amplitude), end, finer)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """u'' up to ``end`` [s], to tolerance / finer of its largest value: (i phi'' - phi'^2) of exp(i phi)."""
+
+        def factor(t: np.ndarray) -> np.ndarray:
+            omega = 2 * math.pi * self.frequency(t)
+            linear = self.law == "linear"
+            rising = 2 * math.pi * (self.end_hz - self.start_hz) if linear else omega * self._octaves
+            rate = rising / self.duration
+            return np.asarray(self.amplitude * (1j * rate - omega**2))
+
+        largest = float(np.max(np.abs(factor(np.array([0.0, self.duration])))))
+        return self._modulated(factor, largest, end, finer)
+
+    def _modulated(
+        self, amplitude: Callable[[np.ndarray], np.ndarray], largest: float, end: float, finer: float
+    ) -> PiecewiseExponential:
+        allowed, last = self.tolerance / finer * largest, min(end, self.duration)
+        return PiecewiseExponential.modulated(
+            amplitude, self.phase, lambda t: 2 * math.pi * self.frequency(t), last, allowed
+        )
+
+
+TimeFunction: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
+
+
+def check_numbers(what: str, **given: float) -> None:
+    for name, value in given.items():
+        if not is_real(value):
+            raise MultiPhiTypeError(f"{what} {name}: got {value!r}, need a number")
+        if not math.isfinite(value):
+            raise MultiPhiValueError(f"{what} {name}: got {value!r}, need a finite number")
+
+
+def _check_tolerance(value: float) -> None:
+    check_numbers("course", tolerance=value)
+    if not TIGHTEST <= value < 1:
+        raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
+
+
+def check_time_function(what: str, course: Any) -> None:
+    if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
+        raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
+
+
+def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Places of the samples between which all others lie on straight lines, but for round-off of the largest value."""
+    widths, round_off = np.diff(time), COLLINEAR * float(np.max(np.abs(values)))
+    turns = np.abs(np.diff(np.diff(values) / widths)) > round_off * (1 / widths[1:] + 1 / widths[:-1])
+    bends = np.flatnonzero(np.concatenate([[True], turns, [True]]))
+    off = np.abs(np.interp(time, time[bends], values[bends]) - values) > round_off
+    return np.union1d(bends, np.flatnonzero(off))
+
+
+def _breaks(given: Any) -> tuple[float, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"breaks: got {given!r}, need a sequence of times in s")
+    times = tuple(given)
+    check_numbers("breaks", **{f"{i}": t for i, t in enumerate(times)})
+    return tuple(float(t) for t in times)
+
+
+def _samples(name: str, given: Any) -> np.ndarray:
+    """A copy (k,) of finite numbers that nobody can change."""
+    values = np.asarray(real_array(f"samples {name}", given, "(k,) real numbers"))
+    if values.ndim != 1:
+        raise MultiPhiValueError(f"samples {name}: got shape {values.shape}, need (k,)")
+    if not np.all(np.isfinite(values)):
+        raise MultiPhiValueError(f"samples {name}: got a value that is NaN or infinite, need finite numbers")
+    values.flags.writeable = False
+    return values

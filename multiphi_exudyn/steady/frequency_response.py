@@ -1,0 +1,96 @@
+"""Frequency response of a structure with contacts: steady states under a harmonic load, one frequency after the other.
+
+Each frequency starts from the state that the one before has reached, as a stepped-sine test does, so where several
+responses attract the curve stays on its branch as long as there is one: frequencies going up and going down give
+different curves. Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.loads import StaticLoad
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
+from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
+
+__all__ = ["FrequencyResponse", "frequency_response"]
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Result of ``frequency_response``: frequencies (k,) [Hz] in the order in which they were run, k steady states."""
+
+    frequencies: np.ndarray
+    states: tuple[SteadyState, ...]
+
+    @property
+    def orders(self) -> np.ndarray:
+        """Periods of the load in one of the response (k,), 0 where it is not periodic."""
+        return np.array([state.order for state in self.states])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to distrust in the states, a sentence for each kind with the frequencies that have it."""
+        found = grouped((f"{hz:g} Hz", state.warnings) for hz, state in zip(self.frequencies, self.states, strict=True))
+        return tuple(group.told(len(self.states)) for group in found)
+
+    @property
+    def last(self) -> SteadyState:
+        """The last one that has not failed."""
+        return next((state for state in reversed(self.states) if state.status != "failed"), self.states[-1])
+
+    def amplitude(self, point: At) -> np.ndarray:
+        """Half the range (k,) [m] of a point in a period of the load, the mean over those kept; NaN where failed."""
+        return np.array([np.mean(state.amplitudes(point)) for state in self.states])
+
+    def duty(self, contact: str) -> np.ndarray:
+        """Part of the time (k,) that a contact is closed; NaN where failed."""
+        return np.array([state.duty(contact) for state in self.states])
+
+
+def frequency_response(
+    model: MultiPhiModel,
+    load: PeriodicLoad,
+    frequencies: Sequence[float] | np.ndarray,
+    *,
+    displacement: np.ndarray | None = None,
+    velocity: np.ndarray | None = None,
+    other_loads: Sequence[StaticLoad] = (),
+    periods: int = 400,
+    tolerance: float = 1e-6,
+) -> FrequencyResponse:
+    """Steady states at ``frequencies`` [Hz] in the order given, each from the one before; the first from x, x' (n,).
+
+    load: whose frequency is replaced. The other arguments: see ``steady_state``. A frequency at which the run fails
+    is a state with that status; the next one starts where the failed one did. Issues a MultiPhiWarning for each kind of
+    warning that states have, not one for each state.
+    """
+    states = list[SteadyState]()
+    x, v = displacement, velocity
+    with kept_back():
+        for hz in _frequencies(frequencies):
+            state = settled(model, at_frequency(load, hz), x, v, other_loads, periods, tolerance)
+            states.append(state)
+            if state.status != "failed":
+                x, v = state.displacement, state.velocity
+    response = FrequencyResponse(np.array(frequencies, dtype=float), tuple(states))
+    issue(response.warnings)
+    return response
+
+
+def _frequencies(given: Sequence[float] | np.ndarray) -> list[float]:
+    try:
+        values = np.array(given, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise MultiPhiTypeError(f"frequencies: got {type(given).__name__}, need (k,) numbers in Hz") from error
+    if values.ndim != 1 or len(values) == 0:
+        raise MultiPhiValueError(f"frequencies: got shape {values.shape}, need (k,) with k >= 1")
+    if not np.all(np.isfinite(values) & (values > 0)):
+        raise MultiPhiValueError(f"frequencies: got {values[~(values > 0)][:1]}, need finite frequencies > 0 Hz")
+    return values.tolist()

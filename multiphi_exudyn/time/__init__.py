@@ -1,0 +1,8 @@
+"""Time: runs from event to event, and the trajectories they leave; there is no time step.
+
+A motion advances a state, segment by segment, in NumPy or compiled, under constant loads or driven by what varies in
+time. A trajectory keeps its segments; what its truncated modes could not hold, and what to distrust in it, is read off
+it.
+
+Order: warning_groups, segment, trajectory, defects, truncation, motion, driven, reliability, compiled, simulate.
+"""

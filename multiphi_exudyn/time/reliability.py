@@ -1,0 +1,184 @@
+"""Reliability: what to distrust in an answer, and what to do about it.
+
+Every warning is one plain sentence with its number. It begins with its kind and a colon; many runs group them by kind:
+
+    "truncated contact: ..."  static flexibility that a closed compliant level's modes leave out (level.py): peak
+                              contact forces are off; known before any run
+    "lost energy: ..."        what truncation took of the largest energy of the run
+    "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
+    "undamped modes: ..."     modes for which a list of modal ratios has none
+    "damping ratios: ..."     ratios that look like per cent
+    "linear range: ..."       what the model's own validity check says
+    "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
+    "load pieces: ..."        loads of so many samples or pieces that the run takes long
+
+The thresholds are calibrated on random truncated models judged by the same with all modes:
+tests/campaign/truncation_study.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.events.state import Loss
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.damping import ModalDamping
+from multiphi_exudyn.time.defects import DefectHistory
+from multiphi_exudyn.time.driven.level import DrivenLevel
+from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
+
+ENERGY_SHARE = 0.01  # of the largest energy of a run
+INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
+RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator more than the error
+PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
+REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
+
+MANY_PIECES = 2**16  # of loads in a run: half a minute of computing and 200 MB
+PIECE_SECONDS = 5e-4  # that a piece of a load takes in a small model
+PIECE_BYTES = 3000  # that it takes there
+
+
+def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
+    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
+    if not trajectory.segments:
+        return ()
+    model = trajectory.model
+    found = list(damping_warnings(model))
+    if not model.whole:
+        history = DefectHistory.of(trajectory)
+        found.extend(static_warnings([part.level.level for part in history.parts]))
+        found.extend(_lost_energy(trajectory, history))
+        found.extend(_truncation(trajectory, history, tolerance))
+    found.extend(_clusters(trajectory))
+    if model.validity is not None:
+        found.extend(model.validity(trajectory))
+    found.extend(_load_pieces(trajectory))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a body in Exudyn, which keeps no segments, knows of its run.
+
+    levels: it has been in, each once. lost: at its start and at all events. energy: the largest of the run [J], kinetic
+    and strain, as far as it was seen.
+    """
+
+    levels: Sequence[Level]
+    lost: Loss
+    energy: float
+
+
+def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
+    """What a user must not miss of a run in Exudyn, as far as levels and losses tell."""
+    found = list(damping_warnings(model))
+    if not model.whole:
+        found.extend(static_warnings(run.levels))
+        found.extend(_energy_warning(abs(run.lost.truncation_kinetic + run.lost.truncation_strain), run.energy))
+    return tuple(found)
+
+
+def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
+    """Of the contact of which the modes of these levels leave out most of the static flexibility."""
+    shares = [(share, name, level.modes) for level in levels for name, share in level.static_shares.items()]
+    share, name, modes = max(shares, default=(0.0, "", 0))
+    if share >= CONTACT_SHARE:
+        others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
+        also = f" (and at {others} more)" if others else ""
+        yield (
+            f"truncated contact: at {name!r}{also} {modes} modes leave out {_per_cent(share)} of the static "
+            f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
+        )
+
+
+def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
+    """Of modal ratios that end before the modes do, or look like per cent."""
+    damping = model.structure.damping
+    if not isinstance(damping, ModalDamping):
+        return
+    listed, kept = damping.listed, model.level_at(()).modes
+    if damping.beyond is None and 0 < len(listed) < kept:
+        yield (
+            f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
+            f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
+        )
+    if len(listed) and np.max(listed) >= PER_CENT:
+        yield (
+            f"damping ratios: {np.max(listed):g} is {100 * np.max(listed):g} % of critical damping, which looks like a "
+            "ratio in per cent; write 0.01 for 1 %"
+        )
+
+
+def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str]:
+    """Of the energy that truncation took, whatever its sign at an instant."""
+    start, base = trajectory.start, trajectory.model.base
+    at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
+    lost = abs(at_start) + float(np.sum(np.abs(history.table[:, 3])))
+    given = 0.5 * float(start.velocity @ start.velocity) + base.strain(start.displacement, start.penetrating)
+    if lost <= ENERGY_SHARE * abs(given):
+        return
+    yield from _energy_warning(lost, max(history.largest_energy, abs(given)))
+
+
+def _energy_warning(lost: float, largest: float) -> Iterator[str]:
+    """largest: zero where truncation has taken all energy at the start."""
+    if lost > ENERGY_SHARE * largest:
+        share = _per_cent(lost / (largest or lost))
+        yield f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}"
+
+
+def _truncation(trajectory: Trajectory, history: DefectHistory, tolerance: Tolerance | None) -> Iterator[str]:
+    """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
+    rigid, error = bool(np.any(history.table[:, 2] > 0)), history.indicator(trajectory.t_end)
+    if tolerance is not None and error > tolerance.error:
+        kept = trajectory.model.level_at(()).modes
+        yield (
+            f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
+            "give the tolerance a larger number of most modes, or a run of its own to decide by"
+        )
+    elif error > (RIGID_INDICATOR if rigid else INDICATOR):
+        typical = ", with rigid contacts a quarter of that is typical" if rigid else ""
+        yield f"truncation: displacements may be off by {_per_cent(error)} of the motion{typical}; {REMEDY}"
+
+
+def _per_cent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _clusters(trajectory: Trajectory) -> list[str]:
+    """One sentence where levels of the run keep modes beyond those asked for."""
+    if not trajectory.model.keeps_clusters:
+        return []  # without a look at segments, which a run makes only when they are asked for
+    visited = dict.fromkeys(segment.level.level.indices for segment in trajectory.segments)
+    levels = [trajectory.model.level_at(indices) for indices in visited]
+    kept = [level for level in levels if level.kept_beyond]
+    if not kept:
+        return []
+    most = max(kept, key=lambda level: level.kept_beyond)
+    asked, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
+    return [
+        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
+        f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
+        f"arbitrary; ask for {most.modes} modes"
+    ]
+
+
+def _load_pieces(trajectory: Trajectory) -> list[str]:
+    """Whether the loads have so many pieces that they set the time and memory of the run."""
+    level = trajectory.final.level if trajectory.final is not None else None
+    if not isinstance(level, DrivenLevel) or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
+        return []
+    pieces = level.excitation.pieces(trajectory.t_end)
+    each = 1e3 * PIECE_SECONDS * level.excitation.effort(trajectory.t_end) / pieces
+    return [
+        f"load pieces: the loads have {pieces} pieces in {trajectory.t_end:g} s, some {each:.1g} ms and "
+        f"{PIECE_BYTES / 1000:g} kB each; fewer samples, a larger tolerance or a lower highest frequency make the run "
+        "shorter"
+    ]

@@ -1,0 +1,279 @@
+"""A long campaign of random cases.
+
+    python tests/campaign/random_campaign.py --kinds all --count 20000 --processes 2
+
+Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
+(run_checks.py). Cases of the kind "plain" (strategies.py) run in both loops and have the same motion; events of a
+contact on which nothing presses may differ. All other kinds (campaign_scenes) are judged by brute force
+(campaign_judge.py). With ``--kernels Prescott,Haswell`` the same cases run under each of these kernels of the linear
+algebra library, each in its own process, and their statuses, numbers of events and answers are compared.
+
+Finished chunks stand in a file, so that a campaign that was stopped goes on where it was; the summary names every
+failing case with its cause. A case alone: ``--kinds viscous --first 17 --count 1``.
+"""
+
+import argparse
+import collections
+import json
+import os
+import subprocess
+import sys
+import time
+import warnings
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # a plain checkout
+
+import campaign_judge
+import numpy as np
+import threadpoolctl
+from campaign_scenes import KINDS, numbers, scene_of
+from run_checks import complaints
+from strategies import built, recipe_of
+
+from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
+from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
+from reference_models.exudyn_quiet import quiet
+
+CHUNK = 100  # cases written at a time
+NEAR = 1e-6  # of the largest displacement: the two loops' motions
+LONGEST = 900.0  # s: most cases take a tenth of a second, the first one compiles; a run may never end
+NUDGE = 1e-12  # of the start, more than is cleared on a stop: a run it changes by over NEAR is sensitive, not wrong
+INSTANTS = 40  # at which two runs are compared
+
+ALL_KINDS = ("plain", *KINDS)
+OWN_NAMES = {"Prescott": {"Katmai", "Prescott", "Nehalem"}}  # what OpenBLAS calls the kernels that were asked for
+
+
+def verdicts(number):
+    """What is to be said of a plain case, each (kind, cause); kinds that are not "failure: ..." are counted only."""
+    return _named(lambda: _verdicts(number))
+
+
+def judged(kind, number):
+    """(verdicts, digest) of a case of any kind; the digest is what every processor must agree on."""
+    if kind == "plain":
+        return verdicts(number), []
+    digests = []
+
+    def judge():
+        with quiet():
+            found, digest = campaign_judge.judged(scene_of(kind, number))
+        digests.append(digest)
+        return found
+
+    found = _named(judge)
+    return found, digests[0] if digests else [found[0][0], 0, []]
+
+
+def _named(judge):
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.simplefilter("ignore", MultiPhiWarning)
+            return call_within(LONGEST, judge)
+    except MultiPhiError as error:
+        return [("refused", str(error))]
+    except TimeLimitExceeded:
+        return [("failure: endless", f"not finished after {LONGEST:g} s")]
+    except Exception as error:
+        return [("failure: exception", f"{type(error).__name__}: {' '.join(str(error).split())}")]
+
+
+def _verdicts(number):
+    case = built(recipe_of(number))
+    first, second = (_run(case, compiled) for compiled in (False, None))
+    if first.message and "chatter" in first.message:  # a named failure of a run that need not have failed
+        return [("chatter", first.message)]
+    found = [(f"failure: {text.split(':')[0]}", text) for text in complaints(first)]
+    if not _same(first, second):
+        found.append(_difference(case, first, second))
+    return found or [("ok" if first.status == "ok" else "named failure", first.message)]
+
+
+def _run(case, compiled):
+    start = {"displacement": case.displacement, "velocity": case.velocity}
+    return simulate(case.model, case.t_end, **start, loads=case.loads, compiled=compiled)
+
+
+def nudged(case, run, share):
+    """The case with another start, by a share of it; where that is zero, by a share of the speeds of its run."""
+    if np.any(case.displacement) or np.any(case.velocity):
+        factor = 1 + share
+        return replace(case, displacement=factor * case.displacement, velocity=factor * case.velocity)
+    speed = float(np.max(np.abs(run.velocity(np.linspace(0, run.t_end, INSTANTS)))))
+    return replace(case, velocity=share * speed * (-1.0) ** np.arange(len(case.velocity)))
+
+
+def _same(first, second):
+    """Same status, same motion."""
+    if first.status != second.status or bool(first.segments) != bool(second.segments):
+        return False
+    if not first.segments:
+        return True
+    t = np.linspace(0, min(first.t_end, second.t_end), INSTANTS)
+    places = [run.displacement(t) for run in (first, second)]
+    return bool(np.max(np.abs(places[0] - places[1])) <= NEAR * np.max(np.abs(places)))
+
+
+def _difference(case, first, second):
+    """Whether the loops differ where every two runs do."""
+    if not all(_same(first, _run(nudged(case, first, sign * NUDGE), False)) for sign in (1, -1)):
+        return "sensitive", "a nudged start changes the answer as much"
+    return "failure: loops", f"{first.status} {len(first.events)} events, {second.status} {len(second.events)}"
+
+
+def chunk(cases):
+    """Verdicts of these cases, (kind, number) each: counts of every kind, what is not ok, and digests."""
+    counts, notable, digests, started = collections.Counter(), [], {}, time.process_time()
+    for kind, number in cases:
+        found, digests[f"{kind}/{number}"] = judged(kind, number)
+        for verdict, cause in found:
+            counts[f"{kind}/{verdict}"] += 1
+            if verdict != "ok":
+                notable.append([kind, number, verdict, cause[:300]])
+    seconds = time.process_time() - started
+    return {
+        "cases": [list(case) for case in cases],
+        "seconds": seconds,
+        "counts": counts,
+        "notable": notable,
+        "digests": digests,
+    }
+
+
+def main(arguments=None):
+    """Exit code 0 where nothing failed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=100_000, help="cases, spread evenly over kinds")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case of every kind")
+    parser.add_argument("--kinds", default="plain", help=f"all, or some of {', '.join(ALL_KINDS)}")
+    parser.add_argument("--kernels", default="", help="OpenBLAS kernels to run under, e.g. Prescott,Haswell,SkylakeX")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("random-campaign.jsonl"), help="finished chunks, one a line")
+    given = parser.parse_args(arguments)
+    if given.kernels:
+        return _under_kernels(given)
+    asked = os.environ.get("OPENBLAS_CORETYPE")
+    if asked and kernel() not in OWN_NAMES.get(asked, {asked}):
+        parser.error(f"OPENBLAS_CORETYPE: got {asked}, the library runs {kernel()}: this processor has no such kernel")
+    kinds = ALL_KINDS if given.kinds == "all" else tuple(given.kinds.split(","))
+    if unknown := set(kinds) - set(ALL_KINDS):
+        parser.error(f"--kinds: got {', '.join(sorted(unknown))}, need some of {', '.join(ALL_KINDS)}")
+    return _campaign(numbers(kinds, given.first, given.count), given)
+
+
+def _campaign(cases, given):
+    done = _finished(given.out)
+    parts = [cases[k : k + CHUNK] for k in range(0, len(cases), CHUNK)]
+    started = time.perf_counter()
+    with given.out.open("a", encoding="utf-8") as file, ProcessPoolExecutor(given.processes) as pool:
+        waiting = [pool.submit(chunk, part) for part in parts if _key(part) not in done]
+        for future in as_completed(waiting):
+            result = future.result()
+            file.write(json.dumps(result) + "\n")
+            file.flush()
+            done[_key(result["cases"])] = result
+    return _summary([done[_key(part)] for part in parts], time.perf_counter() - started)
+
+
+def kernel():
+    """Name of the kernels that NumPy's linear algebra runs."""
+    found = (info for info in threadpoolctl.threadpool_info() if info.get("internal_api") == "openblas")
+    return next((info["architecture"] for info in found), "unknown")
+
+
+def _key(cases):
+    return json.dumps([list(case) for case in cases])
+
+
+def _finished(path):
+    """Chunks of an earlier part of the campaign; a line that a stop cut short is none."""
+    found = {}
+    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
+        if line.endswith("}"):
+            result = json.loads(line)
+            found[_key(result["cases"])] = result
+    return found
+
+
+def _summary(results, seconds):
+    counts, notable = collections.Counter(), []
+    for result in results:
+        counts.update(result["counts"])
+        notable += result["notable"]
+    spent = sum(result["seconds"] for result in results)
+    total = sum(len(result["cases"]) for result in results)
+    print(
+        f"{total} cases, {seconds:.0f} s in this part, {spent / max(total, 1):.3f} s of CPU each ({kernel()} kernels)"
+    )
+    for kind in dict.fromkeys(key.split("/")[0] for key in sorted(counts)):
+        own = {key.split("/")[1]: count for key, count in counts.items() if key.split("/")[0] == kind}
+        print(f"{kind:18s}" + "  ".join(f"{verdict} {count}" for verdict, count in sorted(own.items())))
+    for kind, number, verdict, cause in sorted(notable):
+        if verdict != "sensitive":
+            print(f"{kind} {number}  {verdict}: {cause}")
+    return 1 if any(verdict.startswith("failure") for _, _, verdict, _ in notable) else 0
+
+
+# ---------------------------------------------------------------------- several kernels
+
+
+def _under_kernels(given):
+    """The same campaign once for every kernel, and what differs between them."""
+    codes, found = [], {}
+    for name in given.kernels.split(","):
+        out = given.out.with_suffix(f".{name}{given.out.suffix}")
+        command = [sys.executable, __file__, "--kinds", given.kinds, "--out", str(out)]
+        for option in ("count", "first", "processes"):
+            command += [f"--{option}", str(getattr(given, option))]
+        codes.append(subprocess.run(command, env=os.environ | {"OPENBLAS_CORETYPE": name}, check=False).returncode)
+        if codes[-1] not in (0, 1):
+            return codes[-1]
+        found[name] = {key: value for part in _finished(out).values() for key, value in part["digests"].items()}
+    different = differences(found)
+    print(f"{len(next(iter(found.values())))} cases under {', '.join(found)}: {len(different)} differ")
+    for line in different:
+        print(line)
+    failed = any("sensitive" not in line for line in different)
+    return max(*codes, int(failed))
+
+
+def differences(found):
+    """Sentences about cases whose statuses, numbers of events or answers differ; found: {kernel: {case: digest}}."""
+    (first, expected), *others = found.items()
+    lines = []
+    for name, digests in others:
+        for case in sorted(set(expected) & set(digests)):
+            if text := _differs(expected[case], digests[case]):
+                kind, number = case.split("/")
+                excuse = "" if text.startswith("status") else _excuse(kind, int(number))
+                lines.append(f"{kind} {number}  {first} and {name}: {text}{excuse}")
+    return lines
+
+
+def _differs(one, other):
+    if not one or one == other:
+        return ""
+    if one[0] != other[0]:
+        return f"status {one[0]}, {other[0]}"
+    values = [np.array(digest[2]) for digest in (one, other)]
+    count = min(map(len, values))
+    off = np.max(np.abs(values[0][:count] - values[1][:count]), initial=0.0)
+    size = max(np.max(np.abs(values[0]), initial=0.0), 1e-300)
+    if off > NEAR * size:
+        return f"answers {off / size:.3g} apart, {one[1]} and {other[1]} events"
+    return f"{one[1]} and {other[1]} events" if one[1] != other[1] else ""
+
+
+def _excuse(kind, number):
+    """Whether a nudged run drifts away as well."""
+    scene = scene_of(kind, number)
+    motion = campaign_judge.native(scene)
+    return " (sensitive)" if campaign_judge.sensitive(scene, motion, campaign_judge.INSTANTS) else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""Multi-Phi body under loads and stops that vary in time: Exudyn's answers converge to those of ``simulate``."""
+
+import math
+
+import exudyn as exu
+import numpy as np
+import pytest
+from exudyn.itemInterface import CoordinateSpringDamper, LoadCoordinate, MarkerNodeCoordinate, NodePointGround
+from small_structures import chain
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+from multiphi_exudyn.exudyn_plugin.body.certified_driven_step import jump_times
+from reference_models.exudyn_quiet import quiet
+from reference_models.solver_settings import fixed_steps
+
+T_END = 5.0
+SOFT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
+RIGID = (mp.UnilateralContact("below", "m2", 0.1),)
+SHAKEN = mp.StopMotion("below", mp.Harmonic(0.1, 0.7, -math.pi / 2))
+DRIVEN = mp.HarmonicLoad("m1", 2.0, 0.3, 0.4)
+SAMPLES = np.random.default_rng(0).normal(size=26)
+CASES = {
+    "harmonic": (SOFT, "all", [DRIVEN]),
+    "no contact": ((), "all", [DRIVEN]),
+    "sampled": (SOFT, "all", [mp.SampledLoad("m1", np.linspace(0, T_END, 26), SAMPLES)]),
+    "moving stop": (SOFT, "all", [SHAKEN, DRIVEN]),
+    "rigid moving stop": (RIGID, "all", [SHAKEN, mp.ConstantLoad("m2", -1.0), mp.HarmonicLoad("m1", 0.5, 0.3, 0.4)]),
+    "moving base": (SOFT, "all", [mp.BaseMotion(np.ones(3), mp.Harmonic(0.1, 0.7, -math.pi / 2), ("below",))]),
+    "swept base": (SOFT, "all", [mp.BaseMotion(np.ones(3), mp.Sweep(0.1, 0.3, 1.0, T_END))]),
+    "one mode": (SOFT, 1, [DRIVEN]),
+    "sweep": (SOFT, "all", [mp.SweepLoad("m1", 1.0, 0.1, 2.0, T_END)]),
+    "step": (SOFT, "all", [mp.FunctionLoad("m1", lambda t: 5 if t < 0.1 else -1)]),
+    "one-sided law": ((mp.ForceLaw("m2", ([0.0, 0.1, 0.3], [0.0, 2.0, 9.0])),), "all", [DRIVEN]),
+}
+
+
+def model_of(contacts, modes):
+    structure = chain(3, damping=mp.ModalDamping([0.02, 0.01, 0.03]), stiffness=10.0)
+    return mp.MultiPhiModel(structure, contacts, modes=modes)
+
+
+def solved(model, loads, steps, *, matched=False, prepare=None, attach=None):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    with quiet():
+        items = CreateMultiPhiBody(mbs, model, loads=loads, matchedStepSize=T_END / steps if matched else None)
+        if attach:
+            attach(mbs, items["nGenericODE2"])
+        mbs.Assemble()
+        if prepare:
+            prepare(mbs)
+        settings = fixed_steps(T_END, steps, write_period=T_END / steps)
+        mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    return body_histories(mbs, items)
+
+
+@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
+@pytest.mark.parametrize("case", CASES)
+def test_the_difference_to_the_native_run_falls_with_the_square_of_the_step(case, matched):
+    contacts, modes, loads = CASES[case]
+    model = model_of(contacts, modes)
+    native = mp.simulate(model, T_END, loads=loads)
+    errors = []
+    for steps in (500, 1000):
+        found = solved(model, loads, steps, matched=matched)
+        expected = native.at("m1", np.minimum(found.time, T_END))
+        errors.append(np.max(np.abs(found.points["m1"] - expected)) / np.max(np.abs(expected)))
+        assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
+    assert errors[1] < 5e-4
+    assert math.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("contacts", [SOFT, RIGID], ids=["compliant", "rigid"])
+def test_under_forces_of_the_system_and_a_vanishing_load_a_driven_body_moves_as_a_plain_one(contacts):
+    def attach(mbs, node):
+        own = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+        ground = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=mbs.AddNode(NodePointGround()), coordinate=0))
+        mbs.AddObject(CoordinateSpringDamper(markerNumbers=[ground, own], damping=0.3))
+        mbs.AddLoad(
+            LoadCoordinate(markerNumber=own, load=3.0, loadUserFunction=lambda mbs, t, load: load * math.cos(2 * t))
+        )
+
+    model = model_of(contacts, "all")
+    plain, driven = (
+        solved(model, loads, 500, matched=True, attach=attach) for loads in ([], [mp.HarmonicLoad("m1", 1e-13, 0.3)])
+    )
+    assert [(e.contact, e.kind) for e in plain.events] == [(e.contact, e.kind) for e in driven.events]
+    assert len(plain.events) >= 4
+    assert np.max(np.abs(plain.points["m1"] - driven.points["m1"])) < 1e-9 * np.max(np.abs(plain.points["m1"]))
+
+
+def test_gaps_and_forces_see_the_moving_stop():
+    contacts, modes, loads = CASES["rigid moving stop"]
+    model = model_of(contacts, modes)
+    native, found = mp.simulate(model, T_END, loads=loads), solved(model, loads, 4000)
+    t = np.minimum(found.time, T_END)
+    closed = found.closed["below"]
+    assert np.max(np.abs(found.gaps["below"][closed])) < 1e-12
+    away = np.min(np.abs(t[:, None] - [event.time for event in native.events]), axis=1) > 0.02
+    difference = np.abs(found.contact_force["below"] - native.contact_force("below", t))[away]
+    assert np.max(difference) < 1e-3 * np.max(native.contact_force("below", t))
+
+
+def test_a_function_that_replaces_the_loads_is_found_out():
+    def replace(mbs):
+        mbs.SetPreStepUserFunction(lambda mbs, t: True)
+
+    with pytest.raises(Exception, match="PreStepUserFunction"):
+        solved(model_of(SOFT, "all"), [DRIVEN], 100, prepare=replace)
+
+
+def test_a_step_in_which_a_load_jumps_is_never_taken_for_clear():
+    model = model_of(SOFT, "all")
+    load = mp.SampledLoad("m2", [0.5, 2.5], [-4.0, -4.0])
+    native, found = mp.simulate(model, T_END, loads=[load]), solved(model, [load], 2000)
+    assert jump_times(native.segments[0].level.excitation).tolist() == [0.5, 2.5]
+    assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]

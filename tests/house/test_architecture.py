@@ -1,0 +1,165 @@
+"""The house: imports go to earlier rooms and files only, heavy packages stay in theirs, one import pulls in neither.
+
+Every package says in its docstring, after "Order:", in which order its files and rooms stand; each may import only
+those before it, and a package itself stands after what is in it. This is one order of all modules, so nothing imports
+in a circle. Imports for type checkers, inside functions and by a string count like any other.
+"""
+
+import ast
+import functools
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
+HEAVY = {
+    "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
+    "matplotlib": ("multiphi_exudyn/study",),
+    "numba": ("multiphi_exudyn/time/compiled",),
+    "distributed": ("multiphi_exudyn/study/sweep",),
+}
+WITH_NUMBA = "multiphi_exudyn.time.compiled"  # may be imported inside a function, as numba may
+
+
+def sources() -> list[Path]:
+    return sorted([*ROOT.glob("multiphi_exudyn/**/*.py"), *ROOT.glob("reference_models/*.py")])
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+NAMES = {module_name(path): path for path in sources()}
+PACKAGES = sorted(name for name, path in NAMES.items() if path.name == "__init__.py")
+
+
+@functools.cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@functools.cache
+def order(package: str) -> tuple[str, ...]:
+    """What stands in a package, from the first that may be imported by all others."""
+    said = re.search(r"^Order: ([^.]*)\.", ast.get_docstring(tree(NAMES[package])) or "", re.MULTILINE)
+    assert said, f"{package}: no order of its files in its docstring"
+    return tuple(re.split(r",\s+", said[1]))
+
+
+def imported(node: ast.AST) -> Iterator[str]:
+    """Full names of what a node imports, by a statement or by a string; of ``from a import b`` both a and a.b."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        assert node.level == 0, "relative imports hide the room"
+        yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("import_module", "__import__"):
+        assert isinstance(node.args[0], ast.Constant), "imports by a name that is computed hide the room"
+        yield str(node.args[0].value)
+
+
+def module_of(name: str) -> str | None:
+    """The module of ours that a full name stands for or in, None for everybody else's."""
+    while name and name not in NAMES:
+        name = name.rpartition(".")[0]
+    return name or None
+
+
+def rank(module: str) -> tuple[float, ...]:
+    """Where a module stands: smaller is earlier; a package stands after all that is in it."""
+    parts = module.split(".")
+    place = [order("multiphi_exudyn").index(BESIDE[1]) + 0.5] if parts[0] == BESIDE[0] else []
+    place += [order(".".join(parts[:depth])).index(parts[depth]) for depth in range(1, len(parts))]
+    return (*place, float("inf"))
+
+
+def breaches(importer: str, code: ast.AST) -> list[str]:
+    """What a module must not import of what it does import."""
+    names = {module_of(name) for node in ast.walk(code) for name in imported(node)} - {None}
+    return [name for name in sorted(names) if rank(name) >= rank(importer)]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_names_all_that_is_in_it(package):
+    inside = {name.rpartition(".")[2] for name in NAMES if name.rpartition(".")[0] == package}
+    assert sorted(order(package)) == sorted(inside)
+
+
+@pytest.mark.parametrize("module", NAMES)
+def test_imports_go_to_earlier_rooms_and_files_only(module):
+    assert breaches(module, tree(NAMES[module])) == []
+
+
+BREACHES = {
+    "a later room": ("levels.level", "from multiphi_exudyn.time.simulate import simulate"),
+    "a later file": ("levels.level", "from multiphi_exudyn.levels.model import MultiPhiModel"),
+    "a later file by its room": ("levels.level", "from multiphi_exudyn.levels import model"),
+    "itself": ("levels.level", "from multiphi_exudyn.levels.level import Level"),
+    "its own room": ("levels.level", "import multiphi_exudyn.levels"),
+    "the whole house": ("levels.level", "import multiphi_exudyn as mp"),
+    "a later room within one": ("study.scene.scenes", "from multiphi_exudyn.study.running import runs"),
+    "what stands beside": ("time.simulate", "import reference_models.rig"),
+    "for a type checker": ("levels.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
+    "inside a function": ("levels.level", "def f():\n    from multiphi_exudyn.events import rule"),
+    "by a string": ("levels.level", "importlib.import_module('multiphi_exudyn.events.rule').EventRule"),
+    "by a string alone": ("levels.level", "f = import_module('multiphi_exudyn.events.rule')"),
+    "by the built-in": ("levels.level", "__import__('multiphi_exudyn.events.rule')"),
+}
+
+
+@pytest.mark.parametrize("case", BREACHES)
+def test_a_breach_of_the_order_is_seen(case):
+    importer, code = BREACHES[case]
+    assert len(breaches(f"multiphi_exudyn.{importer}", ast.parse(code))) == 1
+
+
+@pytest.mark.parametrize("code", ["from . import level", "import_module(name)", "__import__(f'{package}.rule')"])
+def test_an_import_that_hides_what_it_imports_is_refused(code):
+    with pytest.raises(AssertionError, match="hide"):
+        breaches("multiphi_exudyn.levels.model", ast.parse(code))
+
+
+LET_PASS = {
+    "an earlier file": ("multiphi_exudyn.levels.model", "from multiphi_exudyn.levels.level import Level"),
+    "an earlier room": ("multiphi_exudyn.levels.model", "import multiphi_exudyn.mathematics.modes"),
+    "what is in it": ("multiphi_exudyn", "from multiphi_exudyn.time.simulate import simulate"),
+    "the plugin": ("reference_models.rig", "from multiphi_exudyn.exudyn_plugin import reduce"),
+    "a reference": ("multiphi_exudyn.study.running.runs", "from reference_models.rig import rig_beam"),
+    "a string that is no import": ("multiphi_exudyn.errors", "monkeypatch.setattr('multiphi_exudyn.cli.main', 0)"),
+}
+
+
+@pytest.mark.parametrize("case", LET_PASS)
+def test_what_is_no_breach_is_let_pass(case):
+    importer, code = LET_PASS[case]
+    assert breaches(importer, ast.parse(code)) == []
+
+
+@pytest.mark.parametrize("package", HEAVY)
+def test_a_heavy_package_is_imported_in_its_own_room_only(package):
+    for path in sources():
+        names = {name.split(".")[0] for node in ast.walk(tree(path)) for name in imported(node)}
+        inside = path.relative_to(ROOT).as_posix().startswith(HEAVY[package])
+        assert package not in names or inside, f"{path} imports {package}"
+
+
+@pytest.mark.parametrize("module", NAMES)
+def test_nothing_light_is_imported_inside_a_function(module):
+    for function in ast.walk(tree(NAMES[module])):
+        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            names = {name for node in ast.walk(function) for name in imported(node)}
+            light = {name for name in names if name.split(".")[0] not in HEAVY and not name.startswith(WITH_NUMBA)}
+            assert not light, f"{function.name} imports {light}"
+
+
+def test_importing_the_package_loads_neither_exudyn_nor_matplotlib_nor_numba():
+    heavy = "{'exudyn', 'matplotlib', 'numba', 'pydantic', 'tqdm'}"
+    code = f"import sys, multiphi_exudyn; print(sorted({heavy} & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert found.stdout.strip() == "[]"

@@ -1,0 +1,158 @@
+"""The examples run, and each is checked by one number."""
+
+import importlib
+import importlib.util
+import math
+import sys
+from pathlib import Path
+
+import exudyn as exu
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_own_matrices(capsys):
+    trajectory = load("own_matrices").main()
+    assert abs(trajectory.ledger.residual) < 1e-12
+    assert "levels built: 3 of 4" in capsys.readouterr().out
+
+
+def test_paper_rig(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["paper_rig.py", str(tmp_path / "rig.png")])
+    trajectories = load("paper_rig").main()
+    first = [trajectory.contact_intervals("support")[0][0] for trajectory in trajectories.values()]
+    assert first == pytest.approx([0.06897, 0.06897], abs=2e-5)
+    assert (tmp_path / "rig.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.count("ok") == 2
+
+
+def test_parameter_study(capsys, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    example = importlib.import_module("parameter_study")
+    monkeypatch.setattr(example, "AXES", {"stiffness": [1e5, 1e6], "displacement": [0.02]})
+    path = str(tmp_path / "runs.sqlite")
+    rows = example.main(path, "serial")
+    assert [row.status for row in rows] == ["ok", "ok"]
+    assert rows[1].values["first contact [ms]"] == pytest.approx(68.97, abs=0.1)
+    assert example.main(path, "serial") == rows
+    assert capsys.readouterr().out.count("impulse") == 4
+
+
+def test_force_laws(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["force_laws.py", str(tmp_path / "laws.png")])
+    example = load("force_laws")
+    monkeypatch.setattr(example, "SEGMENTS", (8, 16, 64))
+    errors = example.main()
+    for runs in errors.values():
+        assert math.log2(runs["native"][1] / runs["native"][2]) / 2 > 1.8
+        assert runs["user object"] == pytest.approx(runs["native"], rel=0.02)
+    assert (tmp_path / "laws.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.count("order") == 4
+
+
+def test_modal_test(capsys, tmp_path):
+    picture = tmp_path / "modal.png"
+    own, found = load("modal_test").main([str(picture)])
+    assert found.frequencies == pytest.approx(own.frequencies, rel=0.002)
+    assert found.ratios == pytest.approx(own.ratios, rel=0.05)
+    assert len(found.frequencies) == 4
+    assert capsys.readouterr().out.count("\n") == 5
+    assert picture.stat().st_size > 10_000
+
+
+def test_frequency_response(capsys, tmp_path):
+    picture = tmp_path / "response.png"
+    found = load("frequency_response").main([str(picture)])
+    assert found.up.amplitude("node2")[-1] == pytest.approx(found.down.amplitude("node2")[0], rel=1e-6)
+    assert found.up.amplitude("node2")[-1] == pytest.approx(found.linear("node2", np.array([10.0]))[0], rel=1e-4)
+    assert found.up.duty("support")[0] > 0.02
+    assert capsys.readouterr().out.count("node2") == 8
+    assert picture.stat().st_size > 10_000
+
+
+def test_meshed_cantilever(capsys, tmp_path):
+    picture = tmp_path / "cantilever.png"
+    example = load("meshed_cantilever")
+    beam, (coarse, fine) = example.main([str(picture)])
+    off = [np.max(np.abs(found.bending / beam.bending - 1)) for found in (coarse, fine)]
+    assert off[1] < off[0] / 2 < 2e-3
+    assert example.difference(fine.tip, beam.tip) < min(0.015, example.difference(coarse.tip, beam.tip))
+    assert example.difference(fine.force, beam.force) < 0.05
+    assert len(fine.trajectory.events) == len(beam.trajectory.events) == 12
+    assert capsys.readouterr().out.count("12 events") == 2
+    assert picture.stat().st_size > 10_000
+
+
+def test_draw_body(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(exu.config, "printToConsole", False)
+    example = load("draw_body")
+    start, later = np.vsplit(example.main().astype(int), 2)
+    assert start.shape == (example.WINDOW[1], example.WINDOW[0], 3)
+    red, green, blue = np.moveaxis(np.array([start, later]), -1, 0)
+    orange = np.sum((red > 150) & (green > 0.4 * red) & (green < 0.7 * red) & (blue < 0.4 * red), axis=(1, 2))
+    assert orange[0] == 0 < orange[1]
+    assert (tmp_path / "body_in_exudyn.png").stat().st_size > 10_000
+
+
+def test_coupled_body(capsys, monkeypatch, tmp_path):
+    example, picture = load("coupled_body"), tmp_path / "coupled.png"
+    monkeypatch.setattr(example, "CASES", example.CASES[1:4:2])  # others: test_interface.py
+    monkeypatch.setattr(example, "T_END", 0.25)
+    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:2])
+    monkeypatch.setattr(example, "FINE", 1.25e-5)
+    monkeypatch.setattr(example, "REPEATS", 1)
+    found = example.main([str(picture)])
+    for runs in found.values():
+        assert runs.errors[-1] < 3e-4
+        assert example.order(runs.errors) == pytest.approx(2.0, abs=0.35)
+        assert runs.apart < 5e-5
+        assert runs.small_error < 3e-3
+        assert runs.small.events >= 2
+    assert picture.stat().st_size > 10_000
+    assert capsys.readouterr().out.count("apart") == 2
+
+
+def test_reduce_your_model(capsys, tmp_path):
+    picture = tmp_path / "reduced.png"
+    found = load("reduce_your_model").main([str(picture)])
+    errors = found.errors(0.25)
+    assert errors["on its own"] == pytest.approx(0.0021, abs=0.001)
+    assert errors["as a body in Exudyn"] == pytest.approx(errors["on its own"], rel=0.01)
+    assert "8 contacts" in capsys.readouterr().out
+
+
+def test_bed_of_stops(capsys, monkeypatch, tmp_path):
+    picture = tmp_path / "bed.png"
+    example = load("bed_of_stops")
+    monkeypatch.setattr(example, "ELEMENTS", (100, 400))
+    coarse, fine = example.main([str(picture)], 20, 0.16)
+    assert coarse.trajectory.status == fine.trajectory.status == "ok"
+    assert len(coarse.trajectory.events) > 15
+    first = [each.trajectory.events[0].time for each in (coarse, fine)]
+    assert first[0] == pytest.approx(first[1], rel=1e-4)
+    assert capsys.readouterr().out.count("1.05e+06") == 2
+    assert picture.stat().st_size > 10_000
+
+
+def test_meshed_bed(capsys, monkeypatch):
+    """Times are for a quiet machine; the events of two meshes and the size of their bases are the same on any."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    example = importlib.import_module("meshed_bed")
+    monkeypatch.setattr(example, "QUICK", ((50, 2), (100, 2)))
+    coarse, fine = example.main([], stops=20, t_end=0.012, repeats=1)
+    assert (coarse.n, fine.n) == (1000, 2000)
+    assert coarse.size == fine.size
+    assert coarse.events == fine.events > 10
+    assert min(coarse.new, coarse.known, fine.new, fine.known) > 0
+    assert "levels known: the finest mesh to the coarsest" in capsys.readouterr().out

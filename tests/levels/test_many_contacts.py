@@ -1,0 +1,156 @@
+"""Many contacts: only the levels visited are built, each with the few modes asked for, and symmetry stays."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg
+from numpy.testing import assert_allclose
+from run_checks import complaints
+from small_structures import bed
+
+from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.mathematics.modes import right_singular_vectors
+from multiphi_exudyn.mechanics.beam import Beam, planar_beam
+from multiphi_exudyn.mechanics.section import Section
+
+FREQUENCIES = 1e-12  # relative, between two routes to the same modes
+SUBSPACES = 1e-9  # sine of the angle between them: what 1e-16 of the softest compliance is to the stiffest mode kept
+EVALUATIONS = 500  # samples of event signals that an event may take
+SYMMETRIC = 1e-12  # of the largest displacement
+
+
+SETS = [(), (3,), (3, 4), (3, 4, 20, 33), tuple(range(10, 30))]
+
+
+class TestFewModesOfALevel:
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, 1e12, math.inf])
+    @pytest.mark.parametrize("twins", [False, True])
+    def test_equal_the_lowest_of_all_its_modes(self, stiffness, twins):
+        base = bed(stiffness, n=80 if twins else 160, twins=twins).base
+        for indices in SETS:
+            few, full = build_level(base, indices, 12), build_level(base, indices)
+            assert few.modes == 12
+            assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
+            wanted = full.vectors[:, :12]
+            assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < SUBSPACES
+            shown = few.force_rows @ few.vectors.T - full.force_rows[:, :12] @ wanted.T
+            assert np.abs(shown).max(initial=0) <= SUBSPACES * np.abs(full.force_rows).max(initial=0)
+
+    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
+    @pytest.mark.parametrize("closed", [1, 20])
+    def test_take_no_singular_values_but_theirs(self, monkeypatch, stiffness, closed):
+        """A base of 200: what all its modes would cost is not paid for a quarter of them."""
+        base, columns = bed(stiffness, n=200).base, []
+
+        def counted(matrix):
+            columns.append(matrix.shape[1])
+            return right_singular_vectors(matrix)
+
+        monkeypatch.setattr("multiphi_exudyn.levels.level_modes.right_singular_vectors", counted)
+        for modes in (12, 48):
+            assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
+        assert columns == [12, 48]
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):
+        base, made = bed(stiffness).base, []
+        monkeypatch.setattr("multiphi_exudyn.levels.level_modes._of_all", lambda *given: made.append(given))
+        for indices in SETS:
+            assert build_level(base, indices, 12).modes == 12
+        assert not made
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    @pytest.mark.parametrize("missed", [0, 5, 12])
+    def test_that_iterations_miss_are_found_by_counting(self, monkeypatch, stiffness, missed):
+        """missed: of the modes from the highest asked for down; the one beyond them, asked for too, is the highest."""
+        base = bed(stiffness, twins=True, n=80, apart=0.3).base
+
+        def lacking(operator, count, **given):
+            values, vectors = eigsh(operator, count + 1, **given)
+            return np.delete(values, missed), np.delete(vectors, missed, axis=1)
+
+        eigsh = scipy.sparse.linalg.eigsh
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lacking)
+        for indices in SETS[1:]:
+            few, full = build_level(base, indices, 12), build_level(base, indices)
+            assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
+
+    def test_equal_each_other_where_iterations_fail(self, monkeypatch):
+        def failing(*given, **options):
+            raise scipy.sparse.linalg.ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+        base = bed(1e6).base
+        found = build_level(base, SETS[-1], 12)
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", failing)
+        assert_allclose(build_level(base, SETS[-1], 12).omega, found.omega, rtol=FREQUENCIES)
+
+    def test_rigid_contacts_do_not_move_in_them(self):
+        level = bed(math.inf).level(("c3", "c20"))
+        assert np.abs(level.base.directions[:, level.indices].T @ level.vectors).max() < 1e-14
+
+    def test_fewer_are_taken_from_them_and_more_are_built(self):
+        some = bed(math.inf)
+        held = some.level(("c3",))
+        fewer = dataclasses.replace(some, modes=3)
+        assert np.shares_memory(fewer.level(("c3",)).vectors, held.vectors)
+        more = dataclasses.replace(some, modes="all")
+        assert more.level(("c3",)).modes == some.base.modes.count - 1
+        assert_allclose(more.level(("c3",)).omega[:12], held.omega, rtol=FREQUENCIES)
+
+
+class TestStopsStruckAtOnce:
+    @pytest.mark.parametrize("stiffness", [1e4, math.inf])
+    @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (3, 0, 4, 2, 1)])
+    def test_in_a_mirror_symmetric_scene_close_together_and_keep_it_symmetric(self, stiffness, order):
+        n, places = 21, [2, 6, 10, 14, 18]
+        chain = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        chain[0, 0] = chain[-1, -1] = 1.0
+        structure = LinearStructure(np.eye(n), 1e3 * chain @ chain, points={f"p{k}": k for k in places})
+        stops = [UnilateralContact(f"c{places[i]}", f"p{places[i]}", 0.1, stiffness) for i in order]
+        run = simulate(MultiPhiModel(structure, stops, modes="all"), 0.13, velocity=-np.ones(n), compiled=False)
+        assert run.status == "ok", run.message
+        first = [event.time for event in run.events if event.kind == "close"][:5]
+        assert len(first) == 5
+        assert_allclose(first, 0.1, rtol=1e-12)
+        x = run.displacement(np.linspace(0, 0.13, 200))
+        assert np.abs(x - x[::-1]).max() < SYMMETRIC * np.abs(x).max()
+
+
+def test_forty_stops_build_the_levels_visited_only():
+    model = bed(1e7, stops=40)
+    mode = model.level(()).shapes[:, 0]
+    run = simulate(model, 0.02, velocity=-3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2]))
+    assert run.status == "ok", run.message
+    assert len(run.events) > 10
+    assert model.levels_possible == 2**40
+    assert model.levels_built <= 2 * len(run.events) + 1
+
+
+def test_a_hundred_stops_run_to_the_end_with_certified_events():
+    """A beam over its bed: the work of an event does not grow with the contacts that rest."""
+    steel = Section.rectangle(0.0, 2.0, width=0.03, height=0.01, youngs_modulus=2.1e11, density=7850.0)
+    places = {f"p{i}": 0.02 * (i + 1) for i in range(100)}
+    structure = planar_beam(Beam([steel], places), 100)
+    stops = [UnilateralContact(f"c{i}", f"p{i}", 1e-3, 1e4) for i in range(100)]
+    model = MultiPhiModel(structure, stops, modes=24)
+    mode = model.level(()).shapes[:, 0]
+    run = simulate(model, 0.008, velocity=-mode / (structure.row("p99") @ mode), compiled=False)
+    assert complaints(run, samples=12.0, most=12) == []
+    assert len(run.events) > 15
+    assert run.stats.levels_built <= 2 * len(run.events) + 1
+    assert run.stats.function_evaluations < EVALUATIONS * len(run.events)
+
+
+def test_a_bed_struck_all_at_once_is_no_chatter(monkeypatch):
+    """One change of every stop within a small part of a period of the highest kept mode."""
+    monkeypatch.setattr("multiphi_exudyn.time.motion.CHATTER_WINDOW", 10)
+    model = bed(1e7, n=200, stops=60)
+    mode = model.level(()).shapes[:, 0]
+    fall = -3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2])
+    run = simulate(model, 4e-4, velocity=fall, compiled=False)
+    assert run.status == "ok", run.message
+    assert len(run.events) > 20
+    assert (run.events[-1].time - run.events[0].time) * model.level(()).highest_frequency < 10 / 20

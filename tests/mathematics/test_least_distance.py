@@ -1,0 +1,154 @@
+"""The shortest change that contacts allow: admissible, by pushing alone, without energy from nowhere, or a failure."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.events.transition import nearest_admissible
+from multiphi_exudyn.mathematics.least_distance import FOLLOWING, Infeasible, least_distance
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+KINDS = ("random", "twice", "opposite", "dependent", "nearly")
+AMPLIFIED = 1e-12  # of the terms of a complementarity, over the angle between rows
+
+
+def directions(random, kind, k, r, angle):
+    """Rows (k, r): some of them the same, opposite, combinations of others, or off by an angle from another."""
+    rows = random.normal(size=(k, r))
+    for i in range(1, k):
+        if kind != "random" and random.random() < 0.6:
+            other = rows[int(random.integers(i))]
+            size = 10.0 ** random.uniform(-2, 2)
+            rows[i] = {
+                "twice": size * other,
+                "opposite": -size * other,
+                "dependent": random.normal(size=i) @ rows[:i],
+                "nearly": random.choice([-1.0, 1.0]) * other + angle * random.normal(size=r),
+            }[kind]
+    return rows
+
+
+def solved(rows, vector, free):
+    """(v+, p), None where there is none."""
+    try:
+        return nearest_admissible(rows, vector, free)
+    except NumericalFailure:
+        return None
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(
+    st.integers(0, 2**31),
+    st.sampled_from(KINDS),
+    st.integers(1, 7),
+    st.integers(1, 6),
+    st.integers(0, 2),
+    st.integers(3, 13),
+    st.sampled_from([-40, 0, 40]),
+)
+def test_an_impact_is_admissible_pushes_and_takes_no_energy_from_nowhere(seed, kind, k, r, moving, digits, power):
+    random, scale, angle = np.random.default_rng(seed), 2.0**power, 10.0**-digits
+    rows = np.hstack([directions(random, kind, k, r, angle), random.normal(size=(k, moving))])
+    vector = random.normal(size=r + moving) * random.choice([1.0, 1e-7], r + moving)
+    found, scaled = solved(rows, vector, r), solved(scale * rows, vector / scale, r)
+    if found is None:
+        assert scaled is None
+        assert moving
+        return
+    after, impulses = found
+    assert scaled is not None
+    assert np.array_equal(scaled[0] * scale, after)
+    assert np.array_equal(scaled[1] * scale**2, impulses)
+    change = after[:r] - vector[:r]
+    lengths = np.linalg.norm(rows[:, :r], axis=1)
+    terms = np.abs(rows) @ np.abs(vector) + lengths * np.linalg.norm(change)
+    slack = FOLLOWING if kind == "nearly" else 2 * ZERO
+    assert np.all(rows @ after >= -slack * terms)
+    assert np.all(impulses >= 0)
+    assert np.array_equal(after[r:], vector[r:])
+    closeness = 1e-10 if kind == "nearly" else 1e-4  # of the rows that push, random ones at the least
+    assert np.all(np.abs(rows @ after)[impulses > 0] <= AMPLIFIED / closeness * terms[impulses > 0])
+    assert_allclose(impulses @ rows[:, :r], change, rtol=0, atol=1e-14 * float(impulses @ lengths) + 1e-300)
+    if not moving:
+        assert np.linalg.norm(after) <= (1 + 1e-13) * np.linalg.norm(vector)
+
+
+@settings(derandomize=True, max_examples=80, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from(KINDS[:-1]), st.integers(1, 5), st.integers(1, 3))
+def test_fails_where_stops_exclude_each_other_and_only_there(seed, kind, k, r):
+    """Whether there is an admissible velocity is judged by linear programming."""
+    random = np.random.default_rng(seed)
+    rows = np.column_stack([directions(random, kind, k, r, 0.0), random.normal(size=k)])
+    found = solved(rows, np.append(random.normal(size=r), 1.0), r)
+    feasible = scipy.optimize.linprog(np.zeros(r), -rows[:, :r], rows[:, r], bounds=(None, None)).status == 0
+    assert (found is not None) == feasible
+
+
+@settings(derandomize=True, max_examples=80, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from(KINDS[:-1]), st.integers(1, 5), st.integers(1, 5))
+def test_is_the_shortest(seed, kind, k, r):
+    random = np.random.default_rng(seed)
+    rows = directions(random, kind, k, r, 0.0)
+    least = rows @ random.normal(size=r)
+    x, _ = least_distance(rows, least, np.abs(least))
+    brute = scipy.optimize.minimize(
+        lambda x: x @ x,
+        x + 0.1 * random.normal(size=r),
+        jac=lambda x: 2 * x,
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda x: rows @ x - least, "jac": lambda x: rows},
+        options={"ftol": 1e-14},
+    )
+    if brute.success:
+        assert x @ x <= brute.fun + 1e-7 * (1 + brute.fun)
+
+
+def test_of_a_moving_and_a_fixed_stop_of_one_direction_the_faster_takes_over():
+    """A mass at rest on a fixed stop is lifted by one that rises at 1.5 m/s, and the fixed one pushes no more."""
+    after, impulses = nearest_admissible(np.array([[2.0, 0.0], [2.0, -1.5]]), np.array([0.0, 1.0]), 1)
+    assert_allclose(after, [0.75, 1.0], rtol=1e-15)
+    assert_allclose(impulses, [0.0, 0.375], rtol=1e-15)
+
+
+def test_between_a_moving_and_a_fixed_stop_there_is_no_way_out():
+    with pytest.raises(Infeasible) as found:
+        nearest_admissible(np.array([[1.0, -0.5], [0.3, 0.0], [-1.0, 0.0]]), np.array([0.0, 1.0]), 1)
+    assert sorted(found.value.rows) == [0, 2]
+
+
+def test_a_push_of_1e_7_beside_others_that_are_round_off_is_followed_alone():
+    """Four contacts of which one is struck at 5e-7 m/s and three are at rest, at speeds of 1 m/s."""
+    random = np.random.default_rng(1)
+    rows = np.linalg.qr(random.normal(size=(7, 7)))[0][:4] + 0.1 * random.normal(size=(4, 7))
+    speeds = random.normal(size=7)
+    speeds -= np.linalg.lstsq(rows, rows @ speeds + [5e-7, 0, 0, 0], rcond=None)[0]
+    after, impulses = nearest_admissible(rows, speeds)
+    assert impulses[0] > 0
+    assert np.linalg.norm(after - speeds) < 1e-6
+    assert np.min(rows @ after) > -1e-14
+
+
+def test_a_contact_that_no_mode_moves_is_left_alone_unless_its_stop_moves_into_it():
+    rows = np.array([[1.0, 0.0], [0.0, 0.0]])
+    assert_allclose(nearest_admissible(rows, np.array([-1.0, 1.0]), 1)[0], [0.0, 1.0])
+    with pytest.raises(Infeasible):
+        nearest_admissible(rows - [[0.0, 0.0], [0.0, 1.0]], np.array([-1.0, 1.0]), 1)
+
+
+def test_says_where_it_does_not_settle(monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.mathematics.least_distance.SETS", 0)
+    with pytest.raises(NumericalFailure, match="round-off decides"):
+        least_distance(np.eye(2), np.ones(2), np.ones(2))
+
+
+@pytest.mark.parametrize("nudge", [-1.0, 0.0, 1.0])
+def test_of_inequalities_that_lack_the_same_to_round_off_the_first_pushes(nudge):
+    rows = np.array([[2.0, 1.0], [0.5, 0.25]])
+    least = np.array([3.0, 0.75 * (1 + nudge * np.finfo(float).eps)])
+    _, multipliers = least_distance(rows, least, np.zeros(2))
+    assert multipliers[0] > 0
+    assert multipliers[1] == 0

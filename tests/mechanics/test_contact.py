@@ -1,0 +1,54 @@
+"""A contact refuses what is no gap, no stiffness and no name."""
+
+import math
+
+import numpy as np
+import pytest
+
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+
+
+def contact(**changes):
+    return UnilateralContact(**{"name": "stop", "direction": "tip", "gap": 1e-3} | changes)
+
+
+class TestUnilateralContact:
+    def test_is_rigid_unless_told_otherwise(self):
+        assert contact().rigid
+        assert contact().stiffness == math.inf
+        assert not contact(stiffness=1e6).rigid
+
+    @pytest.mark.parametrize("gap", [1e-3, 0.0, -1e-3, 1, np.float64(0.002)])
+    def test_accepts_any_finite_gap(self, gap):
+        assert contact(gap=gap).gap == gap
+
+    @pytest.mark.parametrize("direction", ["tip", {"a.tip": 1.0, "b.tip": -1.0}, np.array([0.0, 1.0])])
+    def test_keeps_the_direction_as_given(self, direction):
+        assert contact(direction=direction).direction is direction
+
+    @pytest.mark.parametrize(
+        ("kind", "changes", "begins"),
+        [
+            (ValueError, {"gap": math.nan}, "contact 'stop' gap: got nan"),
+            (ValueError, {"gap": math.inf}, "contact 'stop' gap: got inf"),
+            (TypeError, {"gap": "wide"}, "contact 'stop' gap: got 'wide'"),
+            (TypeError, {"gap": True}, "contact 'stop' gap: got True"),
+            (TypeError, {"gap": None}, "contact 'stop' gap: got None"),
+            (ValueError, {"stiffness": 0.0}, "contact 'stop' stiffness: got 0.0"),
+            (ValueError, {"stiffness": -1e6}, "contact 'stop' stiffness: got -1000000.0"),
+            (ValueError, {"stiffness": math.nan}, "contact 'stop' stiffness: got nan"),
+            (TypeError, {"stiffness": 1j}, "contact 'stop' stiffness: got 1j"),
+            (ValueError, {"damping": -1.0, "stiffness": 1e6}, "contact 'stop' damping: got -1.0"),
+            (ValueError, {"damping": math.inf, "stiffness": 1e6}, "contact 'stop' damping: got inf"),
+            (ValueError, {"damping": 1.0}, "contact 'stop' damping: got 1.0 beside an infinite stiffness"),
+            (TypeError, {"damping": None}, "contact 'stop' damping: got None"),
+            (TypeError, {"name": ""}, "contact name: got ''"),
+            (TypeError, {"name": 3}, "contact name: got 3"),
+        ],
+    )
+    def test_refuses(self, refused, kind, changes, begins):
+        refused(kind, begins, contact, **changes)
+
+    def test_cannot_be_changed(self):
+        with pytest.raises(AttributeError):
+            contact().gap = 0.0

@@ -1,0 +1,382 @@
+"""Force laws: segments of second order, chains of levels that follow the true law, energy that is kept."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from small_structures import chain
+from true_law import with_forces
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.mechanics.force_law import LawSpring
+from reference_models.rig import rig_beam
+
+START = np.array([0.3, 0.8, 1.5])
+T = np.linspace(0, 10, 201)
+SPAN = (-2.0, 2.0)
+
+
+def hardening(q):
+    return q + 2 * q**3
+
+
+def hertz(q):
+    return -50 * np.maximum(-q - 0.2, 0) ** 1.5
+
+
+def softening(q):
+    return -0.35 * q + 0.3 * q**3
+
+
+def two_wells(q):
+    return -q + 0.5 * q**3
+
+
+def magnet(q):
+    return -0.3 / (2.5 - q) ** 2
+
+
+def clearance(q):
+    return 5 * (np.hypot(q - 0.5, 0.1) + q - 0.5) - 5 * (np.hypot(-q - 0.5, 0.1) - q - 0.5)
+
+
+LAWS = {
+    "hardening": (hardening, START),
+    "hertz": (hertz, START),
+    "softening": (softening, START),
+    "two wells": (two_wells, np.array([0.3, 0.8, 1.95])),
+    "magnet": (magnet, np.array([0.3, 0.8, 1.2])),
+    "clearance": (clearance, np.array([0.3, 0.8, 1.2])),
+}
+
+
+def law(function=hardening, at="m2", **given):
+    given = {"segments": 32} | given if "tolerance" not in given else given
+    return mp.ForceLaw(at, function, **({"span": SPAN} | given))
+
+
+def model(*contacts, n=3, **given):
+    return mp.MultiPhiModel(chain(n, **given), contacts, modes="all")
+
+
+def relative(found, expected):
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+class TestSegments:
+    @pytest.mark.parametrize("name", LAWS)
+    def test_their_error_falls_with_the_square_of_their_number(self, name):
+        errors = [law(LAWS[name][0], segments=n).error for n in (16, 32, 64)]
+        assert np.log2(errors[0] / errors[2]) / 2 > 1.9
+        assert errors[-1] < 7e-4
+
+    @pytest.mark.parametrize("name", LAWS)
+    @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+    def test_hold_their_tolerance_and_lie_on_the_law_at_their_knots(self, name, tolerance):
+        function = LAWS[name][0]
+        found, q = law(function, tolerance=tolerance), np.linspace(*SPAN, 9973)
+        off = np.max(np.abs(found.force(q) - function(q))) / np.max(np.abs(function(q)))
+        assert 0.5 * tolerance < off <= 1.001 * tolerance
+        assert off == pytest.approx(found.error, rel=0.01)
+        assert_allclose(found.forces, function(found.knots), rtol=1e-14)
+        fewer = law(function, segments=len(found.knots) - 2)
+        assert fewer.error > tolerance, "one segment less would not do"
+
+    def test_of_the_same_error_everywhere(self):
+        found = law(softening, segments=20)
+        q = np.linspace(found.knots[:-1], found.knots[1:], 101)
+        errors = np.max(np.abs(found.force(q) - softening(q)), axis=0)
+        assert np.min(errors) > 0.9 * np.max(errors)
+
+    @pytest.mark.parametrize("name", LAWS)
+    def test_are_the_sum_of_the_springs(self, name):
+        found, q = law(LAWS[name][0]), np.linspace(-3, 3, 301)
+        total = np.full(len(q), found.constant)
+        for spring in found.springs:
+            gap = -spring.side * q + spring.gap
+            total += spring.side * spring.stiffness * np.maximum(0, -gap)
+        assert_allclose(total, found.force(q), rtol=0, atol=1e-12 * np.max(np.abs(total)))
+
+    def test_beyond_the_span_the_last_ones_go_on(self):
+        found = law(hardening)
+        assert_allclose(np.diff(found.force(np.array([2.0, 3.0, 5.0]))), found.slopes[-1] * np.array([1, 2]))
+
+    def test_a_function_of_numbers_is_as_good_as_one_of_arrays(self):
+        def scalar(q):
+            return math.copysign(abs(q) ** 1.5, q)
+
+        found = law(scalar, segments=8)
+        assert_allclose(found.knots, law(lambda q: np.sign(q) * np.abs(q) ** 1.5, segments=8).knots)
+
+    def test_the_centre_is_the_zero_nearest_to_zero_or_the_place_nearest_to_it(self):
+        assert law(lambda q: (q - 0.5) * (q + 1.5)).centre == pytest.approx(0.5, abs=1e-7)
+        assert law(hertz).centre == 0
+        assert law(magnet).centre == 0
+        assert law(magnet, span=(1.0, 2.0)).centre == 1
+
+    @pytest.mark.parametrize(
+        ("kind", "given", "begins"),
+        [
+            (ValueError, {}, "force law 'law': got tolerance None and segments None"),
+            (ValueError, {"tolerance": 0.1, "segments": 3}, "force law 'law': got tolerance 0.1 and segments 3"),
+            (ValueError, {"tolerance": 0.0}, "force law 'law' tolerance: got 0.0"),
+            (ValueError, {"tolerance": 1.0}, "force law 'law' tolerance: got 1.0"),
+            (ValueError, {"tolerance": 1e-9}, "force law 'law' tolerance: got 1e-09, which needs more"),
+            (TypeError, {"tolerance": "fine"}, "force law 'law' tolerance: got 'fine'"),
+            (TypeError, {"segments": 2.5}, "force law 'law' segments: got 2.5"),
+            (ValueError, {"segments": 1}, "force law 'law' segments: got 1"),
+            (TypeError, {"segments": 4, "span": None}, "force law 'law' span: got None"),
+            (ValueError, {"segments": 4, "span": (1.0, 1.0)}, "force law 'law' span: got (1.0, 1.0)"),
+            (ValueError, {"segments": 4, "span": (0.0, math.inf)}, "force law 'law' span: got (0.0, inf)"),
+            (TypeError, {"segments": 4, "name": ""}, "force law name: got ''"),
+            (ValueError, {"segments": 4, "law": lambda q: 0 * q}, "force law 'law' law: got a constant force"),
+            (ValueError, {"segments": 4, "law": np.log}, "force law 'law' law: gives no"),
+            (TypeError, {"segments": 4, "law": lambda q: "stiff"}, "force law 'law' law: fails"),
+            (TypeError, {"law": 3.0, "span": None}, "force law 'law' law: got float"),
+            (ValueError, {"law": ([0, 1], [0, 1])}, "force law 'law' span: got (-1, 1) for a table"),
+            (ValueError, {"law": ([0, 1, 1], [0, 1, 2]), "span": None}, "force law 'law' law: got a table"),
+            (ValueError, {"law": ([0, 1], [0, math.nan]), "span": None}, "force law 'law' law: got a table"),
+            (ValueError, {"law": ([0, 1], [0, 1, 2]), "span": None}, "force law 'law' law: got shapes"),
+        ],
+    )
+    @pytest.mark.filterwarnings("ignore::RuntimeWarning")
+    def test_refuse(self, refused, kind, given, begins):
+        refused(kind, begins, mp.ForceLaw, **{"at": "m0", "law": hardening, "span": (-1, 1)} | given)
+
+
+class TestModel:
+    def test_a_table_of_two_lines_is_a_compliant_contact(self):
+        stop = mp.UnilateralContact("stop", "m2", 0.3, 50.0)
+        table = mp.ForceLaw("m2", ([-1, -0.3, 2], [-35, 0, 0]))
+        expected, found = (mp.simulate(model(c), 20.0, displacement=START) for c in (stop, table))
+        assert_allclose(found.displacement(T), expected.displacement(T), rtol=0, atol=1e-13)
+        assert [e.time for e in found.events] == pytest.approx([e.time for e in expected.events], rel=1e-13)
+        assert found.stats.levels_possible == expected.stats.levels_possible == 2
+        (spring,) = found.model.contacts
+        assert (spring.gap, spring.stiffness) == (0.3, 50.0)
+
+    def test_two_slopes_have_their_own_periods(self):
+        one = mp.MultiPhiModel(
+            mp.LinearStructure([[1.0]], [[1.0]], points={"m0": 0}), [mp.ForceLaw("m0", ([-2, 0, 2], [-6, 0, 16]))]
+        )
+        trajectory = mp.simulate(replace(one, modes="all"), 10.0, velocity=np.array([3.0]))
+        times = [e.time for e in trajectory.events]
+        assert_allclose(np.unique(np.round(np.diff(times), 12)), [0, np.pi / 3, np.pi / 2], atol=1e-12)
+        assert_allclose(np.max(trajectory.at("m0", np.linspace(0, 1, 2001))), 1.0, atol=1e-6)
+        assert trajectory.status == "ok"
+
+    def test_keeps_its_laws_when_it_is_given_other_modes(self):
+        first, second = law(magnet, name="a"), law(hardening, at="m1", name="b")
+        m = model(first, mp.UnilateralContact("stop", "m0", 0.5), second)
+        few = replace(m, modes=1)
+        assert few.force_laws == m.force_laws == (first, second)
+        assert few.contacts == m.contacts
+        assert all(isinstance(c, LawSpring) for c in m.contacts if c.name != "stop")
+        assert m.levels_possible == 2 * first.levels * second.levels == 2 * 32 * 32
+        assert few.level(()).modes == 1
+
+    @pytest.mark.parametrize("slope", [-0.2, -0.5, -3.0, 0.7, 0.0])
+    def test_levels_of_signed_slopes_are_those_of_the_dense_matrix(self, slope):
+        structure = chain(5)
+        m = mp.MultiPhiModel(structure, [mp.ForceLaw("m4", ([-2, 0, 1, 2], [-4, 0, 2, 2 + slope]))], modes="all")
+        level = m.level(tuple(c.name for c in m.contacts if c.side > 0))
+        dense = np.array(structure.stiffness)
+        dense[4, 4] += slope
+        assert_allclose(level.squares, np.linalg.eigvalsh(dense), rtol=1e-12, atol=1e-14)
+        assert_allclose(level.shapes.T @ dense @ level.shapes, np.diag(level.squares), atol=1e-13)
+        assert np.sum(level.frequencies < 0) == (slope < -0.2)
+
+    def test_beam_levels_of_negative_slope_keep_the_low_frequencies(self):
+        structure = mp.planar_beam(rig_beam(), elements=20)
+        bent = mp.MultiPhiModel(structure, modes="all").static_equilibrium({"node3": 1.0})
+        stiff = 1 / float(structure.row("node3") @ bent)
+        slopes = np.array([-0.9, -3.0]) * stiff
+        for slope in slopes:
+            m = mp.MultiPhiModel(structure, [mp.ForceLaw("node3", ([0, 1], [0, slope]))], modes="all")
+            level = m.level(tuple(c.name for c in m.contacts if c.side > 0))
+            w = m.base.modes.shapes.T @ structure.row("node3")
+            own = level.squares[:3]  # roots of the secular equation 1 + k sum w^2 / (Omega^2 - omega^2) = 0
+            residual = 1 + slope * np.sum(w**2 / (m.base.modes.omega**2 - own[:, None]), axis=1)
+            scale = np.abs(slope) * np.sum(w**2 / np.abs(m.base.modes.omega**2 - own[:, None]), axis=1)
+            assert_allclose(residual / scale, 0, atol=1e-10)
+            assert (own[0] < 0) == (slope < -stiff)
+
+    def test_a_slope_that_cancels_a_stiffness_exactly_leaves_a_mode_that_drifts(self):
+        structure = mp.LinearStructure([[2.0]], [[8.0]], points={"m0": 0})
+        m = mp.MultiPhiModel(structure, [mp.ForceLaw("m0", ([-1, 0, 1], [8, 0, -8]))], modes="all")
+        trajectory = mp.simulate(m, 3.0, velocity=np.array([0.4]), loads=[mp.ConstantLoad("m0", 1.0)])
+        assert_allclose(trajectory.at("m0", T[:60]), 0.4 * T[:60] + 0.25 * T[:60] ** 2, atol=1e-12)
+        assert abs(trajectory.ledger.residual) < 1e-12
+
+
+class TestMotion:
+    @pytest.mark.parametrize("name", LAWS)
+    def test_follows_the_true_law_with_order_two(self, name):
+        function, start = LAWS[name]
+        row = np.array([0.0, 0.0, 1.0])
+        true = with_forces(chain(3), T, lambda t, x, v: -row * function(row @ x), start)
+        errors = []
+        for segments in (32, 128):
+            run = mp.simulate(model(law(function, segments=segments)), 10.0, displacement=start)
+            assert run.status == "ok"
+            assert np.ptp(run.energy(T)) < 1e-9 * np.max(np.abs(run.energy(T)))
+            assert abs(run.ledger.residual) < 1e-12
+            errors.append(relative(run.displacement(T), true))
+        assert np.log2(errors[0] / errors[1]) / 2 > 1.8
+        assert errors[1] < 1.2e-3
+
+    def test_follows_it_with_order_two_at_the_tip_of_a_beam(self):
+        structure = mp.planar_beam(rig_beam(), elements=6)
+        linear = mp.MultiPhiModel(structure, modes=5)
+        bent = linear.static_equilibrium({"node3": 1.0})
+        stiffness = 1 / float(structure.row("node3") @ bent)
+        level, times = linear.level(()), np.linspace(0, 0.2, 101)
+        row = level.shapes.T @ structure.row("node3")
+        modal = mp.LinearStructure(np.eye(5), np.diag(level.squares), points={"tip": row})
+        start = level.shapes.T @ structure.mass @ (bent * 0.02 * stiffness)
+
+        def function(q):
+            return stiffness * (5 * q + 10 * q * (q / 0.02) ** 2)
+
+        true = with_forces(modal, times, lambda t, x, v: -row * function(row @ x), start, rtol=1e-11)
+        errors, whole = [], []
+        for segments in (16, 64):
+            bending = {"segments": segments, "span": (-0.025, 0.025)}
+            reduced = mp.MultiPhiModel(modal, [law(function, "tip", **bending)], modes="all")
+            errors.append(relative(mp.simulate(reduced, 0.2, displacement=start).at("tip", times), row @ true))
+            beam = mp.MultiPhiModel(structure, [law(function, "node3", **bending)], modes=5)
+            run = mp.simulate(beam, 0.2, displacement=0.02 * stiffness * bent)
+            whole.append(relative(run.at("node3", times), row @ true))
+            assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial
+            lost = run.ledger.truncation_kinetic + run.ledger.truncation_strain
+            assert abs(lost) < 1e-4 * run.ledger.initial
+        assert np.log2(errors[0] / errors[1]) / 2 > 1.8
+        assert errors[1] < 0.01
+        assert whole[1] < 0.01
+
+    def test_several_laws_and_contacts_under_a_harmonic_load(self):
+        start = np.array([0.2, 0.6, 0.9, 1.4])
+        between = np.array([-1.0, 0.0, 1.0, 0.0])
+        buffer, harmonic = mp.UnilateralContact("buffer", "m1", 0.2, 30.0), mp.HarmonicLoad("m0", 0.3, 0.2)
+        times = np.linspace(0, 6, 121)
+
+        def force(t, x, v):
+            total = -between * magnet(between @ x)
+            total[3] -= two_wells(x[3])
+            total[1] += 30 * max(0.0, -x[1] - 0.2)
+            total[0] += 0.3 * np.cos(2 * np.pi * 0.2 * t)
+            return total
+
+        true = with_forces(chain(4), times, force, start, rtol=1e-10)
+        errors = []
+        for segments in (32, 128):
+            laws = [
+                law(two_wells, "m3", segments=segments, name="a"),
+                law(magnet, {"m2": 1.0, "m0": -1.0}, segments=segments, name="b"),
+            ]
+            run = mp.simulate(model(laws[0], buffer, laws[1], n=4), 6.0, displacement=start, loads=[harmonic])
+            assert run.status == "ok"
+            assert abs(run.ledger.residual) < 1e-9
+            errors.append(relative(run.displacement(times), true))
+        assert np.log2(errors[0] / errors[1]) / 2 > 1.8
+        assert errors[1] < 2e-3
+
+    def test_a_free_structure_is_held_by_its_law(self):
+        row = np.array([0.0, 0.0, 1.0])
+        true = with_forces(chain(3, ends=0), T, lambda t, x, v: -row * hardening(row @ x), START)
+        run = mp.simulate(model(law(hardening, segments=96), ends=0), 10.0, displacement=START)
+        assert relative(run.displacement(T), true) < 6e-3
+        assert np.ptp(run.energy(T)) < 1e-11 * run.ledger.initial
+
+    def test_the_exchange_at_the_centre_is_one_instant(self):
+        run = mp.simulate(model(law(hardening)), 30.0, displacement=START)
+        centre = [e for e in run.events if e.contact in ("law+1", "law-1")]
+        crossings = [e.time for e in centre if e.contact == "law+1"]
+        assert len(crossings) > 5
+        assert crossings == [e.time for e in centre if e.contact == "law-1"]
+        assert run.stats.transitions == len(run.events) - len(crossings)
+        assert np.max(np.abs(run.at("m2", np.array(crossings)))) < 1e-13
+
+    def test_keeps_its_energy_over_five_thousand_events(self):
+        stiff = chain(1, stiffness=100.0)
+        m = mp.MultiPhiModel(stiff, [law(lambda q: 100 * hardening(q), "m0", segments=64)], modes="all")
+        run = mp.simulate(m, 17.0, displacement=[1.5])
+        assert len(run.events) > 5000
+        energy = run.energy(np.array([0.0, run.t_end]))
+        assert abs(energy[1] / energy[0] - 1) < 1e-10
+
+    def test_looks_at_the_ends_of_its_chains_only(self):
+        run = mp.simulate(model(law(hardening, segments=200)), 5.0, displacement=START)
+        ((_, rule),) = run.model.rules.items()
+        for segment in run.segments:
+            closed = segment.level.level.indices
+            assert len(rule.ends(closed)) <= 3
+        few = mp.simulate(model(law(hardening, segments=20)), 5.0, displacement=START)
+        each = [r.stats.function_evaluations / r.stats.events for r in (few, run)]
+        assert each[1] < 1.2 * each[0]
+
+    def test_growth_without_end_is_a_status(self):
+        run = mp.simulate(model(mp.ForceLaw("m2", ([-1, 0, 1], [9, 0, -9]))), 1e4, displacement=1e-3 * START)
+        assert run.status == "failed"
+        assert "not finite" in run.message
+
+    def test_an_early_event_of_a_growing_motion_is_found_whatever_the_horizon(self):
+        m = model(mp.ForceLaw("m2", ([-1, 0, 1, 2], [9, 0, -9, 60])))
+        short, long = (mp.simulate(m, end, displacement=1e-3 * START) for end in (3.0, 300.0))
+        assert np.min(m.level(("law+1",)).squares) < -4
+        assert long.status == "ok"
+        assert short.events[0].time == pytest.approx(long.events[0].time, rel=1e-13)
+        assert abs(long.ledger.residual) < 1e-9
+
+    def test_beside_a_rigid_stop_that_moves_the_work_of_its_constant_force_is_known(self):
+        m = model(law(magnet, segments=16), mp.UnilateralContact("stop", "m0", 0.1))
+        moving = mp.StopMotion("stop", mp.Smooth(lambda t: 0.15 * (1 - np.cos(2 * t)), 1e-10))
+        run = mp.simulate(m, 8.0, displacement=START, loads=[moving])
+        assert run.status == "ok"
+        assert sum(end - start for start, end in run.contact_intervals("stop")) > 0.5
+        assert abs(run.ledger.residual) < 1e-9
+
+    def test_refuses_the_compiled_loop_and_moving_springs(self, refused):
+        m = model(law(hardening, segments=4))
+        with pytest.raises(MultiPhiError, match="compiled: got True with force laws"):
+            mp.simulate(m, 1.0, compiled=True)
+        moving = mp.StopMotion("law+1", mp.Smooth(lambda t: 0.1 * t, 1e-6))
+        refused(TypeError, "stop motion of 'law+1'", mp.simulate, m, 1.0, loads=[moving])
+
+
+class TestEquilibrium:
+    def test_balances_structure_law_and_load(self):
+        m = model(law(hardening, segments=200))
+        x = m.static_equilibrium({"m2": 3.0})
+        (own,) = m.force_laws
+        assert_allclose(m.structure.stiffness @ x, [0, 0, 3.0 - float(own.force(x[2]))], atol=1e-13)
+        assert x[2] > 0.8
+
+    @pytest.mark.parametrize("force", [-3.0, 0.0, 1.0, 3.0])
+    def test_a_run_from_it_stays_there_with_contacts_and_preload(self, force):
+        contacts = [
+            law(hardening, segments=20),
+            mp.UnilateralContact("rigid", {"m1": -1.0}, 0.2),
+            mp.UnilateralContact("pushed in", {"m0": -1.0}, -0.05),
+            law(lambda q: 2 * (q + 0.3), "m1", segments=4, name="off centre"),
+        ]
+        m = model(*contacts)
+        x = m.static_equilibrium({"m2": force})
+        run = mp.simulate(m, 5.0, displacement=x, loads=[mp.ConstantLoad("m2", force)])
+        assert np.max(np.abs(run.displacement(T[:100]).T - x)) < 1e-13
+
+    def test_is_that_of_a_compliant_contact_for_a_table_of_two_lines(self):
+        stop, table = mp.UnilateralContact("stop", "m2", 0.3, 50.0), mp.ForceLaw("m2", ([-1, -0.3, 2], [-35, 0, 0]))
+        expected, found = (model(c).static_equilibrium({"m1": -2.0}) for c in (stop, table))
+        assert_allclose(found, expected, rtol=1e-13)
+
+    def test_of_a_weak_magnet_is_found_and_of_a_strong_one_refused(self):
+        weak = model(law(lambda q: -0.2 / (2 - q) ** 2, segments=200, span=(-1.9, 1.9)))
+        x = weak.static_equilibrium({})
+        assert x[2] / 3 == pytest.approx(0.2 / (2 - x[2]) ** 2, rel=1e-3)
+        strong = model(law(lambda q: -0.5 / (2 - q) ** 2, segments=200, span=(-1.9, 1.9)))
+        with pytest.raises(mp.NumericalFailure, match="the structure snaps through"):
+            strong.static_equilibrium({})

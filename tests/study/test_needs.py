@@ -1,0 +1,45 @@
+"""What a scene does not need is left out: levels, coordinates, packages and memory of every shipped scene's run."""
+
+import pytest
+from small_scene import BEAM, changed, write
+
+from multiphi_exudyn import cli
+from multiphi_exudyn.study.running.needs import needs_of
+from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+
+LEVELS = {"beam-chain": 8, "bed-of-stops": 189, "two-sided-stop": 3}  # built by the run of a scene; two for all others
+POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4}
+MEMORY = {"beam-chain": 5e6, "bed-of-stops": 70e6}  # bytes at most; 2 MB for all others
+MOST_MODULES = 70  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_scenes() if "hole" not in name])
+def test_a_shipped_scene_takes_what_it_visits(name):
+    needs = needs_of(load_scene(name))
+    assert needs.status == "ok"
+    assert needs.levels_built == LEVELS.get(name, 2)
+    assert needs.levels_possible == POSSIBLE.get(name, 2)
+    assert needs.dofs_carried <= 0.2 * needs.dofs_given
+    assert needs.packages == ("numpy", "scipy", "threadpoolctl")  # the last one by scipy; neither exudyn nor matplotlib
+    assert 10 < needs.modules <= MOST_MODULES
+    assert 0 < needs.memory <= MEMORY.get(name, 2e6)
+
+
+def test_a_contact_that_is_never_reached_costs_no_level(tmp_path):
+    far = changed(("contacts", 0, "gap"), 10.0)
+    needs = needs_of(load_scene(write(tmp_path / "far.toml", far)))
+    assert (needs.levels_built, needs.levels_possible) == (1, 2)
+
+
+def test_the_command_prints_a_line_for_every_scene(tmp_path, capsys):
+    assert cli.main(["needs", write(tmp_path / "small.toml", BEAM)]) == 0
+    heads, line = capsys.readouterr().out.splitlines()
+    assert heads.split()[:3] == ["scene", "model", "levels"]
+    assert "2 of 2" in line
+    assert line.split()[-3:] == ["numpy,", "scipy,", "threadpoolctl"]
+
+
+def test_a_scene_without_a_reduced_model_is_refused(tmp_path, capsys):
+    models = [{"kind": "full", "name": "all", "elements": 4, "step": 1e-4}]
+    assert cli.main(["needs", write(tmp_path / "full.toml", changed(("models",), models))]) == 2
+    assert "need one" in capsys.readouterr().err

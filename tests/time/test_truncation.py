@@ -1,0 +1,172 @@
+"""Truncation: the indicator sees what levels could not hold, and a tolerance turns into numbers of modes."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+from small_structures import chain, stop
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.time.defects import defects
+from multiphi_exudyn.time.truncation import adapted
+from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
+
+END = 0.3
+
+
+@functools.cache
+def rig(stiffness):
+    """The rig with all modes, its start, and its answer at node2 and node3."""
+    structure = mp.planar_beam(rig_beam(), elements=57, damping=rig_damping())
+    model = mp.MultiPhiModel(structure, [rig_contact(stiffness)], modes="all")
+    bent = model.static_equilibrium({"node3": 1.0})
+    start = bent * initial_displacement() / float(structure.row("node3") @ bent)
+    return model, start, histories(mp.simulate(model, END, displacement=start))
+
+
+def histories(trajectory):
+    times = np.linspace(0, END, 1501)
+    return np.array([trajectory.at(point, times) for point in ("node2", "node3")])
+
+
+def error(trajectory, answer):
+    return np.max(np.linalg.norm(histories(trajectory) - answer, axis=1) / np.linalg.norm(answer, axis=1))
+
+
+def test_the_indicator_ranks_truncated_answers_and_is_near_their_error():
+    model, start, answer = rig(1e6)
+    found = []
+    for modes in (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24):
+        run = mp.simulate(dataclasses.replace(model, modes=modes), END, displacement=start)
+        found.append((mp.truncation_indicator(run), error(run, answer)))
+    indicated, true = np.array(found).T
+    assert spearmanr(indicated, true)[0] > 0.95
+    assert np.all(indicated > true)
+    assert np.all(indicated[true > 1e-5] < 6 * true[true > 1e-5])
+
+
+@pytest.mark.parametrize("stiffness", [1e4, math.inf])
+def test_nothing_is_indicated_where_no_mode_is_left_out(stiffness):
+    """Not even at impacts: what Moreau's law takes out is no truncation."""
+    structure = chain(4)
+    model = mp.MultiPhiModel(structure, [stop("m1", 0.1, stiffness)], modes="all")
+    run = mp.simulate(model, 40.0, displacement=np.array([0.5, 1.0, 0.3, 0.2]))
+    assert len(run.events) > 5
+    assert mp.truncation_indicator(run) < 1e-8
+
+
+def test_the_first_defect_is_the_static_residual_of_the_start():
+    """One mode of two: the other one's amplitude is the defect."""
+    structure = mp.LinearStructure(np.diag([1.0, 4.0]), np.diag([1.0, 100.0]), points={"a": 0, "b": 1})
+    run = mp.simulate(mp.MultiPhiModel(structure, modes=1), 1.0, displacement=np.array([1.0, 0.25]))
+    (found,) = defects(run)
+    assert (found.time, found.closed) == (0.0, ())
+    assert found.size == pytest.approx(2 * 0.25)  # x sqrt(m)
+
+
+def test_a_lost_velocity_counts_as_the_displacement_it_would_become():
+    structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 100.0]), points={"a": 0, "b": 1})
+    run = mp.simulate(
+        mp.MultiPhiModel(structure, modes=1), 1.0, displacement=np.array([1.0, 0]), velocity=np.array([0, 3.0])
+    )
+    assert defects(run)[0].size == pytest.approx(0.3)
+
+
+def test_the_indicator_of_a_shorter_time_knows_only_the_defects_until_then():
+    model, start, _ = rig(1e6)
+    run = mp.simulate(dataclasses.replace(model, modes=6), END, displacement=start)
+    assert mp.truncation_indicator(run, 0.05) < 1e-3 < mp.truncation_indicator(run)
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.02, 0.003, 1e-4])
+def test_a_tolerance_is_kept(tolerance):
+    model, start, answer = rig(1e6)
+    run = mp.simulate(dataclasses.replace(model, modes=mp.Tolerance(tolerance)), END, displacement=start)
+    assert (run.status, run.message) == ("ok", "")
+    assert mp.truncation_indicator(run) <= tolerance
+    assert error(run, answer) <= tolerance
+    assert isinstance(run.model.modes, mp.UpTo)
+
+
+def test_a_smaller_tolerance_takes_more_modes_and_no_more_than_needed():
+    model, start, _ = rig(1e6)
+    taken = [
+        mp.simulate(dataclasses.replace(model, modes=mp.Tolerance(tolerance)), END, displacement=start)
+        for tolerance in (0.1, 0.01, 1e-3)
+    ]
+    modes = [run.model.level(()).modes for run in taken]
+    assert sorted(set(modes)) == modes
+    assert modes[-1] < 20
+
+
+def test_a_tolerance_out_of_reach_is_said_and_the_answer_has_all_modes_allowed():
+    model, start, _ = rig(math.inf)
+    run = mp.simulate(dataclasses.replace(model, modes=mp.Tolerance(0.01, most=8)), END, displacement=start)
+    assert run.status == "ok"
+    assert run.model.level(()).modes == 8
+    (told,) = (sentence for sentence in run.warnings if sentence.startswith("truncation: the indicator is 0."))
+    assert "with 8 modes, the tolerance 0.01" in told
+
+
+def test_a_failed_run_is_returned_as_it_is():
+    model = mp.MultiPhiModel(chain(4), [stop(gap=0.1)], modes=mp.Tolerance(0.5))
+
+    def fails(chosen):
+        return dataclasses.replace(mp.simulate(chosen, 1.0, displacement=np.ones(4)), status="failed", message="cause")
+
+    run = adapted(model, fails)
+    assert (run.status, run.message) == ("failed", "cause")
+    assert run.model.level(()).modes == 3
+
+
+def test_modes_up_to_a_frequency():
+    contacts = [stop("m7", 0.05, 50.0), stop("m3", 0.5, name="other")]
+    model = mp.MultiPhiModel(chain(8), contacts, modes=mp.UpTo(0.15))
+    every = dataclasses.replace(model, modes="all")
+    for closed in ((), ("stop",), ("other",), ("stop", "other")):
+        kept, all_of_it = model.level(closed).frequencies, every.level(closed).frequencies
+        assert np.array_equal(kept, all_of_it[all_of_it <= 0.15])
+    run = mp.simulate(model, 30.0, displacement=np.linspace(0, 1, 8))
+    assert run.status == "ok"
+    assert abs(run.ledger.residual) < 1e-12
+
+
+def test_at_least_one_mode_and_not_more_than_said():
+    assert mp.MultiPhiModel(chain(4), modes=mp.UpTo(1e-9)).level(()).modes == 1
+    assert mp.MultiPhiModel(chain(4), modes=mp.UpTo(1e9)).level(()).modes == 4
+    assert mp.MultiPhiModel(chain(4), modes=mp.UpTo(1e9, most=2)).level(()).modes == 2
+
+
+@pytest.mark.parametrize("kind", [mp.Tolerance, mp.UpTo])
+@pytest.mark.parametrize("given", [(0.0,), (-1.0,), (math.nan,), (math.inf,), (0.1, 0)])
+def test_a_limit_needs_positive_numbers(kind, given):
+    with pytest.raises(mp.MultiPhiValueError, match=f"{kind.__name__}: got"):
+        kind(*given)
+
+
+@pytest.mark.parametrize("kind", [mp.Tolerance, mp.UpTo])
+@pytest.mark.parametrize("given", [("small",), (True,), (0.1, 2.5), (0.1, None)])
+def test_a_limit_needs_numbers(kind, given):
+    with pytest.raises(mp.MultiPhiTypeError, match=f"{kind.__name__}: got"):
+        kind(*given)
+
+
+def test_no_motion_has_no_error():
+    model = mp.MultiPhiModel(chain(4), [stop()], modes=mp.Tolerance(0.01))
+    run = mp.simulate(model, 1.0)
+    assert mp.truncation_indicator(run) == 0.0
+    pushed = mp.MultiPhiModel(chain(4), modes=1)
+    assert mp.truncation_indicator(mp.simulate(pushed, 1.0, velocity=np.eye(4)[1]), 0.0) == math.inf
+
+
+def test_a_tolerance_keeps_the_rigid_body_modes():
+    free = mp.MultiPhiModel(chain(4, ends=0), [stop()], modes=mp.Tolerance(1.5, most=3))
+    run = mp.simulate(free, 2.0, displacement=np.ones(4), velocity=-np.ones(4))
+    assert run.status == "ok"
+    assert run.model.level(()).modes >= 2
+    single = mp.LinearStructure([[1.0]], [[0.0]], points={"m0": 0})
+    falling = mp.simulate(mp.MultiPhiModel(single, modes=mp.Tolerance(0.1)), 1.0, velocity=np.array([1.0]))
+    assert falling.at("m0", 1.0) == pytest.approx(1.0)

@@ -1,0 +1,153 @@
+"""Loads as users bring them: steps, ramps, pulses, resonance, many samples; against an integrator, in bounded work."""
+
+import math
+
+import numpy as np
+import pytest
+from integrated import integrated
+from small_structures import chain
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.time import reliability
+from multiphi_exudyn.time.driven.excitation import MOST_EFFORT
+
+TIMES = np.linspace(0.0, 2.0, 81)
+STOPS = (mp.UnilateralContact("below", "m2", 0.02, 500.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.03, 300.0))
+
+
+def structure():
+    return chain(3, damping=np.diag([0.3, 0.1, 0.2]), stiffness=200.0)
+
+
+FUNCTIONS = {
+    "step down": (lambda t: 5 if t < 0.1 else 0, (0.1,)),
+    "step up": (lambda t: 0 if t <= 0.7 else -5.0, (0.7,)),
+    "ramp": (lambda t: 5 * min(t / 0.3, 1.0), (0.3,)),
+    "half sine": (lambda t: 30 * math.sin(math.pi * t / 0.02) if t < 0.02 else 0.0, (0.02,)),
+    "rectified": (lambda t: 4 * np.abs(np.sin(9 * t)), np.arange(1, 6) * math.pi / 9),
+    "where": (lambda t: np.where(t < 0.4, 3 * np.sin(40 * t), np.where(t < 1.1, -2.0, 4.0)), (0.4, 1.1)),
+    "pulse": (lambda t: 30 * np.exp(-(((t - 0.777) / 1e-2) ** 2)), ()),
+    "constant": (lambda t: 3.0, ()),
+    "resonant": (lambda t: 12 * np.cos(RESONANCE * t), ()),
+    "nearly resonant": (lambda t: 12 * np.cos(RESONANCE * (1 + 1e-9) * t), ()),
+}
+RESONANCE = float(mp.MultiPhiModel(structure(), [], modes="all").level(()).omega[1])
+
+
+@pytest.mark.parametrize("contacts", [(), STOPS], ids=["free", "stops"])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_function_of_time_gives_the_motion_of_an_integrator(name, contacts):
+    function, breaks = FUNCTIONS[name]
+    run = mp.simulate(
+        mp.MultiPhiModel(structure(), contacts, modes="all"), 2.0, loads=[mp.FunctionLoad("m1", function)]
+    )
+
+    def force(t):
+        return np.array([0.0, float(function(t)), 0.0])
+
+    expected, events = integrated(structure(), TIMES, force, contacts=contacts, breaks=breaks, longest=0.02)
+    assert run.status == "ok"
+    assert np.max(np.abs(run.displacement(TIMES) - expected)) < 2e-9 * np.max(np.abs(expected))
+    assert [event.time for event in run.events] == pytest.approx(events, abs=1e-9)
+    assert len(events) >= 2 or not contacts
+    assert abs(run.ledger.residual) < 1e-10 * max(run.ledger.work_of_loads, run.ledger.final)
+
+
+def test_no_load_at_all_moves_nothing():
+    run = mp.simulate(
+        mp.MultiPhiModel(structure(), STOPS, modes="all"), 2.0, loads=[mp.FunctionLoad("m1", np.zeros_like)]
+    )
+    assert run.status == "ok"
+    assert not np.any(run.displacement(TIMES))
+
+
+def test_a_narrow_pulse_gives_its_impulse():
+    load = mp.FunctionLoad("m1", lambda t: np.exp(-(((t - 0.777) / 3e-5) ** 2)))
+    run = mp.simulate(mp.MultiPhiModel(structure(), modes="all"), 2.0, loads=[load])
+    gained = run.velocity(0.7773) - run.velocity(0.7767)
+    assert gained[1] == pytest.approx(3e-5 * math.sqrt(math.pi), rel=1e-3)
+
+
+class TestMotionsThatJump:
+    KINK = mp.Smooth(lambda t: np.abs(t - 0.5))  # at an end of the first pieces
+    JUMP = mp.Smooth(lambda t: 0.01 if t < 0.3 else 0.0)
+    BENT = mp.Smooth(lambda t: np.where(t < 0.3, 0, 0.1 * (t - 0.3) ** 2))
+
+    def run(self, load, stiffness=math.inf, damping=0.0):
+        stop = mp.UnilateralContact("stop", "m2", 0.5, stiffness, damping)
+        return mp.simulate(mp.MultiPhiModel(structure(), [stop], modes="all"), 2.0, loads=[load])
+
+    @pytest.mark.parametrize(
+        ("course", "given", "what"),
+        [
+            (KINK, {}, "speed jumps at t = 0.5 s"),
+            (JUMP, {}, "position jumps at t = 0.3 s"),
+            (JUMP, {"stiffness": 100.0, "damping": 3.0}, "position jumps at t = 0.3 s"),
+        ],
+    )
+    def test_of_a_stop_that_cannot_follow_are_refused_by_name(self, course, given, what, refused):
+        load = mp.StopMotion("stop", course)
+        begins = f"loads[0] (StopMotion at 'stop'): got a motion of the stop of 'stop' whose {what}"
+        refused(ValueError, begins, self.run, load, **given)
+
+    @pytest.mark.parametrize(("course", "what"), [(KINK, "speed"), (JUMP, "position")])
+    def test_of_a_base_are_refused(self, course, what, refused):
+        begins = f"loads[0] (BaseMotion): got a motion of the base whose {what} jumps"
+        refused(ValueError, begins, self.run, mp.BaseMotion(np.ones(3), course))
+
+    @pytest.mark.parametrize(
+        ("course", "given"),
+        [
+            (BENT, {}),
+            (KINK, {"stiffness": 100.0}),
+            (JUMP, {"stiffness": 100.0}),
+            (KINK, {"stiffness": 9.0, "damping": 3.0}),
+        ],
+    )
+    def test_that_a_stop_can_follow_run(self, course, given):
+        run = self.run(mp.StopMotion("stop", course), **given)
+        assert run.status == "ok"
+
+
+def test_errors_of_a_function_name_the_load(refused):
+    model = mp.MultiPhiModel(structure(), modes="all")
+    loads = [mp.ConstantLoad("m0", 1.0), mp.FunctionLoad("m1", lambda t: math.sqrt(t - 1))]
+    refused(
+        ValueError, "loads[1] (FunctionLoad at 'm1'): function: got ValueError", mp.simulate, model, 2.0, loads=loads
+    )
+
+
+class TestManyPieces:
+    def test_samples_on_straight_lines_are_one_piece_each(self):
+        time = np.linspace(0.0, 1.0, 20_001)
+        force = np.interp(time, [0.0, 0.25, 0.5, 1.0], [0.0, 3.0, 0.0, 0.0])
+        history = mp.Sampled(time, force).history(1.0)
+        assert history.pieces <= 6
+        assert np.max(np.abs(history.at(time[:-1]) - force[:-1])) <= 1e-15 * 3
+
+    def test_slopes_that_change_little_by_little_are_not_taken_for_one_line(self):
+        time = np.linspace(0.0, 1.0, 2001)
+        force = time + 1e-10 * time**2
+        assert np.max(np.abs(mp.Sampled(time, force).history(1.0).at(time[:-1]) - force[:-1])) <= 2e-15
+
+    def test_more_than_a_run_can_take_are_refused_with_their_number_before_it_begins(self, refused):
+        time = np.linspace(0.0, 1.0, MOST_EFFORT + 2)
+        load = mp.SampledLoad("m0", time, np.random.default_rng(0).normal(size=len(time)))
+        model = mp.MultiPhiModel(chain(1), modes="all")
+        begins = f"loads: got {MOST_EFFORT + 1} pieces in 1 s, need at most {MOST_EFFORT}"
+        refused(ValueError, begins, mp.simulate, model, 1.0, loads=[load])
+
+    def test_a_sweep_over_many_decades_is_bounded_before_it_begins(self, refused):
+        load = mp.SweepLoad("m0", 1.0, 1.0, 1e9, 100.0)
+        model = mp.MultiPhiModel(chain(1), modes="all")
+        refused(ValueError, "loads: got 262144 pieces", mp.simulate, model, 100.0, loads=[load])
+
+    def test_many_are_told(self, monkeypatch):
+        monkeypatch.setattr(reliability, "MANY_PIECES", 100)
+        load = mp.SampledLoad("m0", np.linspace(0.0, 1.0, 201), np.random.default_rng(0).normal(size=201))
+        model = mp.MultiPhiModel(chain(1), modes="all")
+        with pytest.warns(mp.MultiPhiWarning, match="load pieces: the loads have 200 pieces in 1 s, some 0.5 ms"):
+            run = mp.simulate(model, 1.0, loads=[load])
+        assert [sentence.split(":")[0] for sentence in run.warnings] == ["load pieces"]
+        few = mp.SampledLoad("m0", load.time[:50], load.force[:50])
+        assert mp.simulate(model, 1.0, loads=[few]).warnings == ()
