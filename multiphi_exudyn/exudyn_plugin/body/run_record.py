@@ -22,9 +22,12 @@ class RunRecord:
 
     def see(self, state: State, lost: float = 0.0) -> None:
         """Count a state among those of the run; lost: energy [J] that it had before besides."""
-        self._levels.setdefault(state.closed, state.level.level)
-        energy = state.kinetic + float(state.level.strain(state.displacement))
-        self._energy = max(self._energy, energy + lost)
+        self.include(state.level.level, state.kinetic + float(state.level.strain(state.displacement)) + lost)
+
+    def include(self, level: Level, energy: float) -> None:
+        """Count a level of the run, and an energy [J] in it."""
+        self._levels.setdefault(level.indices, level)
+        self._energy = max(self._energy, energy)
 
     def of(self, events: Iterable[Event]) -> RunSummary:
         """The summary with what was lost at these events."""
