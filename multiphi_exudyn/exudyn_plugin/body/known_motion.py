@@ -6,6 +6,7 @@ given times and for the events with theirs. A run that fails does so at an insta
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -53,6 +54,11 @@ class Stretch:
     parts: Sequence[Batch]
     starts: np.ndarray
     phases: np.ndarray
+
+    @functools.cached_property
+    def changes(self) -> np.ndarray:
+        """When [s] something was decided, ascending: events, and contacts that were refused."""
+        return np.union1d(self.starts[1:], self.event_times)
 
     def at(self, times: np.ndarray) -> Iterator[Moments]:
         """The states at times (k,) [s], level by level, at an event those after it."""

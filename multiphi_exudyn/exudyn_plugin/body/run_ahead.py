@@ -1,8 +1,8 @@
 """Run ahead: a body on which nothing acts but its own loads, told to Exudyn from a motion that is known beforehand.
 
-A stop is the end of a step in which something happens; of a body whose loads vary, the end of every step. At a stop the
-exact state is written, with the matrices of its level. Before and between stops Exudyn does the steps on its own, and
-all there is to do for the body is to compare the time with ``next_time``.
+A stop is the end of a step in which something happens, be it that a contact is refused; of a body whose loads vary, the
+end of every step. At a stop the exact state is written, with the matrices of its level. Before and between stops Exudyn
+does the steps on its own, and all there is to do for the body is to compare the time with ``next_time``.
 
 Stops are planned many steps ahead, for steps of the length that the run has. One that is met at another time is planned
 again, so steps of any length are right. At every stop Exudyn's coordinates are compared with what its steps make of the
@@ -31,6 +31,7 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
 __all__ = ["KnownBody", "RunAhead"]
 
+SAME_TIME = 1e-12  # relative: what adding up thousands of steps leaves of a time
 STEPS_AHEAD = 4096  # planned at once, of which few are stops: computed in the time of as many steps of Exudyn
 ROWS_AHEAD = 256  # planned at once where every step is a stop
 CHANGED = 1e-6  # of the largest coordinate: more than Newton's iterations leave, less than anybody means to change
@@ -65,13 +66,13 @@ class KnownBody(Protocol):
 
 @dataclass(frozen=True)
 class _Stops:
-    """k stops. due: from when on [s] they are. times: where [s] the steps end. told: how many events of the stretch
+    """k stops. due: from when on [s] they are. times: where [s] the steps end. done: how many changes of the stretch
     have then happened. levels: at them. rows (k, 3, s): q, q', q''. flags: coordinates of the data node.
     """
 
     due: list[float]
     times: list[float]
-    told: list[int]
+    done: list[int]
     levels: list[SteppedLevel]
     rows: np.ndarray
     flags: list[list[float]]
@@ -95,14 +96,15 @@ class RunAhead:
         self._largest = UNSEEN * _way(body.coordinates.stepped)
         self._past = list[Stretch]()
         self._stretch = motion.advance(time)
-        self._place = self._told = 0
+        self._place = self._done = 0
         self._stops = self._planned(np.zeros(0), missed=False)
 
     @property
     def events(self) -> list[Event]:
         """What has happened so far."""
         before = [event for stretch in self._past for event in stretch.events]
-        return before + list(self._stretch.events[: self._told])
+        since = self._stretch.changes[self._done] if self._done < len(self._stretch.changes) else math.inf
+        return before + list(self._stretch.events[: np.searchsorted(self._stretch.event_times, since)])
 
     def summarise(self, record: RunRecord) -> None:
         """Tell a record what has happened so far."""
@@ -127,7 +129,7 @@ class RunAhead:
     def _meets(self, t: float) -> bool:
         """Whether the next stop is the end of the step at t."""
         times = self._stops.times
-        return self._place < len(times) and abs(times[self._place] - t) <= self._rounding
+        return self._place < len(times) and abs(times[self._place] - t) <= SAME_TIME * t
 
     def _write(self, mbs: Any) -> None:
         stops, k, here = self._stops, self._place, self._body.coordinates
@@ -137,7 +139,7 @@ class RunAhead:
         here.write(row)
         here.store(stops.flags[k])
         self._x[: row.size] = row.ravel()
-        self._told, self._place = stops.told[k], k + 1
+        self._done, self._place = stops.done[k], k + 1
 
     def _next(self) -> float:
         if not self._regular or self._body.varies:
@@ -181,12 +183,13 @@ class RunAhead:
             count = 1
         grid = t + self._step * np.arange(count)
         if self._stretch.failure and t >= self._stretch.end:
+            self._done = len(self._stretch.changes)
             raise NumericalFailure(f"body {self._body.name!r}: {self._stretch.failure}")
         missed = False
         if t >= self._stretch.end:
-            missed = self._told < len(self._stretch.event_times)
+            missed = self._done < len(self._stretch.changes)
             self._past.append(self._stretch)
-            self._stretch, self._told = self._motion.advance(max(t, min(float(grid[-1]), self._end))), 0
+            self._stretch, self._done = self._motion.advance(max(t, min(float(grid[-1]), self._end))), 0
         self._stops, self._place = self._planned(grid, missed), 0
 
     def _planned(self, grid: np.ndarray, missed: bool) -> _Stops:
@@ -195,11 +198,11 @@ class RunAhead:
         grid = grid[grid <= stretch.end + self._rounding]
         if stretch.failure:
             grid = grid[grid < stretch.end]
-        coming = stretch.event_times[self._told :]
+        coming = stretch.changes[self._done :]
         coming = coming[coming <= grid[-1] + self._rounding] if len(grid) else coming[:0]
         where = np.minimum(np.searchsorted(grid, coming), len(grid) - 1)
         places = np.arange(len(grid)) if self._body.varies else np.unique(np.append(where, [0] * missed).astype(int))
-        times, told = grid[places], self._told + np.searchsorted(where, places, side="right")
+        times, done = grid[places], self._done + np.searchsorted(where, places, side="right")
         due = times - self._rounding
         happens = np.isin(places, where)
         due[happens] = np.minimum(due[happens], coming[np.searchsorted(where, places[happens])])
@@ -207,7 +210,7 @@ class RunAhead:
         levels, flags, rows = [self._body.coordinates.stepped] * size, [list[float]()] * size, np.empty((size, 3, s))
         for moments in stretch.at(times) if size else ():
             self._take(moments, times, levels, flags, rows)
-        return _Stops(due.tolist(), times.tolist(), told.tolist(), levels, rows, flags)
+        return _Stops(due.tolist(), times.tolist(), done.tolist(), levels, rows, flags)
 
     def _take(
         self,
