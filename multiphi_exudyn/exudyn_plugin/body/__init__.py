@@ -3,6 +3,6 @@
 After every step a certified test says whether a contact can have asked to change; if so, the step is done again
 exactly, from event to event. One function switches the levels of all bodies of a system.
 
-Order: switching, run_record, coordinates, undisturbed_steps, known_motion, run_ahead, certified_step,
-certified_driven_step, exact_step, body, driven_body, sensors, drawing, binding, solving, create.
+Order: switching, run_record, coordinates, undisturbed_steps, known_motion, stops, run_ahead,
+certified_step, certified_driven_step, exact_step, body, driven_body, sensors, drawing, binding, solving, create.
 """

@@ -111,9 +111,8 @@ class MultiPhiBody(ExactStep):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
-        if self._run_ahead is not None:
-            self._run_ahead.summarise(self._record)
-        return warnings_of_body(self.model, self._record.of(self.events))
+        truncated = 0.0 if self._run_ahead is None else self._run_ahead.tell(self._record)
+        return warnings_of_body(self.model, self._record.of(self._motion.events, truncated))
 
     def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
         """The level of closed contacts as the solver has it."""

@@ -40,7 +40,8 @@ class Moments:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A motion up to ``end`` [s]. events: in it, at event_times (k,) [s]. last: the state at its end.
+    """A motion up to ``end`` [s]. last: the state there. events: in it, at event_times (k,) [s], where truncation took
+    the energies truncated (k,) [J].
 
     failure: why nothing is known beyond its end, or "". parts: segments by level and exponentials. starts (n,) [s] and
     phases (n, c), in numbers, of all segments.
@@ -49,6 +50,7 @@ class Stretch:
     end: float
     events: Sequence[Event]
     event_times: np.ndarray
+    truncated: np.ndarray
     last: State
     failure: str
     parts: Sequence[Batch]
@@ -101,9 +103,9 @@ class KnownMotion:
         starts = np.empty(len(trajectory.segments))
         for part in parts:
             starts[part.places] = part.starts
-        times = event_table(events, motion.model.index)[:, 0]
-        given = parts, starts, _phases(motion)
-        return Stretch(motion.time, events, times, motion.state, motion.message, *given)
+        times, _, _, truncated = event_table(events, motion.model.index).T
+        given = motion.state, motion.message, parts, starts, _phases(motion)
+        return Stretch(motion.time, events, times, truncated, *given)
 
 
 def _phases(motion: Motion) -> np.ndarray:
@@ -113,7 +115,7 @@ def _phases(motion: Motion) -> np.ndarray:
         for place, segment in record.made.items():  # of the NumPy loop
             record.standings[place] = _numbers([segment.phases])
         return np.asarray(record.standings[: record.count])
-    return _numbers([segment.phases for segment in motion.segments])
+    return _numbers([segment.phases for segment in motion.segments]).reshape(-1, len(motion.model.contacts))
 
 
 def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:

@@ -19,19 +19,18 @@ class UndisturbedSteps:
     """Steps of length ``step`` [s] in one level."""
 
     def __init__(self, stepped: SteppedLevel, step: float) -> None:
-        self._powers = [_one_step(stepped, step)]
+        self._powers = [_one_step(stepped, step).T]
 
-    def after(self, x: np.ndarray, count: int) -> np.ndarray:
-        """The state (3 s + 1,) ``count`` steps after x."""
-        power = 0
-        while count:
+    def after(self, states: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """(q, q', q'') (k, 3, s) after as many steps from ``states`` (k, 3, s) as ``counts`` (k,) says."""
+        k = len(states)
+        x = np.hstack([states.reshape(k, -1), np.ones((k, 1))])
+        for power in range(int(np.max(counts, initial=0)).bit_length()):
             if power == len(self._powers):
                 self._powers.append(self._powers[-1] @ self._powers[-1])
-            if count & 1:
-                x = self._powers[power].dot(x)
-            count >>= 1
-            power += 1
-        return x
+            moved = (counts >> power) & 1 == 1
+            x[moved] = x[moved] @ self._powers[power]
+        return x[:, :-1].reshape(states.shape)
 
 
 def _one_step(stepped: SteppedLevel, step: float) -> np.ndarray:
