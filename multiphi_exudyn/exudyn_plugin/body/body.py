@@ -32,7 +32,7 @@ from multiphi_exudyn.events.rule import EventRule
 from multiphi_exudyn.events.state import Event, Loss, Phase, State
 from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.exudyn_plugin.body.certified_step import StepTest
-from multiphi_exudyn.exudyn_plugin.body.coordinates import PHASES, SAME_STEP, Coordinates, flags_of
+from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates, flags_of
 from multiphi_exudyn.exudyn_plugin.body.exact_step import ExactStep
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
@@ -247,7 +247,7 @@ class MultiPhiBody(ExactStep):
             q_tt[:] = stepped.acceleration(q, q_t, force)
         here.write(here.views)
         r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
-        phases = self.phases_at(closed, q[:r], eta_t[:r], t, [PHASES.index(phase) for phase in entered])
+        phases = self._phases_at(closed, q[:r], eta_t[:r], t, entered)
         self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
         self._record = RunRecord(self._state, self._motion.start_loss if fresh else Loss())
         self._most, self.time = 0.0, t
@@ -266,17 +266,17 @@ class MultiPhiBody(ExactStep):
         here.enter(mbs, here.stepped, here.stepped.drive)
         self._step = math.nan
         self._run_ahead = RunAhead(self, motion, self.time, step, end)
-        self._run_ahead.arrive(mbs, self.time, 0)
+        self._run_ahead.begin(mbs)
 
     def _own_motion(self, end: float) -> tuple[Motion, State]:
         """The motion under its own loads alone, up to ``end`` [s] at most, and the present state for it."""
         return motion_of(self.model, self._rule, self._motion.start, None), self._state
 
-    def phases_at(
-        self, closed: tuple[int, ...], eta: np.ndarray, eta_t: np.ndarray, time: float, entered: Sequence[int]
+    def _phases_at(
+        self, closed: tuple[int, ...], eta: np.ndarray, eta_t: np.ndarray, time: float, entered: tuple[Phase, ...]
     ) -> tuple[Phase, ...]:
-        """Phases at a time [s] in a level that was entered with others, in numbers: who has risen is armed again."""
-        phases = [PHASES[k] for k in entered]
+        """Phases at a time [s] in a level that was entered with others: who has risen since is armed again."""
+        phases = list(entered)
         if any(phase is not Phase.ARMED for phase in phases):
             rule, state = self._read_by(State(self._rule.level(closed), eta, eta_t, tuple(phases)), time)
             for contact, phase in enumerate(phases):

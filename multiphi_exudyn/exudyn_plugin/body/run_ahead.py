@@ -53,9 +53,9 @@ class RunAhead:
         self._state = np.array(here.views)
         self._least = UNSEEN * _way(here.stepped)
         self._past = list[Stretch]()
-        self._stretch = motion.advance(time)
+        self._stretch = self._motion.advance(self._until(time))
         self._place = self._done = 0
-        self._stops = self._planned(0, missed=False)
+        self._stops = self._planned(missed=False)
 
     @property
     def events(self) -> list[Event]:
@@ -79,6 +79,12 @@ class RunAhead:
         return int(np.searchsorted(stretch.event_times, since))
 
     # ------------------------------------------------------------------ a stop
+
+    def begin(self, mbs: Any) -> None:
+        """The run begins."""
+        if self._meets(self.time):
+            self._write(mbs)
+        self.next_time = self._next()
 
     def arrive(self, mbs: Any, t: float, index: int) -> None:
         """A step has ended at t [s], the ``index``-th of the run."""
@@ -147,24 +153,30 @@ class RunAhead:
     def _plan(self, t: float, index: int) -> None:
         """The stops from the end of a step at t [s] on, as far as one looks ahead."""
         self.time, self.index = t, index
-        most = ROWS_AHEAD if self._body.varies else STEPS_AHEAD
-        if t >= self._end - self._rounding or not self._regular:
-            most = 1
         if self._stretch.failure and t >= self._stretch.end:
             self._done = len(self._stretch.changes)
             raise NumericalFailure(f"body {self._body.name!r}: {self._stretch.failure}")
-        missed = False
-        if t >= self._stretch.end:
-            missed = self._done < len(self._stretch.changes)
+        missed = self._done < len(self._stretch.changes) and self._stretch.end <= t
+        if self._stretch.end <= t and (missed or t < self._end - self._rounding):
             self._past.append(self._stretch)
-            until = max(t, min(t + self._step * (most - 1), self._end))
-            self._stretch, self._done = self._motion.advance(until), 0
-        self._stops, self._place = self._planned(most, missed), 0
+            self._stretch, self._done = self._motion.advance(self._until(t)), 0
+        self._stops, self._place = self._planned(missed), 0
 
-    def _planned(self, most: int, missed: bool) -> Stops:
+    @property
+    def _most(self) -> int:
+        """How many ends of steps are looked at together."""
+        if not self._regular:
+            return 1
+        return ROWS_AHEAD if self._body.varies else STEPS_AHEAD
+
+    def _until(self, t: float) -> float:
+        """How far [s] to look ahead."""
+        return max(t, min(t + self._step * (self._most - 1), self._end))
+
+    def _planned(self, missed: bool) -> Stops:
         level = self._body.coordinates.stepped
         start = Departure(self.time, self.index, self._step, level, self._state, self._done)
-        return stops_of(self._body, self._stretch, start, self._steps_of, most, missed)
+        return stops_of(self._body, self._stretch, start, self._steps_of, self._most, missed)
 
 
 def _way(stepped: SteppedLevel) -> float:

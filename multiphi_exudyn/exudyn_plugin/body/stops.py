@@ -17,9 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates, flags_of
-from multiphi_exudyn.exudyn_plugin.body.known_motion import Moments, Stretch
+from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
+from multiphi_exudyn.exudyn_plugin.body.known_motion import Stretch
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -50,11 +49,6 @@ class KnownBody(Protocol):
 
     def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
-
-    def phases_at(
-        self, closed: tuple[int, ...], eta: np.ndarray, eta_t: np.ndarray, time: float, entered: Sequence[int]
-    ) -> tuple[Phase, ...]:
-        """Phases at a time [s] in a level that was entered with others, in numbers."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +115,7 @@ def stops_of(
 
 
 def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray]:
-    """Levels, states (n, 3, s) and flags (n, 2 c) at times (n,) [s]."""
+    """Levels, states (n, 3, s) and flags (n, 2 c) at times (n,) [s], the phases as on entering the level."""
     here, count = body.coordinates.stepped, len(times)
     levels, states = [here] * count, np.empty((count, 3, here.size))
     flags = np.zeros((count, 2 * len(body.model.contacts)))
@@ -129,21 +123,11 @@ def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[
         places, closed = moments.places, moments.level.level.indices
         stepped, forces = body.stepped_level(closed), body.own_forces(closed, times[places])
         states[places] = stepped.states(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
-        flags[places] = _flags(body, moments, times[places])
+        flags[np.ix_(places, np.array(closed, dtype=int))] = 1.0
+        flags[places, flags.shape[1] // 2 :] = moments.phases
         for place in places.tolist():
             levels[place] = stepped
     return levels, states, flags
-
-
-def _flags(body: KnownBody, moments: Moments, times: np.ndarray) -> np.ndarray:
-    """Coordinates (k, 2 c) of the data node at times (k,) [s] in one level."""
-    closed, phases = moments.level.level.indices, moments.phases
-    flags = np.zeros((len(times), 2 * phases.shape[1]))
-    flags[:, list(closed)] = 1.0
-    for k in np.flatnonzero(np.any(phases, axis=1)).tolist():
-        given = moments.displacement[k], moments.velocity[k], float(times[k]), phases[k].tolist()
-        flags[k] = flags_of(closed, body.phases_at(closed, *given))
-    return flags
 
 
 def _expected(
