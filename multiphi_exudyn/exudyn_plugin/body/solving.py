@@ -67,7 +67,7 @@ def _watched(solve: Callable[..., Any]) -> Callable[..., Any]:
         try:
             found = solve(solver, mbs, *given, **named)
         except BaseException:
-            bodies.next_time = -math.inf
+            bodies.clock.next_time = -math.inf
             raise
         if solver.output.finishedSuccessfully:
             bodies.check_called(solver.it.currentTime)

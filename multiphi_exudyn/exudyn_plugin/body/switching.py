@@ -58,12 +58,31 @@ class SwitchingBody(Protocol):
         """Raise for settings of an implicit solver that make it wrong."""
 
 
+class Clock:
+    """The time of the last step [s], and when the bodies have something to do next; ``due`` is called then.
+
+    A class of its own, for what it does is done after every step: attributes of a dict take twice the time.
+    """
+
+    def __init__(self, due: StepFunction) -> None:
+        self.due = due
+        self.time = math.nan
+        self.next_time = -math.inf
+
+    def after_step(self, mbs: Any, t: float) -> bool:
+        """Called by Exudyn; whether the run goes on."""
+        if self.time < t < self.next_time:
+            self.time = t
+            return True
+        return self.due(mbs, t)
+
+
 class Switching(dict[str, SwitchingBody]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
     preceding, following: the user's own PreStep and PostStep functions, or None. needed: whether any body has to be
     called. disturbed: whether an event of one body has just moved what hangs on it, maybe another. end: of the run [s],
-    infinite once its warnings are issued. time: of the last call [s]. next_time: of the next one that is for a body.
+    infinite once its warnings are issued. clock: whose function is the PostStep one.
     """
 
     def __init__(self) -> None:
@@ -73,8 +92,7 @@ class Switching(dict[str, SwitchingBody]):
         self.needed = False
         self.disturbed = False
         self.end = math.inf
-        self.time = math.nan
-        self.next_time = -math.inf
+        self.clock = Clock(self._switch)
 
     def add(self, body: SwitchingBody) -> None:
         """Take a body in; those with rigid contacts come last, so that what they strike has had its own events."""
@@ -88,16 +106,9 @@ class Switching(dict[str, SwitchingBody]):
             body.before_step(mbs, t)
         return self.preceding is None or self.preceding(mbs, t)
 
-    def after_step(self, mbs: Any, t: float) -> bool:
-        """Called by Exudyn; whether the run goes on."""
-        if self.time < t < self.next_time:
-            self.time = t
-            return True
-        return self._switch(mbs, t)
-
     def _switch(self, mbs: Any, t: float) -> bool:
         """A step after which some body may have something to do, or the start of a run."""
-        self.time, self.next_time = t, -math.inf
+        self.clock.time, self.clock.next_time = t, -math.inf
         for body in self.values():
             body.after_step(mbs, t)
         if self.disturbed:
@@ -108,16 +119,16 @@ class Switching(dict[str, SwitchingBody]):
             self.end = math.inf
             self._warn()
         elif self.following is None:
-            self.next_time = min(self.end, *(body.next_time for body in self.values()))
+            self.clock.next_time = min(self.end, *(body.next_time for body in self.values()))
         return self.following is None or self.following(mbs, t)
 
     def begin(self) -> None:
         """A run of a solver begins."""
-        self.time, self.next_time, self.end = math.nan, -math.inf, math.inf
+        self.clock.time, self.clock.next_time, self.end = math.nan, -math.inf, math.inf
 
     def check_called(self, t: float) -> None:
-        """Raises if a run has come to t [s] without ``after_step``: somebody else's PostStep function is installed."""
-        if self.needed and not self.time >= t:
+        """Raises if a run has come to t [s] without the bodies: somebody else's PostStep function is installed."""
+        if self.needed and not self.clock.time >= t:
             raise MultiPhiValueError(
                 f"PostStepUserFunction: got a function that replaced the switching of {next(iter(self))!r}, need it "
                 "set before CreateMultiPhiBody (it is then called after the switching)"
@@ -133,14 +144,14 @@ class Switching(dict[str, SwitchingBody]):
         """Become the system's PostStep function, followed by the present one."""
         self.needed = True
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
-        if present != self.after_step:
+        if present != self.clock.after_step:
             self.following = present
-            mbs.SetPostStepUserFunction(self.after_step)
+            mbs.SetPostStepUserFunction(self.clock.after_step)
 
     def installed(self, mbs: Any) -> bool:
         """Whether these bodies switch in a run of the system."""
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
-        return present is not None and present == self.after_step
+        return present is not None and present == self.clock.after_step
 
     def install_before(self, mbs: Any) -> None:
         """Become the system's PreStep function, followed by the present one."""
