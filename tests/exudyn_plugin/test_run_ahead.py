@@ -45,14 +45,24 @@ class System:
         self.items = CreateMultiPhiBody(self.mbs, model, "body", velocity=VELOCITY, **given)
         self.body = self.mbs.variables["multiPhi"]["body"]
 
-    def solve(self, t_end=T_END, solver=TRAPEZOIDAL, start=0.0, step=STEP, **given):
+    def assemble(self):
+        """Only once: it takes the initial coordinates for those of the nodes."""
         if not self.mbs.systemIsConsistent:
             self.mbs.Assemble()
+
+    def solve(self, t_end=T_END, solver=TRAPEZOIDAL, start=0.0, step=STEP, **given):
+        self.assemble()
         chosen = fixed_steps(t_end, round((t_end - start) / step), write_period=step)
         chosen.timeIntegration.startTime = start
         chosen.timeIntegration.generalizedAlpha.spectralRadius = 1.0
         self.mbs.SolveDynamic(chosen, solverType=solver, **given)
         return body_histories(self.mbs, self.items)
+
+    def solve_static(self):
+        """q (s,)."""
+        self.assemble()
+        self.mbs.SolveStatic(fixed_steps(1.0, 1, write_period=1.0))
+        return self.mbs.GetNodeOutput(self.items["nGenericODE2"], exu.OutputVariableType.Coordinates)
 
     def coordinates(self):
         """q, q', q'' at all samples (k, 3 s)."""
@@ -225,6 +235,50 @@ def test_a_run_that_the_user_stops_has_the_events_until_then_and_the_next_begins
 
 def system_histories(system):
     return body_histories(system.mbs, system.items)
+
+
+def test_a_static_solution_after_a_run_has_the_level_of_the_system_and_not_that_in_which_the_run_ended():
+    system, native = System(model_of(50.0), matchedStepSize=STEP), mp.simulate(model_of(50.0), T_END, velocity=VELOCITY)
+    begun, ended = native.contact_intervals("above")[0]
+    at_rest = System(model_of(50.0), matchedStepSize=STEP).solve_static()
+    first = system.solve(round((begun + ended) / 2, 2))
+    assert first.closed["above"][-1]
+    assert np.array_equal(system.solve_static(), at_rest)
+    level = system.mbs.GetNodeOutput(system.items["nGenericData"], exu.OutputVariableType.Coordinates)
+    assert not np.any(level)
+    again = system.solve(round((begun + ended) / 2, 2))
+    assert np.max(np.abs(first.points["m1"] - again.points["m1"])) < 1e-12
+
+
+def test_one_body_alone_and_one_that_is_held_in_one_system():
+    """The one follows its known motion, while the other is looked at after every step."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    model = model_of(50.0)
+    given = {"velocity": VELOCITY, "matchedStepSize": STEP}
+    alone, held = CreateMultiPhiBody(mbs, model, "alone", **given), CreateMultiPhiBody(mbs, model, "held", **given)
+    own = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=held["nGenericODE2"], coordinate=0))
+    ground = mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
+    mbs.AddObject(eii.CoordinateSpringDamper(markerNumbers=[ground, own], stiffness=1e-9))
+    mbs.Assemble()
+    mbs.SolveDynamic(fixed_steps(T_END, 500, write_period=STEP), solverType=TRAPEZOIDAL)
+    bodies, native = mbs.variables["multiPhi"], mp.simulate(model, T_END, velocity=VELOCITY)
+    assert (bodies["alone"].next_time, bodies["held"].next_time) == (pytest.approx(T_END), -math.inf)
+    assert np.max(distances(body_histories(mbs, alone), native)) < 1e-9
+    assert np.max(distances(body_histories(mbs, held), native)) < 1e-6
+    del container
+
+
+def test_more_steps_than_are_planned_at_once_and_events_in_every_part(monkeypatch):
+    model = model_of(50.0)
+    native = mp.simulate(model, T_END, velocity=VELOCITY)
+    whole = System(model, matchedStepSize=STEP).solve()
+    monkeypatch.setattr("multiphi_exudyn.exudyn_plugin.body.run_ahead.STEPS_AHEAD", 16)
+    system = System(model, matchedStepSize=STEP)
+    found = system.solve()
+    assert [event.contact for event in found.events] == [event.contact for event in native.events]
+    assert np.max(distances(found, native)) < 1e-9
+    assert found.warnings == whole.warnings
 
 
 # ---------------------------------------------------------------------- who interferes

@@ -111,7 +111,7 @@ class MultiPhiBody(ExactStep):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
-        truncated = 0.0 if self._run_ahead is None else self._run_ahead.tell(self._record)
+        truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
         return warnings_of_body(self.model, self._record.of(self._motion.events, truncated))
 
     def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
@@ -265,7 +265,7 @@ class MultiPhiBody(ExactStep):
         motion, here = KnownMotion(*self._own_motion(end), self.time), self.coordinates
         here.enter(mbs, here.stepped, here.stepped.drive)
         self._step = math.nan
-        self._run_ahead = RunAhead(self, motion, self.time, step, end)
+        self._run_ahead = RunAhead(self, motion, self._record, self.time, step, end)
         self._run_ahead.begin(mbs)
 
     def _own_motion(self, end: float) -> tuple[Motion, State]:

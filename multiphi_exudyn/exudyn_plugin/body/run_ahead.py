@@ -12,6 +12,7 @@ afar, are looked at one by one from then on.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
-from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion, Stretch
+from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
@@ -38,21 +39,23 @@ UNSEEN = 1e-3  # of what brings a contact to its stop: coordinates this small ar
 class RunAhead:
     """One run of ``body`` along ``motion``, from time to ``end`` [s] in steps of length ``step`` [s].
 
-    next_time: the end of a step at this time [s] or later is to be reported (``arrive``). time, index: of the last one
-    that was.
+    record: is told of what has happened. next_time: the end of a step at this time [s] or later is to be reported
+    (``arrive``). time, index: of the last one that was.
     """
 
-    def __init__(self, body: KnownBody, motion: KnownMotion, time: float, step: float, end: float) -> None:
+    def __init__(
+        self, body: KnownBody, motion: KnownMotion, record: RunRecord, time: float, step: float, end: float
+    ) -> None:
         here = body.coordinates
         self.next_time = -math.inf
         self.time, self.index = time, 0
-        self._body, self._motion = body, motion
+        self._body, self._motion, self._record = body, motion, record
         self._step, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
         self._steps = BoundedCache[tuple[int, ...], UndisturbedSteps](body.model.most_levels)
         self._state = np.array(here.views)
         self._least = UNSEEN * _way(here.stepped)
-        self._past = list[Stretch]()
+        self._past, self._truncated = list[Sequence[Event]](), 0.0
         self._stretch = self._motion.advance(self._until(time))
         self._place = self._done = 0
         self._stops = self._planned(missed=False)
@@ -60,16 +63,14 @@ class RunAhead:
     @property
     def events(self) -> list[Event]:
         """What has happened so far."""
-        before = [event for stretch in self._past for event in stretch.events]
+        before = [event for events in self._past for event in events]
         return before + list(self._stretch.events[: self._told])
 
-    def tell(self, record: RunRecord) -> float:
-        """Tell a record of what has happened so far; energy [J] that truncation took."""
-        for stretch in (*self._past, self._stretch):
-            for level, energy in stretch.levels(self.time):
-                record.include(level, energy)
-        before = sum(float(np.sum(stretch.truncated)) for stretch in self._past)
-        return before + float(np.sum(self._stretch.truncated[: self._told]))
+    def recorded(self) -> float:
+        """Bring the record up to date; energy [J] that truncation took so far."""
+        for level, energy in self._stretch.levels(self.time):
+            self._record.include(level, energy)
+        return self._truncated + float(np.sum(self._stretch.truncated[: self._told]))
 
     @property
     def _told(self) -> int:
@@ -158,7 +159,9 @@ class RunAhead:
             raise NumericalFailure(f"body {self._body.name!r}: {self._stretch.failure}")
         missed = self._done < len(self._stretch.changes) and self._stretch.end <= t
         if self._stretch.end <= t and (missed or t < self._end - self._rounding):
-            self._past.append(self._stretch)
+            self._done = len(self._stretch.changes)
+            self._truncated = self.recorded()
+            self._past.append(self._stretch.events)
             self._stretch, self._done = self._motion.advance(self._until(t)), 0
         self._stops, self._place = self._planned(missed), 0
 
