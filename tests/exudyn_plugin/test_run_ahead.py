@@ -243,7 +243,9 @@ def test_a_static_solution_after_a_run_has_the_level_of_the_system_and_not_that_
     at_rest = System(model_of(50.0), matchedStepSize=STEP).solve_static()
     first = system.solve(round((begun + ended) / 2, 2))
     assert first.closed["above"][-1]
+    events = system.body.events
     assert np.array_equal(system.solve_static(), at_rest)
+    assert system.body.events == events != []
     level = system.mbs.GetNodeOutput(system.items["nGenericData"], exu.OutputVariableType.Coordinates)
     assert not np.any(level)
     again = system.solve(round((begun + ended) / 2, 2))

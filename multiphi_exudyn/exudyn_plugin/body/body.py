@@ -71,7 +71,7 @@ class MultiPhiBody(ExactStep):
         self._tests: BoundedCache[tuple[int, ...], StepTest] = BoundedCache(most)
         self._step = self._rounding = self._clearance = self._speed = math.nan
         self._run_ahead: RunAhead | None = None
-        self._x = np.zeros(0)
+        self._x, self._most = np.zeros(0), 0.0
         self._record = RunRecord(self._state, motion.start_loss)
         stepped, state = self._stepped(self._state.closed), self._state
         self.coordinates = Coordinates(self.items, stepped, most, matched_step is not None)
@@ -91,7 +91,8 @@ class MultiPhiBody(ExactStep):
     @property
     def next_time(self) -> float:
         """When [s] it has something to do next, -inf where that is at the end of every step."""
-        return -math.inf if self._run_ahead is None else self._run_ahead.next_time
+        ahead = self._run_ahead
+        return ahead.next_time if ahead is not None and ahead.running else -math.inf
 
     @property
     def varies(self) -> bool:
@@ -144,7 +145,7 @@ class MultiPhiBody(ExactStep):
     def after_step(self, mbs: Any, t: float) -> None:
         """Called by Exudyn when a step is done, and at the start; one that is alone may not be."""
         ahead = self._run_ahead
-        if ahead is not None and ahead.time < t:
+        if ahead is not None and ahead.running and ahead.time < t:
             if t < ahead.next_time:
                 return
             index = mbs.sys["dynamicSolver"].it.currentStepIndex
@@ -217,7 +218,8 @@ class MultiPhiBody(ExactStep):
     def _begin_static(self, mbs: Any) -> None:
         """Give a static solution the level that the system has at its start, whatever the last run ended in."""
         self.coordinates.attach(mbs)
-        self._run_ahead = None
+        if self._run_ahead is not None:
+            self._run_ahead.running = False
         stepped = self._stepped(self.coordinates.stored()[0])
         self.coordinates.load(mbs, stepped, self.force_vector(stepped))
 
@@ -228,29 +230,14 @@ class MultiPhiBody(ExactStep):
         self.check_matched(step)
         here.attach(mbs)
         alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
-        self._run_ahead = None
         if here.rigid and not alone:
             self._check_start(mbs)
+        self._run_ahead, self._most, self.time = None, 0.0, t
         self._motion.segments.clear()
-        stepped, (q, q_t, q_tt) = here.stepped, here.views
-        closed, entered = here.stored()
-        if closed != stepped.closed:  # the accelerations have been computed with stale matrices
-            stepped = self._enter(mbs, closed)
-            if not alone:
-                q_tt[:] = stepped.acceleration(q, q_t, here.acting(mbs, step)[: self._size])
-        force = self.own_forces(closed, np.array([t]))[0] if alone else here.force(here.read())[: self._size]
-        fresh = np.array_equal(q, self._given[0]) and np.array_equal(q_t, self._given[1])
+        fresh = all(np.array_equal(view, given) for view, given in zip(here.views[:2], self.start, strict=True))
         self._motion.events[:] = [replace(event, time=t) for event in self._given_events] if fresh else []
-        if fresh:  # only now the force is known, which the velocity of matched modes contains
-            q_t += stepped.from_force @ force
-        if fresh or alone:
-            q_tt[:] = stepped.acceleration(q, q_t, force)
-        here.write(here.views)
-        r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
-        phases = self._phases_at(closed, q[:r], eta_t[:r], t, entered)
-        self._state = State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
+        self._state = self._taken(mbs, step, alone, fresh)
         self._record = RunRecord(self._state, self._motion.start_loss if fresh else Loss())
-        self._most, self.time = 0.0, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
         if alone:
             self._set_out(mbs, step, end)
@@ -259,6 +246,29 @@ class MultiPhiBody(ExactStep):
             self._take_step(step)
             self._sample()
         bodies_of(mbs).end = end - SAME_STEP * step
+
+    def _taken(self, mbs: Any, step: float, alone: bool, fresh: bool) -> State:
+        """The state at the start of a run from the system, which gets the accelerations that belong to it.
+
+        fresh: whether it starts as the body was made: only now the force is known, which the velocity of matched modes
+        contains.
+        """
+        here, t = self.coordinates, self.time
+        stepped, (q, q_t, q_tt) = here.stepped, here.views
+        closed, entered = here.stored()
+        if closed != stepped.closed:  # the accelerations have been computed with stale matrices
+            stepped = self._enter(mbs, closed)
+            if not alone:
+                q_tt[:] = stepped.acceleration(q, q_t, here.acting(mbs, step)[: self._size])
+        force = self.own_forces(closed, np.array([t]))[0] if alone else here.force(here.read())[: self._size]
+        if fresh:
+            q_t += stepped.from_force @ force
+        if fresh or alone:
+            q_tt[:] = stepped.acceleration(q, q_t, force)
+        here.write(here.views)
+        r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
+        phases = self._phases_at(closed, q[:r], eta_t[:r], t, entered)
+        return State(self._rule.level(closed), q[:r].copy(), eta_t[:r], phases)
 
     def _set_out(self, mbs: Any, step: float, end: float) -> None:
         """Compute the motion ahead, from the present state and time on."""

@@ -115,7 +115,8 @@ def _phases(motion: Motion) -> np.ndarray:
         for place, segment in record.made.items():  # of the NumPy loop
             record.standings[place] = _numbers([segment.phases])
         return np.asarray(record.standings[: record.count])
-    return _numbers([segment.phases for segment in motion.segments]).reshape(-1, len(motion.model.contacts))
+    phases = [segment.phases for segment in motion.segments]
+    return _numbers(phases).reshape(len(phases), len(motion.model.contacts))
 
 
 def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:

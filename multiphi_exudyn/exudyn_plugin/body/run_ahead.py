@@ -39,15 +39,15 @@ UNSEEN = 1e-3  # of what brings a contact to its stop: coordinates this small ar
 class RunAhead:
     """One run of ``body`` along ``motion``, from time to ``end`` [s] in steps of length ``step`` [s].
 
-    record: is told of what has happened. next_time: the end of a step at this time [s] or later is to be reported
-    (``arrive``). time, index: of the last one that was.
+    record: is told of what has happened. running: until another solver begins. next_time: the end of a step at this
+    time [s] or later is to be reported (``arrive``). time, index: of the last one that was.
     """
 
     def __init__(
         self, body: KnownBody, motion: KnownMotion, record: RunRecord, time: float, step: float, end: float
     ) -> None:
         here = body.coordinates
-        self.next_time = -math.inf
+        self.running, self.next_time = True, -math.inf
         self.time, self.index = time, 0
         self._body, self._motion, self._record = body, motion, record
         self._step, self._rounding, self._end = step, SAME_STEP * step, end
