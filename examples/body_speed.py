@@ -2,7 +2,8 @@
 
 The paper's rig for a second. All runs alternate in one process; CPU time of SolveDynamic, median. The error is that of
 the tip up to 0.3 s against the model with all its modes, of a Craig-Bampton component (contacts of 1e6 N/m) the worst
-of three nearby steps: one step alone may be right by luck.
+of three nearby steps: one step alone may be right by luck. The steps of the components hold 2 and 0.5 % against the
+full nonlinear beam; against the linear one, all modes of it, finer ones would be needed.
 
 Run: python examples/body_speed.py
 """

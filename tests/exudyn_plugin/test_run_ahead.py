@@ -124,6 +124,15 @@ def test_a_function_of_the_user_changes_the_way_and_not_the_answer(kind):
     assert np.max(np.abs(first.points["m1"] - second.points["m1"])) < 1e-7
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.time.simulate._compiled_loop", lambda rule, needed: None)
+    model = model_of(KINDS[kind])
+    native, found = mp.simulate(model, T_END, velocity=VELOCITY), System(model, matchedStepSize=STEP).solve()
+    assert same_events(found.events, native.events)
+    assert np.max(distances(found, native)) < 1e-9
+
+
 def test_it_is_asked_at_events_only(monkeypatch):
     asked, arrive = [], RunAhead.arrive
 
