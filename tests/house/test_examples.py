@@ -164,6 +164,6 @@ def test_body_speed(capsys):
     six = [row.error for name, row in rows.items() if name.startswith("body, 6 modes") and "rigid" not in name]
     assert len(six) == 4
     assert six == pytest.approx([0.0113] * 4, rel=0.02)
-    assert rows["body, 12 modes, 5200 steps"].error < 5e-4
+    assert rows["body, 12 modes, 5020 steps"].error < 5e-4
     assert all(0 < row.median < math.inf for row in rows.values())
     assert capsys.readouterr().out.count("at most") == 5
