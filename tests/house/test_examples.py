@@ -166,4 +166,4 @@ def test_body_speed(capsys):
     assert six == pytest.approx([0.0113] * 4, rel=0.02)
     assert rows["body, 12 modes, 5020 steps"].error < 5e-4
     assert all(0 < row.median < math.inf for row in rows.values())
-    assert capsys.readouterr().out.count("at most") == 5
+    assert capsys.readouterr().out.count("at most") == 7
