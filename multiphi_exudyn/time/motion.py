@@ -17,7 +17,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.state import Change, Event, Loss, Phase
+from multiphi_exudyn.events.state import Change, Event, Loss, Phase, State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.segment import Segment
 from multiphi_exudyn.time.trajectory import Start, Statistics, Trajectory
@@ -48,6 +48,13 @@ class Motion:
         self._decided, self._last_decision = deque[tuple[float, float]](maxlen=self.window + 1), 0.0
         with self._failing():
             self._begin()
+
+    def go_on_from(self, state: State, time: float) -> None:
+        """Forget what has been collected, and go on from a state and a time [s]."""
+        self.state, self.time, self.message, self.start_loss = state, time, "", Loss()
+        self.segments, self.events = [], []
+        self._decided.clear()
+        self._last_decision = time
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
@@ -212,6 +219,11 @@ class CompiledMotion(Motion):
     def __post_init__(self) -> None:
         self.record = self.loop.record()
         super().__post_init__()
+
+    def go_on_from(self, state: State, time: float) -> None:
+        """Forget what has been collected, and go on from a state and a time [s]."""
+        super().go_on_from(state, time)
+        self.record = self.loop.record()
 
     def _continue(self, end: float) -> None:
         if self.model.highest_frequency * (end - self.time) <= COMPILED_PERIODS:

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Loss
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -67,12 +66,12 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
 class RunSummary:
     """What a body in Exudyn, which keeps no segments, knows of its run.
 
-    levels: it has been in, each once. lost: at its start and at all events. energy: the largest of the run [J], kinetic
-    and strain, as far as it was seen.
+    levels: it has been in, each once. truncated: energy [J] that truncation took at its start and at all events.
+    energy: the largest of the run [J], kinetic and strain, as far as it was seen.
     """
 
     levels: Sequence[Level]
-    lost: Loss
+    truncated: float
     energy: float
 
 
@@ -81,7 +80,7 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     found = list(damping_warnings(model))
     if not model.whole:
         found.extend(static_warnings(run.levels))
-        found.extend(_energy_warning(abs(run.lost.truncation_kinetic + run.lost.truncation_strain), run.energy))
+        found.extend(_energy_warning(abs(run.truncated), run.energy))
     return tuple(found)
 
 

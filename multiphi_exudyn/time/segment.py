@@ -130,8 +130,11 @@ class Batch:
     def states(self, rows: np.ndarray | slice, after: np.ndarray) -> np.ndarray:
         """eta and eta' (2, j, r) of the segments ``rows`` (j,), times ``after`` (j,) [s] their starts."""
         c, phi = self.coefficients[rows], self.basis.at(after)
-        both = np.concatenate([c * phi, self.basis.derivative(c) * phi]) @ self.shapes.T
-        return both.real.reshape(2, len(phi), len(self.shapes))
+        if self.basis.pure:
+            both = np.concatenate([c * phi, self.basis.derivative(c) * phi]) @ self.shapes.T
+            return both.real.reshape(2, len(phi), len(self.shapes))
+        moved = self.shapes * c[:, None, :]  # a power of time and the next lower one have shapes of their own
+        return np.array([np.einsum("jrp,jp->jr", x, phi).real for x in (moved, self.basis.derivative(moved))])
 
 
 def batches(segments: Sequence[Segment]) -> list[Batch]:

@@ -32,7 +32,7 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["quiet", "simulate", "started"]
+__all__ = ["motion_of", "quiet", "simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -119,7 +119,7 @@ def started(
     excitation = Excitation.of(model, loads, end, finer)
     if not excitation.channels:
         start = _start(model, displacement, velocity, excitation, end)
-        return _motion(model, _rule(model, excitation.static), start, compiled)
+        return motion_of(model, _rule(model, excitation.static), start, compiled)
     if compiled:
         raise MultiPhiValueError(
             "compiled: got True with loads that vary in time, or that pull at damped rigid-body motion, "
@@ -129,7 +129,7 @@ def started(
     return DrivenMotion(model, rule, _start(model, displacement, velocity, excitation, end))
 
 
-def _motion(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
+def motion_of(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
     """The run, in the loop that is wanted and can be had."""
     if compiled is not False and rule.compiled is None:
         rule.compiled = _compiled_loop(rule, compiled)

@@ -1,4 +1,4 @@
-"""Multi-Phi body under loads and stops that vary in time: Exudyn's answers converge to those of ``simulate``."""
+"""Multi-Phi body under loads and stops that vary in time: alone it is ``simulate``, beside others of second order."""
 
 import math
 
@@ -40,10 +40,12 @@ def model_of(contacts, modes):
     return mp.MultiPhiModel(structure, contacts, modes=modes)
 
 
-def solved(model, loads, steps, *, matched=False, prepare=None, attach=None):
+def solved(model, loads, steps, *, matched=False, beside=False, prepare=None, attach=None):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     with quiet():
+        if beside:  # a function that might do anything
+            mbs.SetPostStepUserFunction(lambda mbs, t: True)
         items = CreateMultiPhiBody(mbs, model, loads=loads, matchedStepSize=T_END / steps if matched else None)
         if attach:
             attach(mbs, items["nGenericODE2"])
@@ -57,13 +59,27 @@ def solved(model, loads, steps, *, matched=False, prepare=None, attach=None):
 
 @pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
 @pytest.mark.parametrize("case", CASES)
-def test_the_difference_to_the_native_run_falls_with_the_square_of_the_step(case, matched):
+def test_alone_every_step_ends_where_the_native_run_is(case, matched):
+    contacts, modes, loads = CASES[case]
+    model = model_of(contacts, modes)
+    native, found = mp.simulate(model, T_END, loads=loads), solved(model, loads, 500, matched=matched)
+    times = np.minimum(found.time, T_END)
+    assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
+    assert [e.time for e in found.events] == pytest.approx([e.time for e in native.events], rel=1e-12)
+    velocity = native.model.structure.row("m1") @ native.velocity(times)
+    for ours, theirs in ((found.points["m1"], native.at("m1", times)), (found.velocities["m1"], velocity)):
+        assert np.max(np.abs(ours - theirs)) < 1e-11 * np.max(np.abs(theirs))
+
+
+@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
+@pytest.mark.parametrize("case", CASES)
+def test_beside_others_the_difference_to_the_native_run_falls_with_the_square_of_the_step(case, matched):
     contacts, modes, loads = CASES[case]
     model = model_of(contacts, modes)
     native = mp.simulate(model, T_END, loads=loads)
     errors = []
     for steps in (500, 1000):
-        found = solved(model, loads, steps, matched=matched)
+        found = solved(model, loads, steps, matched=matched, beside=True)
         expected = native.at("m1", np.minimum(found.time, T_END))
         errors.append(np.max(np.abs(found.points["m1"] - expected)) / np.max(np.abs(expected)))
         assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]

@@ -156,3 +156,14 @@ def test_meshed_bed(capsys, monkeypatch):
     assert coarse.events == fine.events > 10
     assert min(coarse.new, coarse.known, fine.new, fine.known) > 0
     assert "levels known: the finest mesh to the coarsest" in capsys.readouterr().out
+
+
+def test_body_speed(capsys):
+    """Times are not asserted: a step of the body is as good as any other, and its error is that of its modes."""
+    rows = load("body_speed").main(rounds=1)
+    six = [row.error for name, row in rows.items() if name.startswith("body, 6 modes") and "rigid" not in name]
+    assert len(six) == 4
+    assert six == pytest.approx([0.0113] * 4, rel=0.02)
+    assert rows["body, 12 modes, 5020 steps"].error < 5e-4
+    assert all(0 < row.median < math.inf for row in rows.values())
+    assert capsys.readouterr().out.count("at most") == 7

@@ -15,6 +15,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.time.driven.excitation import Excitation
 from multiphi_exudyn.time.driven.level import DrivenLevel
+from multiphi_exudyn.time.segment import batches
 
 TIMES = np.linspace(0.0, 20.0, 101)
 PLACE = np.eye(3)[1]
@@ -349,3 +350,19 @@ def test_a_sweep_of_thousands_of_cycles_is_no_failure_though_its_phase_is_known_
     assert run.status == "ok"
     assert "smooth loads: the response is certain to" in run.message
     assert len(run.segments) < 2000
+
+
+def test_states_of_many_segments_together_are_those_of_each():
+    """Also on pieces of a harmonic so short that it is a polynomial there, whose powers have shapes of their own."""
+    stops = [mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0)]
+    structure = chain(3, damping=mp.ModalDamping([0.02, 0.01, 0.03]), stiffness=10.0)
+    model = mp.MultiPhiModel(structure, stops, modes="all")
+    run = mp.simulate(model, 5.0, loads=[mp.HarmonicLoad("m1", 2.0, 0.3, 0.4)])
+    assert any(not segment.basis.pure for segment in run.segments)
+    for part in batches(run.segments):
+        for row, place in enumerate(part.places):
+            segment = run.segments[place]
+            times = np.linspace(segment.start, segment.end, 7)
+            found = part.states(np.full(7, row), times - segment.start)
+            for derivative in (0, 1):
+                assert_allclose(found[derivative].T, segment.modal(times, derivative), rtol=0, atol=1e-13)

@@ -1,8 +1,9 @@
 """Body: a reduced model as an object of an Exudyn system, with its sensors, its drawing and its checks of the solver.
 
-After every step a certified test says whether a contact can have asked to change; if so, the step is done again
-exactly, from event to event. One function switches the levels of all bodies of a system.
+A body on which nothing of the system acts is told from a motion that is known beforehand. Beside others, a certified
+test says after every step whether a contact can have asked to change; if so, the step is done again exactly, from event
+to event. One function switches the levels of all bodies of a system.
 
-Order: switching, run_record, coordinates, certified_step, certified_driven_step, exact_step, body, driven_body,
-sensors, drawing, binding, solving, create.
+Order: switching, run_record, coordinates, undisturbed_steps, known_motion, stops, run_ahead,
+certified_step, certified_driven_step, exact_step, body, driven_body, sensors, drawing, binding, solving, create.
 """

@@ -10,9 +10,6 @@ velocities: under a constant force it grows no faster than with the largest rate
 mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
 looked at exactly (body.py): the test may not decide, but it does not err. Of forces f on points s also holds L f
 (modal_force.py), of the step's mean: what stands at each end, less half its change.
-
-The states ahead of a body on which nothing acts are powers of the trapezoidal rule's matrix times the present one,
-so that one product answers for many steps at once (Lookahead).
 """
 
 from __future__ import annotations
@@ -25,11 +22,8 @@ from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.root_search import HERMITE
 
-__all__ = ["Lookahead", "StepTest", "energy_norm", "gains", "swell"]
+__all__ = ["StepTest", "energy_norm", "gains", "swell"]
 
-KNOTS = 16  # intervals a lookahead is divided into
-SPACING = 0.5  # rad, the phase of the highest mode in one of them,
-MOST = 2**16  # steps in one of them, where no mode oscillates: a step is a small part of a run
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a contact's function: what no test needs to tell from zero
 
 
@@ -43,8 +37,8 @@ class StepTest:
         size, count = stepped.size, len(rows)
         norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1 + direct.shape[1]))])
         self.directly = bool(np.any(direct))
-        self._added = np.tile(direct, (3, 1)) / _scales(stepped, rows, step, step)[:, None]
-        self._matrix = np.vstack([np.hstack([_conditions(stepped, rows, step, step), self._added]), norm])
+        self._added = np.tile(direct, (3, 1)) / _scales(stepped, rows, step)[:, None]
+        self._matrix = np.vstack([np.hstack([_conditions(stepped, rows, step), self._added]), norm])
         self._forces = 3 * size + 1
         self._one, self._two, self._three = count, 2 * count, 3 * count
 
@@ -67,47 +61,20 @@ class StepTest:
         return float(np.max(np.abs(self._added @ (after - before)[self._forces :]), initial=0.0)) / 2
 
 
-class Lookahead:
-    """The test for many steps of a body on which nothing acts. steps: how many."""
-
-    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float) -> None:
-        phase = float(np.max(_omega(stepped), initial=0.0)) * step
-        each = max(1, int(SPACING / max(phase, SPACING / MOST)))
-        self.steps = KNOTS * each
-        conditions, count = _conditions(stepped, rows, each * step, self.steps * step), len(rows)
-        self._one_step = _step_matrix(stepped, step)
-        flow = np.linalg.matrix_power(self._one_step, each)
-        knots = [conditions]
-        for _ in range(KNOTS):
-            knots.append(knots[-1] @ flow)
-        knots[0], knots[-1] = knots[0][count:], knots[-1][: 2 * count]
-        self._matrix = np.vstack(knots)
-
-    def clear(self, x: np.ndarray, speed: float) -> bool:
-        """Whether nothing can happen in the next steps, from a state x and its |S z'|."""
-        least: float = min(self._matrix.dot(x).tolist(), default=math.inf)
-        return least > speed
-
-    def after(self, x: np.ndarray, steps: int) -> np.ndarray:
-        """The state some steps after x."""
-        return np.asarray(np.linalg.matrix_power(self._one_step, steps) @ x)
-
-
-def _conditions(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float) -> np.ndarray:
+def _conditions(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
     """s - h s'/3, s, s + h s'/3 of all contacts as functions of x = (q, q', q'', 1), (3 c, 3 s + 1).
 
-    Each is divided by its factor of max |S z'|, which is known at the start of a time ``lasting`` [s], so that all have
-    the same right-hand side.
+    Each is divided by its factor of max |S z'| at the start, so that all have the same right-hand side.
     """
     along, rate = _padded(stepped, rows)
     none = np.zeros_like(along)
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
     functions = np.vstack([value - third, value, value + third]) @ stepped.physical
     constants = np.tile([row.constant for row in rows], 3)
-    return np.hstack([functions, constants[:, None]]) / _scales(stepped, rows, step, lasting)[:, None]
+    return np.hstack([functions, constants[:, None]]) / _scales(stepped, rows, step)[:, None]
 
 
-def _scales(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float) -> np.ndarray:
+def _scales(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
     """The factors (3 c,) of max |S z'| at the start, by which the conditions are divided.
 
     Free motion has no fourth derivative: then round-off of the way that max |S z'| makes in a step, or for a contact
@@ -118,7 +85,7 @@ def _scales(stepped: SteppedLevel, rows: list[Row], step: float, lasting: float)
     way = step**2 * np.linalg.norm(along, axis=1) + step * np.linalg.norm(rate, axis=1)
     constants = np.array([abs(row.constant) for row in rows]).reshape(-1)
     least = NEGLIGIBLE * np.where(way > 0, way, np.where(constants > 0, constants, 1.0))
-    return np.tile(np.maximum(scale, least) * swell(stepped, lasting), 3)
+    return np.tile(np.maximum(scale, least) * swell(stepped, step), 3)
 
 
 def _padded(stepped: SteppedLevel, rows: list[Row]) -> tuple[np.ndarray, np.ndarray]:
@@ -128,18 +95,6 @@ def _padded(stepped: SteppedLevel, rows: list[Row]) -> tuple[np.ndarray, np.ndar
     along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
     rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
     return along, rate
-
-
-def _step_matrix(stepped: SteppedLevel, step: float) -> np.ndarray:
-    """One step of the trapezoidal rule under a constant force, x_1 = matrix x_0, (3 s + 1, 3 s + 1)."""
-    s, m, d, k = stepped.size, stepped.mass, stepped.damping, stepped.stiffness
-    identity, none, h = np.eye(s), np.zeros((s, s)), step / 2
-    q = np.hstack([identity, step * identity, h**2 * identity])
-    q_t = np.hstack([none, identity, h * identity])
-    q_tt = np.linalg.solve(m + h * d + h**2 * k, np.hstack([k, d, m]) - d @ q_t - k @ q)
-    matrix = np.eye(3 * s + 1)
-    matrix[: 3 * s, : 3 * s] = np.vstack([q + h**2 * q_tt, q_t + h * q_tt, q_tt])
-    return matrix
 
 
 def _omega(stepped: SteppedLevel) -> np.ndarray:

@@ -8,32 +8,38 @@ connectors of the system on the body's node and, as forces f (m,) on points, on 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+import exudyn as exu
 import numpy as np
 
-from multiphi_exudyn.events.state import Phase, State
+from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, Reactions
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import SystemMatrices
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
-__all__ = ["Coordinates", "flags", "matrices"]
+__all__ = ["SAME_STEP", "Coordinates", "flags_of", "matrices"]
 
 PHASES = tuple(Phase)
+SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 
 
 class Coordinates:
     """Coordinates (s,) of one body. items: its typed indices. stepped: see the module's docstring.
 
     interface: its interface coordinates or None. surroundings: the system around them, attached: what hangs on them,
-    views: q, q', q'' in the system's current state, all three during a run.
+    views: q, q', q'' in the system's current state, all three during a run. most: levels of which Exudyn's own matrices
+    are kept. matched: whether M differs among levels.
     """
 
-    def __init__(self, items: dict[str, Any], stepped: SteppedLevel) -> None:
+    def __init__(self, items: dict[str, Any], stepped: SteppedLevel, most: int, matched: bool) -> None:
         self.items = items
         self.stepped = stepped
+        self._matched = matched
+        self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](most)
         self.interface: Interface | None = None
         self.surroundings: SystemMatrices | None = None
         self.attached: AttachedInertia | None = None
@@ -84,11 +90,6 @@ class Coordinates:
         known = 3 * self.stepped.size + 1
         return np.concatenate([self.stepped.outside.dot(x[:known]), x[known:]])
 
-    @property
-    def no_force(self) -> np.ndarray:
-        """(p, f) of nothing."""
-        return np.zeros(self.stepped.size + self.points)
-
     def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q', q'' of x."""
         s = self.stepped.size
@@ -104,10 +105,19 @@ class Coordinates:
     def load(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
         """Give the system the matrices of a level, and the force (s,) of the body's own that now acts in it."""
         self.stepped = stepped
-        for parameter, value in matrices(stepped, force).items():
+        prepared = self._prepared.get_or_build(stepped.closed, lambda: _containers(stepped))
+        for parameter, value in prepared.items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
+        mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
         if self.interface is not None:
             self.interface.load(stepped)
+
+    def enter(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
+        """``load`` within a run of the dynamic solver."""
+        self.load(mbs, stepped, force)
+        if self._matched:  # a solver may take the mass matrix for constant and keep it
+            mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
+        mbs.solverSignalJacobianUpdate = True
 
     def applied(self, mbs: Any) -> np.ndarray:
         """p (s,) in the present state of the system, of a body without interface."""
@@ -180,10 +190,10 @@ class Coordinates:
             return np.zeros((len(stepped.closed), 0))
         return self.interface.of(stepped).direct
 
-    def store(self, state: State) -> None:
+    def store(self, flags: Sequence[float]) -> None:
         """Write closed contacts and phases into the data node."""
         if "nGenericData" in self.items:
-            self._data[:] = flags(state)
+            self._data[:] = flags
 
     def stored(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
         """Closed contacts and phases from the data node."""
@@ -193,10 +203,12 @@ class Coordinates:
         return tuple(np.flatnonzero(closed > 0.5).tolist()), tuple(PHASES[round(p)] for p in phases.tolist())
 
 
-def flags(state: State) -> list[float]:
+def flags_of(closed: tuple[int, ...], phases: Sequence[Phase]) -> list[float]:
     """Coordinates of the data node."""
-    closed = [float(contact in state.closed) for contact in range(len(state.phases))]
-    return closed + [float(PHASES.index(phase)) for phase in state.phases]
+    flags = [0.0] * len(phases) + [float(PHASES.index(phase)) for phase in phases]
+    for contact in closed:
+        flags[contact] = 1.0
+    return flags
 
 
 def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
@@ -207,3 +219,10 @@ def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
         "stiffnessMatrix": stepped.stiffness,
         "forceVector": force,
     }
+
+
+def _containers(stepped: SteppedLevel) -> dict[str, Any]:
+    """Mass, damping and stiffness as Exudyn's own matrices, which it takes over without looking at every number."""
+    given = matrices(stepped, stepped.drive)
+    del given["forceVector"]
+    return {parameter: exu.MatrixContainer(value) for parameter, value in given.items()}

@@ -13,7 +13,7 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.coordinates import flags, matrices
+from multiphi_exudyn.exudyn_plugin.body.coordinates import flags_of, matrices
 from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.body.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
@@ -148,7 +148,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
         )
     )
     if body.model.contacts:
-        values = flags(body.state)
+        values = flags_of(body.state.closed, body.state.phases)
         items["nGenericData"] = mbs.AddNode(
             NodeGenericData(
                 name=f"Node:{body.name}.level", initialCoordinates=values, numberOfDataCoordinates=len(values)

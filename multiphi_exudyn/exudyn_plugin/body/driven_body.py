@@ -2,9 +2,12 @@
 
     M q'' + D q' + K q = drive + P w(t) + Q w'(t) + (loads and connectors of the system)
 
-Before every step Exudyn is given the modal force at the step's end; the trapezoidal rule makes of it a motion of
-second order in the step. Where an event is in doubt the step is repeated exactly, with w(t) itself and not its mean,
-as a native run would do it: event times, moving stops and quasi-static deflections are those of ``simulate``.
+A body on which nothing else acts is told to Exudyn at the end of every step as its known motion has it (run_ahead.py):
+its histories are those of ``simulate``.
+
+Beside others Exudyn is given the modal force at the end of every step before it; the trapezoidal rule makes of it a
+motion of second order in the step. Where an event is in doubt the step is repeated exactly, with w(t) itself and not
+its mean, as a native run would do it.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from multiphi_exudyn.time.driven.excitation import Excitation
 from multiphi_exudyn.time.driven.motion import DrivenMotion
 from multiphi_exudyn.time.driven.rule import DrivenRule
 from multiphi_exudyn.time.driven.state import DrivenState
+from multiphi_exudyn.time.motion import Motion
 
 __all__ = ["DrivenBody"]
 
@@ -55,7 +59,26 @@ class DrivenBody(MultiPhiBody):
 
     def force_vector(self, stepped: SteppedLevel) -> np.ndarray:
         """Constant force (s,) of the object in a level, at the present time."""
-        return stepped.drive + self._own_force(stepped.closed, self._now)
+        return stepped.drive + self._force_at(stepped.closed, self._now)
+
+    @property
+    def varies(self) -> bool:
+        """Whether its loads vary in time."""
+        return True
+
+    def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
+        return self._forces(closed, self.excitation.values(times))
+
+    def _forces(self, closed: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) of w, w' (k, 2, q) in a level."""
+        level, forces = self._driven.level(closed), np.zeros((len(values), self._size))
+        forces[:, : level.plain.level.modes] = values[:, 0] @ level.force.T + values[:, 1] @ level.force_rate.T
+        return forces
+
+    def _force_at(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+        """The same (s,) at the end of a step, of which many are evaluated at once."""
+        return self._forces(closed, self._channels.at(time)[None])[0]
 
     def shown(
         self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, time: np.ndarray
@@ -65,21 +88,21 @@ class DrivenBody(MultiPhiBody):
         return self._driven.level(stepped.closed), np.vstack([eta, w]), np.vstack([eta_t, w_t])
 
     def before_step(self, mbs: Any, t: float) -> None:
-        """Called by Exudyn before a step that ends at t: the force that will then act."""
+        """Called by Exudyn before a step that ends at t: beside others, the force that will then act."""
+        if self._run_ahead is not None:
+            return
         self._told = t
-        force = self.coordinates.stepped.drive + self._own_force(self.coordinates.stepped.closed, t)
+        force = self.coordinates.stepped.drive + self._force_at(self.coordinates.stepped.closed, t)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
 
-    def after_step(self, mbs: Any, t: float) -> None:
-        """Called by Exudyn when a step is done, and at the start."""
-        if not abs(t - self.time - self._step) <= self._rounding and not self._is_step(mbs, t):
-            return
+    def _check_step(self, mbs: Any, begun: float) -> None:
+        """Do the step from a time [s] on again exactly where something may have happened in it."""
+        t = self.time
         if self._told != t:
             raise MultiPhiValueError(
                 f"PreStepUserFunction: got a function that replaced the loads of {self.name!r}, need it set before "
                 "CreateMultiPhiBody (it is then called after them)"
             )
-        self.time, begun = t, self.time
         x, w = self.coordinates.read(), self._channels.at(t)
         test = self._driven_test()
         armed = all(phase is Phase.ARMED for phase in self._state.phases)
@@ -134,16 +157,18 @@ class DrivenBody(MultiPhiBody):
         return state.plain if isinstance(state, DrivenState) else state
 
     def _own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
-        level, force = self._driven.level(closed), np.zeros(self._size)
-        w, w_t = self._channels.at(time)
-        force[: level.plain.level.modes] = level.force @ w + level.force_rate @ w_t
-        return force
+        return self._force_at(closed, time)  # there is no interface
 
-    def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
-        if rule is not self._rule:
-            forced = DrivenRule(rule, self.excitation, time, self.time)
-            return forced, forced.state(state)
-        self._driven.set_out(time, self.time)
+    def _departing(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
+        forced = DrivenRule(rule, self.excitation, time, self.time)
+        return forced, forced.state(state)
+
+    def _own_motion(self, end: float) -> tuple[Motion, State]:
+        self._driven.set_out(self.time, end)
+        return DrivenMotion(self.model, self._driven, self._motion.start), self._driven.state(self._state)
+
+    def _read_by(self, state: State, time: float) -> tuple[EventRule, State]:
+        self._driven.set_out(time, time)
         return self._driven, self._driven.state(state)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.state import Event, State
+from multiphi_exudyn.events.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedRule
@@ -55,12 +55,6 @@ class ExactStep(ABC):
     _size: int
     _step: float
     _most: float
-    _alone: bool
-
-    @property
-    def events(self) -> list[Event]:
-        """Closings and openings with their exact times."""
-        return self._motion.events
 
     @abstractmethod
     def _write(self, mbs: Any, state: State, force: np.ndarray) -> None:
@@ -69,6 +63,10 @@ class ExactStep(ABC):
     @abstractmethod
     def _keep(self, state: State) -> None:
         """Remember a state, choose its test, and write its level into the data node."""
+
+    @abstractmethod
+    def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
 
     @abstractmethod
     def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
@@ -80,7 +78,7 @@ class ExactStep(ABC):
 
     def _own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
         """(p, f) of the body's own varying loads at a time, in a level."""
-        return self.coordinates.no_force
+        return np.concatenate([self.own_forces(closed, np.array([time]))[0], np.zeros(self.coordinates.points)])
 
     def _repeat(self, mbs: Any, begun: float, before: np.ndarray, after: np.ndarray, jumped: bool = False) -> None:
         """Do the step from ``before`` again, exactly, and write what came out if anything happened in it.
@@ -88,7 +86,7 @@ class ExactStep(ABC):
         Forces of constraints at the end of a step would not do: the trapezoidal rule lets them alternate, true in the
         mean. jumped: whether an own load jumped in the step, which that rule would take for a ramp.
         """
-        here, start, known = self.coordinates, self._state, len(self.events)
+        here, start, known = self.coordinates, self._state, len(self._motion.events)
         own = here.stepped
         given = self._own_force(start.closed, begun) + self._own_force(start.closed, self.time)
         force = self._significant((here.force(before) + here.force(after) - given) / 2, after)
@@ -99,12 +97,12 @@ class ExactStep(ABC):
             self._keep(replace(start, phases=state.phases))
             if not jumped:
                 return
-        if self._alone or instant is None:
+        if instant is None:
             self._write(mbs, state, force)
             return
         present, entered = self._present(mbs, instant, force, own), self._stepped(instant.after.closed)
         present = self._significant(present, after)
-        del self.events[known:]
+        del self._motion.events[known:]
         self._state = start
         here.look_back(self.time - instant.time)
         state, _ = self._travel(before, begun, force, present, entered)
@@ -171,7 +169,7 @@ class ExactStep(ABC):
 
         given: the level in whose modes ``entered`` is told.
         """
-        closed, known = self._state.closed, len(self.events)
+        closed, known = self._state.closed, len(self._motion.events)
 
         def after(level: tuple[int, ...]) -> np.ndarray:
             return self.coordinates.told(entered, given, self._stepped(level))
@@ -179,7 +177,7 @@ class ExactStep(ABC):
         def until(level: tuple[int, ...]) -> np.ndarray:
             return force if level == closed else after(level)
 
-        first = self._rule if self._alone else self._forced(until)
+        first = self._forced(until)
         then = first if entered is force else self._forced(after)
         q, q_t, _ = self.coordinates.split(before)
         acting = (force + self._own_force(closed, begun))[: self._size]
@@ -188,7 +186,7 @@ class ExactStep(ABC):
         r = loaded.level.modes
         state, segment = self._advanced(State(loaded, q[:r], eta_t[:r], self._state.phases), begun, first, True)
         instant = None
-        if len(self.events) > known:
+        if len(self._motion.events) > known:
             times = np.array([segment.end])
             moved = segment.modal(times)[:r, 0] + centre_of(first, closed), segment.modal(times, 1)[:r, 0]
             instant = _Instant(segment.end, moved, state)
@@ -202,7 +200,7 @@ class ExactStep(ABC):
         shifted = replace(
             state, level=rule.level(state.closed), displacement=state.displacement - centre_of(rule, state.closed)
         )
-        motion.rule, motion.state, motion.time = *self._set_out(rule, shifted, begun), begun
+        motion.rule, motion.state, motion.time = *self._departing(rule, shifted, begun), begun
         motion.advance(self.time, to_change)
         if motion.message:
             raise NumericalFailure(f"body {self.name!r}: {motion.message}")
@@ -233,13 +231,13 @@ class ExactStep(ABC):
         """L (k, m) in a level, see Coordinates."""
         return self.coordinates.direct(self._stepped(closed))
 
-    def _set_out(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
+    def _departing(self, rule: EventRule, state: State, time: float) -> tuple[EventRule, State]:
         """Rule and state of an exact motion from a time on."""
         return rule, state
 
     def _significant(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """(p, f), with p = 0 where it is what an iterative solver leaves of the accelerations in x, and alone."""
+        """(p, f), with p = 0 where it is what an iterative solver leaves of the accelerations in x."""
         modal, q_tt = force[: self._size], x[2 * self._size : 3 * self._size]
-        if self._alone or modal.dot(modal) <= NEGLIGIBLE**2 * q_tt.dot(q_tt):
+        if modal.dot(modal) <= NEGLIGIBLE**2 * q_tt.dot(q_tt):
             modal[:] = 0.0
         return force

@@ -16,17 +16,24 @@ class RunRecord:
 
     def __init__(self, start: State, lost: Loss) -> None:
         self._levels: dict[tuple[int, ...], Level] = {}
-        self._lost = lost
+        self._truncated = _truncated(lost)
         self._energy = 0.0
         self.see(start, lost.total)
 
     def see(self, state: State, lost: float = 0.0) -> None:
         """Count a state among those of the run; lost: energy [J] that it had before besides."""
-        self._levels.setdefault(state.closed, state.level.level)
-        energy = state.kinetic + float(state.level.strain(state.displacement))
-        self._energy = max(self._energy, energy + lost)
+        self.include(state.level.level, state.kinetic + float(state.level.strain(state.displacement)) + lost)
 
-    def of(self, events: Iterable[Event]) -> RunSummary:
-        """The summary with what was lost at these events."""
-        lost = sum((event.loss for event in events), self._lost)
+    def include(self, level: Level, energy: float) -> None:
+        """Count a level of the run, and an energy [J] in it."""
+        self._levels.setdefault(level.indices, level)
+        self._energy = max(self._energy, energy)
+
+    def of(self, events: Iterable[Event], truncated: float = 0.0) -> RunSummary:
+        """The summary with what truncation took at these events, and at others [J]."""
+        lost = self._truncated + sum(_truncated(event.loss) for event in events) + truncated
         return RunSummary(tuple(self._levels.values()), lost, self._energy)
+
+
+def _truncated(loss: Loss) -> float:
+    return loss.truncation_kinetic + loss.truncation_strain

@@ -2,8 +2,7 @@
 
     x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (rule.py), and L f
 
-Exudyn's own node sensors record eta and its derivatives and cost next to nothing during a run. The level sensor is a
-user function: it also finds out whether the switching of levels has been replaced by another PostStep function.
+Exudyn's own node sensors record eta, its derivatives and the level, and cost next to nothing during a run.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
-from exudyn.itemInterface import SensorNode, SensorUserFunction
+from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.state import Event
@@ -52,32 +51,21 @@ class BodyHistories:
 
 def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:
     """Sensors of the node's coordinates and of the level; all are kept in memory, none is written to a file."""
-    items = {
-        key: mbs.AddSensor(
-            SensorNode(
-                name=f"Sensor:{body.name}.{key}",
-                nodeNumber=body.items["nGenericODE2"],
-                outputVariableType=variable,
-                storeInternal=True,
-                writeToFile=False,
-            )
-        )
-        for key, variable in RECORDED.items()
-    }
+    items = {key: _sensor(mbs, body, key, "nGenericODE2", kind) for key, kind in RECORDED.items()}
     if "nGenericData" in body.items:
-        items["sLevel"] = mbs.AddSensor(_level_sensor(body))
+        items["sLevel"] = _sensor(mbs, body, "sLevel", "nGenericData", exu.OutputVariableType.Coordinates)
     return items
 
 
-def _level_sensor(body: MultiPhiBody) -> SensorUserFunction:
-    node = body.items["nGenericData"]
-
-    def level(mbs: Any, t: float, sensorNumbers: Any, factors: Any, configuration: Any) -> np.ndarray:
-        body.check_called(mbs, t)
-        return mbs.GetNodeOutput(node, exu.OutputVariableType.Coordinates, configuration)
-
-    return SensorUserFunction(
-        name=f"Sensor:{body.name}.sLevel", sensorUserFunction=level, storeInternal=True, writeToFile=False
+def _sensor(mbs: Any, body: MultiPhiBody, key: str, node: str, kind: Any) -> Any:
+    return mbs.AddSensor(
+        SensorNode(
+            name=f"Sensor:{body.name}.{key}",
+            nodeNumber=body.items[node],
+            outputVariableType=kind,
+            storeInternal=True,
+            writeToFile=False,
+        )
     )
 
 
@@ -92,6 +80,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     time = table["sCoordinates"][:, 0]
     if len(time) == 0:
         raise MultiPhiValueError("sensors: got no stored data, need a run of SolveDynamic before")
+    bodies_of(mbs).check_called(float(time[-1]))
     contacts = [contact.name for contact in body.model.contacts]
     flags = table["sLevel"][:, 1 : 1 + len(contacts)] > 0.5 if contacts else np.zeros((len(time), 0), bool)
     names = body.model.structure.points if points is None else list(points)

@@ -2,11 +2,13 @@
 
 Inside a run Exudyn wraps what a body raises in an error of its own, which blames the user's functions. Called as a
 method of the system or from the module, SolveDynamic checks before, and what a body raises in a run comes out as it is.
+A run of the implicit solver, by SolveDynamic or not, in which the bodies have not been called to its end raises then.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -27,6 +29,9 @@ def install_checks() -> None:
         present = place.SolveDynamic
         if not hasattr(present, _CHECKED):
             place.SolveDynamic = _checked(present)
+    if not hasattr(exu.MainSolverImplicitSecondOrder.SolveSystem, _CHECKED):
+        solver: Any = exu.MainSolverImplicitSecondOrder
+        solver.SolveSystem = _watched(solver.SolveSystem)
 
 
 def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
@@ -50,3 +55,23 @@ def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
 
     setattr(solve_dynamic, _CHECKED, True)
     return solve_dynamic
+
+
+def _watched(solve: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(solve)
+    def solve_system(solver: Any, mbs: Any, *given: Any, **named: Any) -> Any:
+        bodies = mbs.variables.get(BODIES)
+        if bodies is None:
+            return solve(solver, mbs, *given, **named)
+        bodies.begin()
+        try:
+            found = solve(solver, mbs, *given, **named)
+        except BaseException:
+            bodies.clock.next_time = -math.inf
+            raise
+        if solver.output.finishedSuccessfully:
+            bodies.check_called(solver.it.currentTime)
+        return found
+
+    setattr(solve_system, _CHECKED, True)
+    return solve_system

@@ -2,7 +2,10 @@
 
 Exudyn has a single place for such a function. Bodies share it, and what the user had installed before the first
 body is called after them, with the coordinates and levels as the bodies left them. A function installed later
-replaces this one; the level sensor of a body finds out (``check_called``).
+replaces this one; a run that ends without it is found out (``check_called``).
+
+As long as every body knows when it has something to do next, the function compares the time with the first of these
+times, and does nothing else.
 """
 
 from __future__ import annotations
@@ -31,6 +34,10 @@ class SwitchingBody(Protocol):
     items: dict[str, Any]
 
     @property
+    def next_time(self) -> float:
+        """When [s] it has something to do next, -inf where that is at the end of every step."""
+
+    @property
     def rigid(self) -> bool:
         """Whether it has rigid contacts."""
 
@@ -51,17 +58,41 @@ class SwitchingBody(Protocol):
         """Raise for settings of an implicit solver that make it wrong."""
 
 
+class Clock:
+    """The time of the last step [s], and when the bodies have something to do next; ``due`` is called then.
+
+    A class of its own, for what it does is done after every step: attributes of a dict take twice the time.
+    """
+
+    def __init__(self, due: StepFunction) -> None:
+        self.due = due
+        self.time = math.nan
+        self.next_time = -math.inf
+
+    def after_step(self, mbs: Any, t: float) -> bool:
+        """Called by Exudyn; whether the run goes on."""
+        if self.time < t < self.next_time:
+            self.time = t
+            return True
+        return self.due(mbs, t)
+
+
 class Switching(dict[str, SwitchingBody]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
-    preceding, following: the user's own PreStep and PostStep functions, or None. disturbed: whether an event of one
-    body has just moved what hangs on it, maybe another. end: of the run [s], infinite once its warnings are issued.
+    preceding, following: the user's own PreStep and PostStep functions, or None. needed: whether any body has to be
+    called. disturbed: whether an event of one body has just moved what hangs on it, maybe another. end: of the run [s],
+    infinite once its warnings are issued. clock: whose function is the PostStep one.
     """
 
-    preceding: StepFunction | None = None
-    following: StepFunction | None = None
-    disturbed: bool = False
-    end: float = math.inf
+    def __init__(self) -> None:
+        super().__init__()
+        self.preceding: StepFunction | None = None
+        self.following: StepFunction | None = None
+        self.needed = False
+        self.disturbed = False
+        self.end = math.inf
+        self.clock = Clock(self._switch)
 
     def add(self, body: SwitchingBody) -> None:
         """Take a body in; those with rigid contacts come last, so that what they strike has had its own events."""
@@ -75,8 +106,9 @@ class Switching(dict[str, SwitchingBody]):
             body.before_step(mbs, t)
         return self.preceding is None or self.preceding(mbs, t)
 
-    def after_step(self, mbs: Any, t: float) -> bool:
-        """Called by Exudyn; whether the run goes on."""
+    def _switch(self, mbs: Any, t: float) -> bool:
+        """A step after which some body may have something to do, or the start of a run."""
+        self.clock.time, self.clock.next_time = t, -math.inf
         for body in self.values():
             body.after_step(mbs, t)
         if self.disturbed:
@@ -86,7 +118,21 @@ class Switching(dict[str, SwitchingBody]):
         if t >= self.end:
             self.end = math.inf
             self._warn()
+        elif self.following is None:
+            self.clock.next_time = min(self.end, *(body.next_time for body in self.values()))
         return self.following is None or self.following(mbs, t)
+
+    def begin(self) -> None:
+        """A run of a solver begins."""
+        self.clock.time, self.clock.next_time, self.end = math.nan, -math.inf, math.inf
+
+    def check_called(self, t: float) -> None:
+        """Raises if a run has come to t [s] without the bodies: somebody else's PostStep function is installed."""
+        if self.needed and not self.clock.time >= t:
+            raise MultiPhiValueError(
+                f"PostStepUserFunction: got a function that replaced the switching of {next(iter(self))!r}, need it "
+                "set before CreateMultiPhiBody (it is then called after the switching)"
+            )
 
     def _warn(self) -> None:
         """Issue what the bodies have to say of the run that ends."""
@@ -96,15 +142,16 @@ class Switching(dict[str, SwitchingBody]):
 
     def install(self, mbs: Any) -> None:
         """Become the system's PostStep function, followed by the present one."""
+        self.needed = True
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
-        if present != self.after_step:
+        if present != self.clock.after_step:
             self.following = present
-            mbs.SetPostStepUserFunction(self.after_step)
+            mbs.SetPostStepUserFunction(self.clock.after_step)
 
     def installed(self, mbs: Any) -> bool:
         """Whether these bodies switch in a run of the system."""
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
-        return present is not None and present == self.after_step
+        return present is not None and present == self.clock.after_step
 
     def install_before(self, mbs: Any) -> None:
         """Become the system's PreStep function, followed by the present one."""
@@ -153,7 +200,7 @@ def nothing_acts_on(mbs: Any, node: Any, body: Any) -> bool:
     before = _user_function("PreStep", mbs.GetPreStepUserFunction())
     if bodies.following or bodies.preceding or before not in (None, bodies.before_step):
         return False
-    if mbs.GetPostNewtonUserFunction():
+    if not bodies.installed(mbs) or mbs.GetPostNewtonUserFunction():
         return False
     own = mbs.GetObject(body)
     if any(own[key] for key in own if key.endswith("UserFunction")):

@@ -87,10 +87,18 @@ class SteppedLevel:
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,)."""
-        q, v = np.zeros(self.size), np.zeros(self.size)
-        q[: len(eta)], v[: len(eta)] = eta, eta_t
-        q_t = self.from_displacement @ q + self.from_velocity @ v + self.from_force @ (force + self.drive)
-        return q, q_t, self.acceleration(q, q_t, force)
+        q, q_t, q_tt = np.split(self.states(eta[None, :], eta_t[None, :], force[None, :])[0], 3)
+        return q, q_t, q_tt
+
+    def states(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s)."""
+        found = np.zeros((len(eta), 3 * self.size))
+        q, q_t, q_tt = np.split(found, 3, axis=1)
+        v, r = np.zeros_like(q), eta.shape[1]
+        q[:, :r], v[:, :r] = eta, eta_t
+        q_t[:] = q @ self.from_displacement.T + v @ self.from_velocity.T + (force + self.drive) @ self.from_force.T
+        q_tt[:] = (force + self.drive - q_t @ self.damping.T - q @ self.stiffness.T) @ self._mass_inverse.T
+        return found
 
     @functools.cached_property
     def outside(self) -> np.ndarray:

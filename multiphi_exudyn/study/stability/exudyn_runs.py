@@ -29,7 +29,7 @@ __all__ = ["FULL_MODEL", "USER_OBJECT", "loops_compared", "run_full_model", "run
 
 USER_OBJECT, FULL_MODEL = "user object", "full model"
 MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; matched modes need more than two
-STEPS_PER_PERIOD = 200  # of the full model in it, and of the user object where a load varies within a step
+STEPS_PER_PERIOD = 200  # of the full model in it
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
 GRID = 10_001  # times at which two native answers are compared
@@ -40,8 +40,7 @@ MOST_WORDS = 200  # characters of a cause that is not our own
 
 def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit_s: float) -> Outcome:
     """The body alone in Exudyn, its modes matched to the step where ``most_steps`` allow it."""
-    per_period = STEPS_PER_PERIOD if problem.driven else MATCHED_PER_PERIOD
-    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * per_period))
+    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * MATCHED_PER_PERIOD))
     steps, matched = min(wanted, most_steps), wanted <= most_steps
 
     def solve() -> Outcome:

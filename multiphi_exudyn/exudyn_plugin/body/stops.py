@@ -1,0 +1,146 @@
+"""Stops: what Exudyn is told of a known motion, and at the ends of which steps.
+
+A stop is the end of a step in which something changes: an event, or a contact that is refused. Of a body whose loads
+vary it is the end of every step. It is planned for steps of equal length, h, from the end of a step at t on:
+
+    t_k = t + k h,   k = 0, 1, ...
+
+with the exact state at t_k, and with the one that Exudyn's own steps make of the last stop, if nobody disturbs them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
+from multiphi_exudyn.exudyn_plugin.body.known_motion import Stretch
+from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
+from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.levels.model import MultiPhiModel
+
+__all__ = ["Departure", "KnownBody", "StepsOf", "Stops", "stops_of"]
+
+SAME_PLACE = 1e-9  # of a step: a change so close behind the end of one may be rounding of the times
+
+StepsOf = Callable[[SteppedLevel], UndisturbedSteps]
+
+
+class KnownBody(Protocol):
+    """What is needed of a body."""
+
+    name: str
+    model: MultiPhiModel
+    coordinates: Coordinates
+
+    @property
+    def varies(self) -> bool:
+        """Whether its loads vary in time."""
+
+    def check_matched(self, step: float) -> None:
+        """Raises where steps of this length [s] are not those to which its modes are matched."""
+
+    def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
+        """The level of closed contacts as the solver has it."""
+
+    def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The end of a step at ``time`` [s], the ``index``-th of the run, from which steps of length ``step`` [s] follow.
+
+    level, state: as Exudyn has them there, (q, q', q'') (3, s). done: how many changes of the stretch are behind it.
+    """
+
+    time: float
+    index: int
+    step: float
+    level: SteppedLevel
+    state: np.ndarray
+    done: int
+
+
+@dataclass(frozen=True)
+class Stops:
+    """n stops. times: [s]; due: a step that ends at this time [s] or later is the stop. indices: of these steps.
+
+    done: how many changes of the stretch are then behind. levels, states (n, 3, s): what is written; flags (n, 2 c):
+    what goes into the data node. expected (n, s): q that Exudyn has before, largest (n,): the largest of them so far.
+    """
+
+    times: list[float]
+    due: list[float]
+    indices: list[int]
+    done: list[int]
+    levels: list[SteppedLevel]
+    states: np.ndarray
+    flags: np.ndarray
+    expected: np.ndarray
+    largest: list[float]
+
+
+def stops_of(
+    body: KnownBody, stretch: Stretch, start: Departure, steps_of: StepsOf, most: int, missed: bool = False
+) -> Stops:
+    """The stops within a stretch among the next ``most`` ends of steps, the one at the departure included.
+
+    missed: that one is a stop, whatever comes.
+    """
+    last = min(most - 1, math.floor((stretch.end - start.time) / start.step + SAME_PLACE))
+    coming = stretch.changes[start.done :]
+    places = np.ceil((coming - start.time) / start.step - SAME_PLACE)
+    places = np.maximum(places + (start.time + start.step * places < coming), 0).astype(int)
+    coming, places = coming[places <= last], places[places <= last]
+    every = np.arange(last + 1) if body.varies else places if not missed else np.append(0, places)
+    stops, first = np.unique(every, return_index=True)
+    times = start.time + start.step * stops
+    if stretch.failure:
+        known = times < stretch.end
+        stops, first, times = stops[known], first[known], times[known]
+    due = times - SAME_PLACE * start.step
+    if not (body.varies or missed):
+        due = np.minimum(due, coming[first])
+    levels, states, flags = _states(body, stretch, times)
+    done = start.done + np.searchsorted(places, stops, side="right")
+    expected = _expected(start, stops, levels, states, steps_of)
+    largest = np.maximum.accumulate(np.max(np.abs(expected), axis=1, initial=0.0)).tolist()
+    given = times.tolist(), due.tolist(), (start.index + stops).tolist(), done.tolist()
+    return Stops(*given, levels, states, flags, expected, largest)
+
+
+def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray]:
+    """Levels, states (n, 3, s) and flags (n, 2 c) at times (n,) [s], the phases as on entering the level."""
+    here, count = body.coordinates.stepped, len(times)
+    levels, states = [here] * count, np.empty((count, 3, here.size))
+    flags = np.zeros((count, 2 * len(body.model.contacts)))
+    for moments in stretch.at(times) if count else ():
+        places, closed = moments.places, moments.level.level.indices
+        stepped, forces = body.stepped_level(closed), body.own_forces(closed, times[places])
+        states[places] = stepped.states(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
+        flags[np.ix_(places, np.array(closed, dtype=int))] = 1.0
+        flags[places, flags.shape[1] // 2 :] = moments.phases
+        for place in places.tolist():
+            levels[place] = stepped
+    return levels, states, flags
+
+
+def _expected(
+    start: Departure, stops: np.ndarray, levels: list[SteppedLevel], states: np.ndarray, steps_of: StepsOf
+) -> np.ndarray:
+    """q (n, s) that undisturbed steps make of the state at the departure and at every stop up to the next one."""
+    if not len(stops):
+        return np.zeros((0, start.level.size))
+    before, counts = np.concatenate([start.state[None], states[:-1]]), np.diff(stops, prepend=0)
+    found, given = np.empty((len(stops), start.level.size)), [start.level, *levels[:-1]]
+    numbers = {stepped.closed: (number, stepped) for number, stepped in enumerate(given)}
+    number = np.array([numbers[stepped.closed][0] for stepped in given])
+    for mark, stepped in numbers.values():
+        here = number == mark
+        found[here] = steps_of(stepped).after(before[here], counts[here])[:, 0]
+    return found
