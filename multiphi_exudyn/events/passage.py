@@ -139,11 +139,11 @@ class Passage(ContactFunctions):
         """Energy [J] that an impact dissipates: what the structure lost, as long as no stop moves."""
         return lost
 
-    def _unseen(self, state: State, rows: np.ndarray, touching: list[int]) -> np.ndarray:
-        """Gap velocities (k,) that the free motion turns back before the gap is more than round-off of its terms."""
+    def _unseen(self, state: State, rows: np.ndarray, touching: list[int], acceleration: np.ndarray) -> np.ndarray:
+        """Gap velocities (k,) that an acceleration turns back before the gap is more than round-off of its terms."""
         level, place = state.level, np.abs(state.displacement)
         gaps = np.abs(level.level.gap_rows[touching]) @ place + np.abs(level.gap_constants[touching])
-        return np.sqrt(2 * ZERO * gaps * np.maximum(-(rows @ state.acceleration), 0.0))
+        return np.sqrt(2 * ZERO * gaps * np.maximum(-(rows @ acceleration), 0.0))
 
     def _sizes(self, rows: np.ndarray, *states: State) -> np.ndarray:
         """What gap velocities (k,) could be at the speeds of these states, whose directions an impact mixes."""

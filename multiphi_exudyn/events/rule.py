@@ -335,17 +335,25 @@ class EventRule(Passage):
 
         Motion is acceleration, or where that presses none of them the first derivative that counts.
         """
-        own = state.level.level
-        rows = own.speed_rows[touching]
-        speeds = rows @ state.velocity
-        resting = np.abs(speeds) <= np.maximum(
-            RESTING * self._sizes(rows, released, state), self._unseen(state, rows, touching)
-        )
-        if not np.any(resting):
-            return set()
+        rows = state.level.level.speed_rows[touching]
+        speeds = np.abs(rows @ state.velocity)
+        sizes = np.abs(rows) @ np.maximum(state.accelerating, released.accelerating)
+        resting = speeds <= RESTING * self._sizes(rows, released, state)
+        acceleration, multipliers = self._pressed(state, touching, rows, sizes, resting)
+        unseen = speeds <= self._unseen(state, rows, touching, acceleration)
+        if np.any(unseen & ~resting):
+            resting |= unseen
+            _, multipliers = self._pressed(state, touching, rows, sizes, resting)
         at_rest = np.array(touching)[resting].tolist()
-        sizes = np.abs(rows[resting]) @ np.maximum(state.accelerating, released.accelerating)
-        _, multipliers = self._nearest(state.level, at_rest, rows[resting], state.acceleration, sizes)
         pressing = {i for i, force in zip(at_rest, multipliers, strict=True) if force > 0}
         pressing = pressing or {i for i in at_rest if self._standing(state, i) is Phase.REFUSED}
         return self._joining(state, set(), pressing)
+
+    def _pressed(
+        self, state: State, touching: list[int], rows: np.ndarray, sizes: np.ndarray, resting: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The acceleration (r,) that contacts at rest, of those that touch, leave of the free one, and their forces."""
+        if not np.any(resting):
+            return state.acceleration, np.zeros(0)
+        at_rest = np.array(touching)[resting].tolist()
+        return self._nearest(state.level, at_rest, rows[resting], state.acceleration, sizes[resting])

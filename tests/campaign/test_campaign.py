@@ -44,6 +44,11 @@ def test_an_impulse_that_is_round_off_closes_no_contact():
     assert judged("truncated", 3030)[0] == [("ok", "")]
 
 
+def test_a_contact_that_an_impact_lets_go_slowly_is_let_go():
+    """Two rigid stops at 1e-5 rad, one held and one struck: as if held both, they pushed with 1e4 times the momentum."""
+    assert judged("redundant", 412)[0] == [("ok", "")]
+
+
 def test_a_load_whose_numbers_are_large_hides_no_impact():
     """In other units the speeds of the channels outweigh those of the structure, of which an impact is judged."""
     assert judged("units", 6)[0] == [("ok", "")]
