@@ -20,7 +20,7 @@ BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, an
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": ("multiphi_exudyn/study",),
-    "numba": ("multiphi_exudyn/time/compiled",),
+    "numba": ("multiphi_exudyn/time/compiled", "multiphi_exudyn/mathematics/compiled.py"),
     "distributed": ("multiphi_exudyn/study/sweep",),
 }
 WITH_NUMBA = "multiphi_exudyn.time.compiled"  # may be imported inside a function, as numba may
