@@ -1,0 +1,108 @@
+"""Arrays: what the loop works on, in three flat buffers: ints (int64), numbers (float64), waves (complex128).
+
+Offsets are ints. n = r + q coordinates xi = (eta, w) of a level with r modes and q channels, p exponentials, c elements.
+
+record     where                     what stands in it
+---------  ------------------------  -----------------------------------------------------------------------------------
+run        ints[0 ...]               sizes, where tables and scratch memory begin, states, counts, what is needed, causes
+           numbers[0 ...]            times, energies lost, chatter, what a failure is told with
+element    ints[ints[KINDS] + i]     COMPLIANT, RIGID or VISCOUS; chain, stiffness and direction in tables of their own
+level      ints[level ...]           its key: a small integer for every element; its sizes; where its parts begin:
+                                     motion (r, 2n + 1)  eta'' = motion . (xi, xi', 1), gaps (c, n + 1), speeds (c, n + 1),
+                                     potential, carried, patterns (energies), its response (flat_response.py), its exits
+exit       ints[exit ...]            element, the state it asks for, whether it may recover, its signal, and the signal
+                                     that the element would have in the level entered alone, -1 while nobody needed it
+signal     ints[signal ...]          s = row . (xi, xi', 1): where the row (2n + 1,) stands, and the rows times V (2, p)
+map        ints[map ...]             xi_m = matrix xi_l + offset, xi'_m = rates xi'_l + rate_offset: channels included
+state      ints[state ...]           level, where xi, xi' and their scales stand, the phase of every exit
+piece      ints[piece ...]           of the channels: w(t) = Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: its terms
+segment    ints, numbers[...]        level, piece, first event, phases; start, end, armed at, horizon, work at its start; xi, xi'
+event      ints, numbers[...]        element, state entered (SHARED: an impulse on one that stays); time, losses, impulse
+
+A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for: ``NEED``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+__all__ = ["Buffers"]
+
+# ---------------------------------------------------------------------- run record, ints
+
+ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
+KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
+LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
+PIECES, PIECE_COUNT, PIECE = 13, 14, 15  # records of pieces, how many, the present one
+NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
+CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
+TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
+CHANGES, CHANGE_IMPULSES, CHANGE_COUNT = 25, 26, 27  # of the decision under way: ints, numbers
+WINDOW, DECISIONS, RING = 28, 29, 30  # chatter: size of the window, decisions so far, where their ring begins
+STOP_AT_EVENT = 31
+SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
+COORDINATE_NUMBERS, COORDINATE_COUNT, COORDINATE_ROOM = 36, 37, 38
+PHASE_INTS, PHASE_COUNT, PHASE_ROOM = 39, 40, 41
+EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM, EVENTS_TAKEN = 42, 43, 44, 45, 46
+
+# scratch memory: where it begins
+FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
+FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS = 53, 54, 55, 56
+DRIVE, DRIVE_WAVES = 59, 60  # w, w', w'' (3, q) and of which terms they are the sums (3, q); terms of the piece, moved on
+SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
+SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
+ACCELERATION = 70
+ROWS, LEAST, LEAST_SIZES, IMPULSES, FURTHER, LEAST_NUMBERS, LEAST_INTS, CHANGE = 73, 74, 75, 76, 77, 78, 79, 80
+ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED = range(81, 91)  # sets
+HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
+JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
+
+# states, as records in the run record
+CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(112, 176, 8)
+RUN_INTS = 176
+
+# ---------------------------------------------------------------------- run record, numbers
+
+TIME, HORIZON, LAST_DECISION, ALLOWED, WORK = 0, 1, 2, 3, 4
+TOLD = 8  # three numbers of a failure
+LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
+RUN_NUMBERS = 36
+BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, LOSSES = 0, 1, 2, 3, 4, 5
+
+# ---------------------------------------------------------------------- other records, ints
+
+COMPLIANT, RIGID, VISCOUS = 0, 1, 2
+OPEN, CLOSE = 0, 1  # states of a contact
+ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
+
+NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
+FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY = range(10, 19)
+SQUARES, DAMPINGS, ALONE = 19, 20, 21  # for the forced response
+LEVEL_INTS = 24
+
+ELEMENT, ASKED, STAYS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
+EXIT_INTS = 7
+ROW, WAVE, RATED = 0, 1, 2
+SIGNAL_INTS = 3
+
+MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET = 0, 1, 2, 3
+MAP_INTS = 4
+MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
+
+LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
+STATE_INTS = 8
+
+PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
+CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
+SHARED = -1
+SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 5
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
+
+# ---------------------------------------------------------------------- answers
+
+OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES = 1, 2, 3, 4
+NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE = 1, 2, 3, 4, 5, 6, 7
