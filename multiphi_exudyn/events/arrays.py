@@ -24,9 +24,6 @@ A level is found by its key in a table, and so is a map by its two levels. Whate
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
 
 __all__ = ["Buffers"]
@@ -66,7 +63,7 @@ RUN_INTS = 176
 
 # ---------------------------------------------------------------------- run record, numbers
 
-TIME, HORIZON, LAST_DECISION, ALLOWED, WORK = 0, 1, 2, 3, 4
+TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME = 0, 1, 2, 3, 4, 5
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 RUN_NUMBERS = 36
@@ -106,3 +103,38 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
 NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES = 1, 2, 3, 4
 NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE = 1, 2, 3, 4, 5, 6, 7
+
+
+class Buffers:
+    """The three buffers, which grow by doubling; whatever is put in them stays where it is."""
+
+    def __init__(self) -> None:
+        self.ints, self.numbers, self.waves = np.zeros(1024, np.int64), np.zeros(4096), np.zeros(1024, complex)
+        self._used = {"ints": 0, "numbers": 0, "waves": 0}
+
+    @property
+    def all(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """ints, numbers, waves."""
+        return self.ints, self.numbers, self.waves
+
+    @property
+    def size(self) -> int:
+        """Bytes in use."""
+        return sum(count * getattr(self, name).itemsize for name, count in self._used.items())
+
+    def take(self, name: str, count: int) -> int:
+        """Where so many zeros begin in the buffer ``name``."""
+        start, buffer = self._used[name], getattr(self, name)
+        self._used[name] = start + count
+        if start + count > len(buffer):
+            longer = np.zeros(max(2 * len(buffer), start + count), buffer.dtype)
+            longer[:start] = buffer[:start]
+            setattr(self, name, longer)
+        return start
+
+    def put(self, name: str, values: object) -> int:
+        """Where these values begin in the buffer ``name``."""
+        given = np.asarray(values).ravel()
+        start = self.take(name, len(given))
+        getattr(self, name)[start : start + len(given)] = given
+        return start
