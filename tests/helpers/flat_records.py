@@ -35,11 +35,17 @@ class Buffers:
         flat_basis.describe_basis(*self.all, record)
         return record
 
-    def put_response(self, response):
+    def put_response(self, response, squares, damping):
+        """``modal_response(squares, damping)``."""
         r, p = response.shapes.shape
         maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
+        alone = (squares == 0) & ~np.any(damping, axis=1) | response.diagonal
+        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
         basis, reached = self.put_basis(response.basis), self.put_ints(np.zeros(2 * p))
-        record = self.put_ints([r, basis, reached, *(self.put_waves(values) for values in maps)])
+        places = [self.put_waves(values) for values in maps]
+        places += [self.put_numbers(squares), self.put_numbers(np.diagonal(damping) / 2)]
+        places += [self.put_ints(alone), self.put_ints(poles)]
+        record = self.put_ints([r, basis, reached, *places])
         flat_response.reached_modes(self.ints, self.waves, record)
         return record
 
