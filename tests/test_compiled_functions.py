@@ -61,6 +61,11 @@ def ratio(numbers: Numbers) -> float:
 
 
 @compiled
+def power_of_two_above(value: float) -> float:
+    return math.ldexp(1.0, math.frexp(value)[1])
+
+
+@compiled
 def complex_ratio(waves: Waves) -> None:
     waves[0] = waves[1] / waves[2]
 
@@ -154,6 +159,11 @@ def test_a_compiled_function_returns_an_integer_or_nothing():
     ints = np.array([0, 9, 7, 5])
     assert Entry(falling)(ints, 3) == falling(ints, 3) == 1
     assert Entry(turn)(*buffers()[1:], 2) is None
+
+
+def test_a_number_is_taken_apart_and_put_together_as_in_python():
+    for value in (0.75, -3.0, 1e-310, 1e300):
+        assert Entry(power_of_two_above)(value) == power_of_two_above(value)
 
 
 def test_a_division_by_zero_is_infinite_and_no_error():
@@ -260,6 +270,32 @@ def test_a_damaged_file_is_compiled_again(made, damage):
     assert len(made) == 6
     assert program()(ONES) == 6.0
     assert len(made) == 6
+
+
+@pytest.fixture
+def two_processes(monkeypatch):
+    """Work that is shared between two processes, however little it is."""
+    monkeypatch.setattr(compilation, "WORTH_A_PROCESS", 2)
+    monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
+
+
+def test_a_few_lines_are_compiled_by_one_process(monkeypatch):
+    monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
+    assert len(compilation.shares([square, turn, total])) == 1
+
+
+@pytest.mark.usefixtures("two_processes")
+def test_processes_share_out_functions_by_their_lines():
+    assert compilation.shares([square, turn, total]) == [[total], [turn, square]]
+    assert compilation.compile_elsewhere([turn, square]).keys() == {turn, square}
+    assert Entry(total)(*buffers(), 4, 1.5) == pytest.approx(total(*buffers(), 4, 1.5), rel=1e-15)
+
+
+@pytest.mark.usefixtures("two_processes")
+def test_what_another_process_cannot_import_is_compiled_here():
+    run = program()
+    assert compilation.compile_elsewhere([run.function]) == {}
+    assert run(ONES) == 6.0
 
 
 def test_without_a_folder_that_can_be_written_every_process_compiles_and_says_so(made, monkeypatch, tmp_path, capsys):
