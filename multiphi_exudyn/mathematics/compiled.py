@@ -1,178 +1,149 @@
-"""Functions on flat buffers, run as plain Python or compiled by numba.
+"""Functions on flat buffers, run as plain Python or compiled.
 
-A function marked ``compiled`` takes buffers and scalars only, returns one scalar or nothing and writes everything else
-into the buffers. The name stays the plain function: called from Python it runs as Python, with NumPy arrays as buffers.
-``entry(function)`` is the same function compiled, with all that it calls, on its first call.
-
-Each function is compiled by itself and called through its address: numba's effort is then linear in the number of
-lines, while functions that see one another are optimised again in every caller.
+A function marked ``compiled`` keeps its name for the plain function: called from Python it runs as Python, with NumPy
+arrays as buffers. ``entry(function)`` is the same function compiled, with all that it calls, at its first call; what is
+compiled is kept on disk, and loaded from there without numba. Where numba is missing, an entry is the plain function.
 """
 
 from __future__ import annotations
 
-import cmath
 import ctypes
 import importlib.util
-import math
-from collections.abc import Callable, Iterator
-from types import CodeType, FunctionType
-from typing import Any, TypeVar, get_type_hints
+import sys
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FunctionType, NoneType
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
+from multiphi_exudyn.mathematics.compiled_cache import cache_file, keep, kept, writable_folder
+from multiphi_exudyn.mathematics.flat_function import (
+    Ints,
+    Numbers,
+    Waves,
+    compiled,
+    digest,
+    reached,
+    signature,
+    symbol,
+)
 
-__all__ = ["Ints", "Numbers", "Waves", "available", "compiled", "entry"]
+__all__ = ["Entry", "Ints", "Numbers", "Waves", "available", "compile_entries", "compiled", "entry"]
 
-Ints = NDArray[np.int64]
-Numbers = NDArray[np.float64]
-Waves = NDArray[np.complex128]
-Function = TypeVar("Function", bound=Callable[..., Any])
+TYPES: dict[Any, np.dtype] = {Ints: np.dtype(np.int64), Numbers: np.dtype(float), Waves: np.dtype(complex)}
+SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
+START, EACH_LINE = 1.0, 0.01  # s, of a compilation on a busy machine, to tell how long one has to wait
 
-BUFFERS: dict[Any, Any] = {Ints: np.dtype(np.int64), Numbers: np.dtype(np.float64), Waves: np.dtype(np.complex128)}
-SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, type(None): None}
-MODULES = (math, cmath)  # what a compiled function may use beside numbers and compiled functions
-BUILTINS = frozenset({"abs", "bool", "complex", "float", "int", "max", "min", "range", "round"})
-
-_registered: set[FunctionType] = set()
+_one_at_a_time = threading.RLock()  # neither numba nor LLVM is meant for two threads
+_entries: list[Entry] = []
 
 
 def available() -> bool:
-    """Whether functions can be compiled: numba is installed."""
+    """Whether functions are compiled: numba is installed."""
     return importlib.util.find_spec("numba") is not None
 
 
-def compiled(function: Function) -> Function:
-    """Mark a function on flat buffers as one to compile; it stays the plain function."""
+def entry(function: Callable[..., Any]) -> Entry:
+    """``function`` to be called compiled, with contiguous NumPy arrays and scalars."""
     assert isinstance(function, FunctionType)
-    _registered.add(function)
-    return function
+    _entries.append(Entry(function))
+    return _entries[-1]
 
 
-def entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """``function`` compiled, on its first call, for contiguous NumPy arrays and scalars; itself without numba."""
-    assert isinstance(function, FunctionType)
-    return _Entry(function) if available() else function
+def compile_entries() -> Path | None:
+    """Compile all entries of the modules loaded so far; the file that keeps them, None if none could be written."""
+    for each in _entries:
+        each.native()
+    return cache_file()
 
 
-class _Entry:
-    """A function of Python that calls compiled code."""
+class Entry:
+    """A function that Python calls compiled; ``function`` is the plain one."""
 
     def __init__(self, function: FunctionType) -> None:
         self.function = function
-        self._types, _ = signature(function)
         self._native: Callable[..., Any] | None = None
+        self._code: Any = None  # keeps the machine code where it is
 
     def __call__(self, *arguments: Any) -> Any:
-        """The result of the compiled function."""
-        if self._native is None:
-            self._native = _native(self.function)
-        return self._native(*map(_passed, self._types, arguments))
+        """What the function returns."""
+        try:
+            return (self._native or self.native())(*arguments)
+        except ctypes.ArgumentError as error:
+            raise MultiPhiTypeError(f"{self.function.__qualname__}: {error}") from error
 
+    def native(self) -> Callable[..., Any]:
+        """The function as ctypes calls it, made at the first call; the plain one without numba."""
+        with _one_at_a_time:
+            if self._native is None:
+                self._native = self._loaded() if available() else self.function
+        return self._native
 
-def _passed(kind: Any, argument: Any) -> Any:
-    """An argument as ctypes takes it: a buffer by reference, a scalar as it is."""
-    if kind in SCALARS:
-        return argument
-    if argument.dtype != BUFFERS[kind]:
-        raise MultiPhiTypeError(f"buffer: got {argument.dtype}, need {BUFFERS[kind]}")
-    return ctypes.byref(ctypes.c_int64.from_buffer(argument))
+    def _loaded(self) -> Callable[..., Any]:
+        try:
+            from multiphi_exudyn.mathematics.machine_code import load
 
-
-def signature(function: FunctionType) -> tuple[tuple[Any, ...], Any]:
-    """(kinds of the arguments, kind of the result): a buffer's type, int, float, or None's type."""
-    hints = get_type_hints(function)
-    code = function.__code__
-    kinds = tuple(hints.get(name) for name in code.co_varnames[: code.co_argcount])
-    result = hints.get("return")
-    if result not in SCALARS or any(kind not in BUFFERS and kind not in SCALARS for kind in kinds):
-        raise MultiPhiTypeError(
-            f"{function.__qualname__}: got the annotations {hints}, need Ints, Numbers, Waves, int and float, and one "
-            "scalar or None as result"
-        )
-    return kinds, result
-
-
-def callees(function: FunctionType) -> dict[str, FunctionType]:
-    """The compiled functions that a function calls, under the names it uses."""
-    return {name: value for name, value in used(function).items() if isinstance(value, FunctionType)}
-
-
-def used(function: FunctionType) -> dict[str, Any]:
-    """What a function takes from its module, by name: numbers, compiled functions, math and cmath."""
-    found = {}
-    for name in function.__code__.co_names:
-        value = function.__globals__.get(name)
-        if isinstance(value, bool | int | float | complex) or value in MODULES or _is_compiled(value):
-            found[name] = value
-        elif value is not None:
-            raise MultiPhiTypeError(
-                f"{function.__qualname__}: got {name} of type {type(value).__name__}, need numbers, compiled functions "
-                "and the modules math and cmath"
+            address, self._code = load(_objects(reached(self.function)), symbol(self.function))
+        except ImportError as error:
+            warnings.warn(
+                f"numba is installed but cannot be imported ({error}): the loop runs as plain Python, 50 times slower",
+                MultiPhiWarning,
+                stacklevel=4,
             )
-    if any(isinstance(constant, CodeType) for constant in function.__code__.co_consts):
-        raise MultiPhiTypeError(f"{function.__qualname__}: got a function inside, need loops")
-    return found
+            return self.function
+        arguments, result = signature(self.function)
+        native: Any = ctypes.CFUNCTYPE(SCALARS[result])(address)
+        native.argtypes = [_Buffer(TYPES[kind]) if kind in TYPES else SCALARS[kind] for kind in arguments]
+        return native
 
 
-def _is_compiled(value: Any) -> bool:
-    return isinstance(value, FunctionType) and value in _registered
+def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
+    """The object files of functions, from the disk as far as they are kept there."""
+    digests = {symbol(function): digest(function) for function in functions}
+    assert len(digests) == len(functions), "two functions of one name"
+    objects = kept(digests)
+    missing = [function for function in functions if symbol(function) not in objects]
+    if missing:
+        made = dict(zip(map(symbol, missing), _compile(missing), strict=True))
+        keep({name: (digests[name], code) for name, code in made.items()})
+        objects |= made
+    return list(objects.values())
 
 
-def reached(function: FunctionType) -> list[FunctionType]:
-    """``function`` and all that it calls, callees first."""
+def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
+    """The object files of functions, announced by a line on stderr."""
+    from multiphi_exudyn.mathematics.compilation import compile_functions
 
-    def visit(current: FunctionType, above: tuple[FunctionType, ...]) -> Iterator[FunctionType]:
-        if current in above:
-            raise MultiPhiTypeError(f"{current.__qualname__}: got a recursion, need loops")
-        for callee in callees(current).values():
-            if callee not in order:
-                yield from visit(callee, (*above, current))
-        yield current
-
-    order: dict[FunctionType, None] = {}
-    for each in visit(function, ()):
-        order[each] = None
-    return list(order)
+    lines = sum(len({line for *_, line in function.__code__.co_lines()}) for function in functions)
+    often = "once on this machine" if writable_folder() else "in every process: no folder to keep it in is writable"
+    print(f"compiling the loop: about {START + EACH_LINE * lines:.0f} s, {often}", file=sys.stderr)
+    return compile_functions(functions)
 
 
-_kept: dict[FunctionType, Any] = {}  # the compiled functions of this process
+class _Buffer:
+    """What a buffer is for ctypes: the address of its first number, remembered for the array asked about last.
 
+    That array may be deleted meanwhile, but not moved: NumPy enlarges no array in its place that somebody remembers.
+    """
 
-def _native(function: FunctionType) -> Callable[..., Any]:
-    """The compiled function as ctypes calls it."""
-    for each in reached(function):
-        if each not in _kept:
-            _kept[each] = _compile(each)
-    kinds, result = signature(function)
-    arguments = (ctypes.c_void_p if kind in BUFFERS else SCALARS[kind] for kind in kinds)
-    return ctypes.CFUNCTYPE(SCALARS[result], *arguments)(_kept[function].address)
+    def __init__(self, dtype: np.dtype) -> None:
+        self._dtype = dtype
+        self._last: tuple[Callable[[], Any], ctypes.c_void_p] = (lambda: self, ctypes.c_void_p())
 
+    def from_param(self, array: np.ndarray) -> ctypes.c_void_p:
+        """The address of an array."""
+        last, address = self._last
+        return address if last() is array else self._address(array)
 
-def _compile(function: FunctionType) -> Any:
-    """A function compiled by itself; what it calls is called by its symbol."""
-    import numba
-
-    called = {
-        name: numba.types.ExternalFunction(_kept[callee].native_name, _numba_signature(callee))
-        for name, callee in callees(function).items()
-    }
-    alone = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
-    return numba.cfunc(_numba_signature(function), error_model="numpy")(alone)
-
-
-def _numba_signature(function: FunctionType) -> Any:
-    """The signature in numba's types."""
-    from numba import types
-
-    kinds = {
-        Ints: types.CPointer(types.int64),
-        Numbers: types.CPointer(types.float64),
-        Waves: types.CPointer(types.complex128),
-        int: types.int64,
-        float: types.float64,
-        type(None): types.void,
-    }
-    arguments, result = signature(function)
-    return kinds[result](*(kinds[kind] for kind in arguments))
+    def _address(self, array: np.ndarray) -> ctypes.c_void_p:
+        if not (isinstance(array, np.ndarray) and array.dtype == self._dtype and array.flags.carray):
+            got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
+        address = ctypes.c_void_p(array.ctypes.data)
+        self._last = (weakref.ref(array), address)
+        return address

@@ -148,9 +148,7 @@ def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
         from multiphi_exudyn.time.compiled.loop import CompiledLoop
     except ImportError as error:
         if needed:
-            raise MultiPhiError(
-                "compiled: got True without numba, need it: pip install multiphi-exudyn[fast]"
-            ) from error
+            raise MultiPhiError("compiled: got True without numba, need it: pip install numba") from error
         return None
     return CompiledLoop(rule)
 

@@ -182,8 +182,6 @@ def test_of_two_signals_that_fall_together_it_names_the_one_the_descent_finder_n
     assert Search(basis, twice).simultaneous(Descent(found.time, found.signal)) == [0, 1]
 
 
-
-
 @pytest.mark.skipif(not compiled.available(), reason="needs numba")
 @pytest.mark.parametrize("kind", KINDS)
 def test_compiled_it_gives_what_it_gives_as_plain_python(kind):
