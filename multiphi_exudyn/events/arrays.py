@@ -33,7 +33,7 @@ __all__ = ["Buffers"]
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
-PIECES, PIECE_COUNT, PIECE = 13, 14, 15  # records of pieces, how many, the present one
+PIECES, PIECE_COUNT, PIECE, PIECE_NOW = 13, 14, 15, 47  # records of pieces, how many, the present one, its record
 NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
 CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
 TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
@@ -48,6 +48,7 @@ EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM, EVENTS_TAKEN = 42, 43, 44, 4
 # scratch memory: where it begins
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
 FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS = 53, 54, 55, 56
+FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(105, 112)  # response to channels
 DRIVE, DRIVE_WAVES = 59, 60  # w, w', w'' (3, q) and of which terms they are the sums (3, q); terms of the piece, moved on
 SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
 SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
@@ -77,7 +78,6 @@ ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
 
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY = range(10, 19)
-SQUARES, DAMPINGS, ALONE = 19, 20, 21  # for the forced response
 LEVEL_INTS = 24
 
 ELEMENT, ASKED, STAYS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
@@ -101,7 +101,7 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
 # ---------------------------------------------------------------------- answers
 
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
-NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES = 1, 2, 3, 4
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM = 1, 2, 3, 4, 5
 NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE = 1, 2, 3, 4, 5, 6, 7
 
 

@@ -487,12 +487,11 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 @compiled
 def same_speed(ints: Ints, numbers: Numbers, before: int, after: int) -> int:
     """1 where an impact has changed no speed by more than round-off."""
-    n = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS]
-    changed = 0.0
-    for i in range(n):
+    r, changed = ints[ints[before + LEVEL] + MODES], 0.0
+    for i in range(r):
         difference = numbers[ints[after + SPEED] + i] - numbers[ints[before + SPEED] + i]
         changed += difference * difference
-    return 1 if math.sqrt(changed) <= RESTING * norm(numbers, ints[before + SPEED], n) else 0
+    return 1 if math.sqrt(changed) <= RESTING * norm(numbers, ints[before + SPEED], r) else 0
 
 
 @compiled

@@ -19,18 +19,30 @@ from multiphi_exudyn.events.arrays import (
     FLOW_COUNT,
     FLOW_FORCED,
     FLOW_FREE,
+    FLOW_RECORD,
+    FLOW_STATE,
     FLOW_TERMS,
     FLOW_WAVES,
     FORCE,
+    FORCED,
+    FORCED_ROOM,
+    FORCED_WANTED,
+    FORCED_WORK,
+    FORCES,
     HORIZON,
     LEVEL,
     MODES,
+    MOTION,
+    PIECE,
+    PIECES,
+    PIECE_NOW,
     PIECE_TERMS,
     PIECE_TIMES,
     PLACE,
     RATED,
     RESPONSE,
     ROW,
+    SCALED_TERM,
     SPEED,
     TERM_INTS,
     WAVE,
@@ -42,23 +54,35 @@ from multiphi_exudyn.mathematics.flat_basis import (
     RATES,
     SCALES,
     SIZE,
+    describe_basis,
     differentiate,
     exponential_size,
     exponentials,
 )
-from multiphi_exudyn.mathematics.flat_response import FREE, REACHED, SHAPES, coefficients_of
+from multiphi_exudyn.mathematics.flat_response import (
+    FREE,
+    FROM_DISPLACEMENT,
+    FROM_FORCE,
+    FROM_VELOCITY,
+    REACHED,
+    SHAPES,
+    coefficients_of,
+    forced_response,
+)
 
 __all__ = ["expand", "set_drive", "signal_sizes", "signal_waves", "state_at"]
 
 
 @compiled
-def set_drive(ints: Ints, numbers: Numbers, waves: Waves, piece: int, time: float, end: float) -> None:
-    """The channels at a time on a piece: w, w', w'' (3, q), the sizes of their terms (3, q), and its terms from then on.
+def set_drive(ints: Ints, numbers: Numbers, waves: Waves, time: float, end: float) -> None:
+    """The channels at a time on the present piece: w, w', w'' (3, q), the sizes of their terms (3, q), and its terms from then on.
 
     The terms are moved on by synthetic division. The horizon of motions that begin there is the power of two above what
     is left of the piece, or of the run: bases are shared among pieces of about the same length.
     """
-    q, drive, moved = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES]
+    q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECES] + ints[PIECE]
+    piece = ints[piece]
+    ints[PIECE_NOW] = piece
     start, until = numbers[ints[piece + PIECE_TIMES]], min(numbers[ints[piece + PIECE_TIMES] + 1], end)
     numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])
     for k in range(6 * q):
@@ -93,15 +117,139 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, piece: int, time: floa
 @compiled
 def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     """Fill in the flow from a state."""
-    level, c = ints[state + LEVEL], ints[FLOW_WAVES]
-    response = ints[level + RESPONSE]
+    level, c, x, v = ints[state + LEVEL], ints[FLOW_WAVES], ints[state + PLACE], ints[state + SPEED]
+    response, force = ints[level + RESPONSE], ints[level + FORCE]
     p = ints[ints[response + FREE] + SIZE]
-    ints[FLOW_FREE] = p
-    coefficients_of(ints, numbers, waves, response, ints[state + PLACE], ints[state + SPEED], ints[level + FORCE], c)
-    ints[FLOW_BASIS] = ints[response + FREE]
-    ints[FLOW_COUNT] = p
+    ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_BASIS] = p, p, ints[response + FREE]
+    if ints[CHANNELS] > 0:
+        r = ints[level + MODES]
+        force_flow(ints, numbers, waves, state)
+        coefficients_of(ints, numbers, waves, response, ints[FLOW_STATE], ints[FLOW_STATE] + r, force, c)
+        size_driven_terms(ints, numbers, waves, level)
+        return
+    coefficients_of(ints, numbers, waves, response, x, v, force, c)
     for j in range(p):
         numbers[ints[FLOW_TERMS] + j] = abs(waves[c + j])
+
+
+@compiled
+def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """The response to the channels' terms, with these, as x_k of the flow, and its basis.
+
+    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r), and of which sizes (2, r)
+    they are the sums. Where there is no room for as many powers as a response takes, FORCED_WANTED says for how many.
+    """
+    level, q, horizon = ints[state + LEVEL], ints[CHANNELS], numbers[HORIZON]
+    r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[DRIVE_WAVES]
+    own, record, most = ints[FLOW_STATE], ints[FLOW_RECORD], ints[FORCED_ROOM]
+    basis = ints[FLOW_BASIS]
+    for i in range(r):
+        numbers[own + i] = numbers[ints[state + PLACE] + i]
+        numbers[own + r + i] = numbers[ints[state + SPEED] + i]
+        numbers[own + 2 * r + i] = 0.0
+        numbers[own + 3 * r + i] = 0.0
+    count, powers = free, 0
+    for term in range(ints[given + PIECE_TERMS]):
+        degree, carrier = ints[given + TERM_INTS + 2 * term] - 1, ints[given + TERM_INTS + 2 * term + 1]
+        force_modes(ints, numbers, waves, level, carrier, moved, degree)
+        rows = forced_response(
+            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon, most,
+            ints[FORCED_WORK], ints[FORCED],
+        )  # fmt: skip
+        if rows > most:
+            ints[FORCED_WANTED] = max(ints[FORCED_WANTED], rows)
+            rows = most
+        powers = max(powers, max(rows, degree + 1) - 1)
+        add_forced(ints, numbers, waves, level, carrier, degree, rows, count)
+        count += max(rows, degree + 1)
+        moved += (degree + 1) * q
+    for j in range(free):
+        ints[ints[record + POWERS] + j] = ints[ints[basis + POWERS] + j]
+        waves[ints[record + RATES] + j] = waves[ints[basis + RATES] + j]
+    for i in range(2 * r):
+        numbers[own + 2 * r + i] = abs(numbers[own + 2 * r + i]) + abs(numbers[own + i])
+    ints[record + SIZE] = count
+    numbers[ints[record + SCALES]] = horizon if powers > 0 else numbers[ints[basis + SCALES]]
+    describe_basis(ints, numbers, waves, record)
+    ints[FLOW_COUNT], ints[FLOW_BASIS] = count, record
+
+
+@compiled
+def force_modes(
+    ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int
+) -> None:
+    """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
+    r, q, horizon, rate = ints[level + MODES], ints[CHANNELS], numbers[HORIZON], waves[carrier]
+    n, scale, scaled = r + q, 1.0, ints[SCALED_TERM]
+    for d in range(degree + 1):
+        for k in range(q):
+            waves[scaled + d * q + k] = waves[moved + d * q + k] * scale
+        scale *= horizon
+    for d in range(degree + 1):
+        for i in range(r):
+            row, total = ints[level + MOTION] + i * (2 * n + 1), 0j
+            for k in range(q):
+                value = waves[scaled + d * q + k]
+                slope = rate * value
+                if d < degree:
+                    slope += (d + 1) / horizon * waves[scaled + (d + 1) * q + k]
+                total += numbers[row + r + k] * value + numbers[row + n + r + k] * slope
+            waves[ints[FORCES] + d * r + i] = total
+
+
+@compiled
+def add_forced(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    level: int,
+    carrier: int,
+    degree: int,
+    rows: int,
+    count: int,
+) -> None:
+    """List the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
+    r, q, record, own = ints[level + MODES], ints[CHANNELS], ints[FLOW_RECORD], ints[FLOW_STATE]
+    n, rate = r + q, waves[carrier]
+    for k in range(max(rows, degree + 1)):
+        j = count + k
+        x = ints[FLOW_FORCED] + (j - ints[FLOW_FREE]) * n
+        for i in range(r):
+            waves[x + i] = waves[ints[FORCED] + k * r + i] if k < rows else 0j
+        for i in range(q):
+            waves[x + r + i] = waves[ints[SCALED_TERM] + k * q + i] if k <= degree else 0j
+        ints[ints[record + POWERS] + j] = k
+        waves[ints[record + RATES] + j] = rate
+        waves[ints[FLOW_WAVES] + j] = 1.0 + 0j
+        numbers[ints[FLOW_TERMS] + j] = 1.0
+    for i in range(r):
+        value = waves[ints[FORCED] + i]
+        slope = rate * value
+        if rows > 1:
+            slope += waves[ints[FORCED] + r + i] / numbers[HORIZON]
+        numbers[own + i] -= value.real
+        numbers[own + r + i] -= slope.real
+        numbers[own + 2 * r + i] += value.real
+        numbers[own + 3 * r + i] += slope.real
+
+
+@compiled
+def size_driven_terms(ints: Ints, numbers: Numbers, waves: Waves, level: int) -> None:
+    """Of which terms the coefficients of the free response are the sums; both in the unit of the flow's basis."""
+    response, own, force = ints[level + RESPONSE], ints[FLOW_STATE], ints[level + FORCE]
+    r, basis = ints[level + MODES], ints[response + FREE]
+    ratio = numbers[ints[ints[FLOW_RECORD] + SCALES]] / numbers[ints[basis + SCALES]]
+    for j in range(ints[FLOW_FREE]):
+        size, unit = 0.0, 1.0
+        for i in range(ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]):
+            size += abs(waves[ints[response + FROM_DISPLACEMENT] + j * r + i]) * numbers[own + 2 * r + i]
+            size += abs(waves[ints[response + FROM_VELOCITY] + j * r + i]) * numbers[own + 3 * r + i]
+            if force >= 0:
+                size += abs(waves[ints[response + FROM_FORCE] + j * r + i]) * abs(numbers[force + i])
+        for _ in range(ints[ints[basis + POWERS] + j]):
+            unit *= ratio
+        numbers[ints[FLOW_TERMS] + j] = size * unit
+        waves[ints[FLOW_WAVES] + j] *= unit
 
 
 @compiled
@@ -173,6 +321,10 @@ def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x
         if j < free:
             first, end = ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]
             row = ints[response + SHAPES] + j * r
+        else:  # every power has an x of its own
+            slope = waves[ints[basis + RATES] + j] * value
+            if ints[ints[basis + POWERS] + j] > 0:
+                slope += ints[ints[basis + POWERS] + j] / numbers[ints[basis + SCALES]] * waves[phi + j - 1]
         for i in range(first, end):
             numbers[x + i] += (waves[row + i] * value).real
             numbers[v + i] += (waves[row + i] * slope).real

@@ -12,6 +12,7 @@ from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.flat_state import level_hash, map_hash, measure
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics import flat_basis, flat_response, zero_crossing
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.flat_least_distance import least_distance_ints, least_distance_numbers
@@ -89,6 +90,16 @@ class LevelArrays:
             self._add_map(source, self.level(closed))
         elif self.ints[a.NEEDED] == a.NEED_ENTERED:
             self._add_entered(source, int(key[0]))
+        else:
+            self._supply_channels()
+
+    def _supply_channels(self) -> None:
+        """Pack what the loop needs of channels."""
+        raise AssertionError("there are no channels")
+
+    def _plain(self, level: LoadedLevel) -> LoadedLevel:
+        """A level without its channels."""
+        return level
 
     # ------------------------------------------------------------------ elements and scratch memory
 
@@ -142,9 +153,22 @@ class LevelArrays:
         if wider == self._most:
             return
         self._most = n, p, exits = wider
-        take, signals = self.buffers.take, 2 * exits
-        struck = max(2 * int(np.sum(self.ints[self.ints[a.KINDS] :][: self.ints[a.ELEMENTS]] == a.RIGID)), 1)
-        sizes = {
+        for name, slots in self._scratch(n, p, 2 * exits).items():
+            for slot, count in slots.items():
+                self.ints[slot] = self.buffers.take(name, count)
+        for state in STATES_OF_A_RUN:
+            old = self.ints[state : state + a.STATE_INTS].copy()
+            for part in range(a.PLACE, a.SWING + 1):
+                self.ints[state + part] = self.buffers.take("numbers", n)
+            self.ints[state + a.PHASES] = self.buffers.take("ints", exits)
+            if old[a.LEVEL]:
+                self._carry_over(state, old)
+
+    def _scratch(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
+        """How much of each buffer every part of the scratch memory takes, that depends on the levels."""
+        kinds = self.ints[self.ints[a.KINDS] :][: self.ints[a.ELEMENTS]]
+        struck = max(2 * int(np.sum(kinds == a.RIGID)), 1)
+        return {
             "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS, a.CHANGE), n)
             | {a.ROWS: struck * n, a.LEAST_NUMBERS: least_distance_numbers(struck, n), a.FLOW_TERMS: p}
             | {a.CONSTANTS: signals, a.NOISES: signals}
@@ -153,16 +177,6 @@ class LevelArrays:
             "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 2 * p}
             | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)},
         }
-        for name, slots in sizes.items():
-            for slot, count in slots.items():
-                self.ints[slot] = take(name, count)
-        for state in STATES_OF_A_RUN:
-            old = self.ints[state : state + a.STATE_INTS].copy()
-            for part in range(a.PLACE, a.SWING + 1):
-                self.ints[state + part] = take("numbers", n)
-            self.ints[state + a.PHASES] = take("ints", exits)
-            if old[a.LEVEL]:
-                self._carry_over(state, old)
 
     def _carry_over(self, state: int, old: np.ndarray) -> None:
         """A state from the scratch memory that was too small."""
@@ -177,23 +191,21 @@ class LevelArrays:
     # ------------------------------------------------------------------ levels
 
     def _add(self, level: LoadedLevel) -> None:
-        own, put = level.level, self.buffers.put
-        response, contacts = own.response, range(len(self.rule.model.contacts))
-        parts = self._parts(level)
-        q = int(self.ints[a.CHANNELS])
-        r = own.modes - q
-        self._reserve(own.modes, len(response.basis.rates), len(contacts))
+        own, put, q = level.level, self.buffers.put, int(self.ints[a.CHANNELS])
+        plain, contacts = self._plain(level).level, range(len(self.rule.model.contacts))
+        parts, r = self._parts(level), plain.modes
+        self._reserve(r + q, self._exponentials(plain.response), len(contacts))
         record = self.buffers.take("ints", a.LEVEL_INTS)
         states = [int(i in own.indices) for i in contacts]
         ends = self.rule.ends(own.indices)
-        omega = own.omega[:r]
+        omega = plain.omega
         periods = np.divide(1.0, omega, out=np.zeros(r), where=omega > 0)
         exits = self._exits(level, states)
         given = {
             a.NUMBER: len(self.loaded),
             a.MODES: r,
             a.STATES: put("ints", states),
-            a.RESPONSE: self._response(response),
+            a.RESPONSE: self._response(plain),
             a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
             a.EXITS: exits,
             a.EXIT_COUNT: len(contacts),
@@ -203,10 +215,10 @@ class LevelArrays:
             a.FREQUENCIES: put("numbers", omega),
             a.PERIODS: put("numbers", periods),
             a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
-            **{slot: put("numbers", values) if values is not None else -1 for slot, values in parts.items()},
+            a.CARRIED: -1,
+            **{slot: put("numbers", values) for slot, values in parts.items()},
         }
-        if a.SPEEDS not in given:
-            given[a.SPEEDS] = given[a.GAPS]
+        given.setdefault(a.SPEEDS, given[a.GAPS])
         for slot, value in given.items():
             self.ints[record + slot] = value
         self._levels[own.indices] = len(self.loaded)
@@ -214,7 +226,7 @@ class LevelArrays:
         self.loaded.append(level)
         self._enter_level(record)
 
-    def _parts(self, level: LoadedLevel) -> dict[int, np.ndarray | None]:
+    def _parts(self, level: LoadedLevel) -> dict[int, np.ndarray]:
         """What describes a level's motion, gaps and energies."""
         own, rest = level.level, level.asymptotic
         motion = np.column_stack([-np.diag(own.squares), -own.damping, rest.drive])
@@ -222,16 +234,23 @@ class LevelArrays:
             a.MOTION: motion,
             a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
             a.POTENTIAL: np.concatenate([[rest.potential], -rest.drive, own.squares]),
-            a.CARRIED: None,
-            a.PATTERNS: None,
         }
 
-    def _response(self, response: ModalResponse) -> int:
-        """The record of a free response (flat_response.py)."""
-        put, (r, p) = self.buffers.put, response.shapes.shape
+    def _exponentials(self, response: ModalResponse) -> int:
+        """The largest number of exponentials of a motion in a level."""
+        return len(response.basis.rates)
+
+    def _response(self, level: Level) -> int:
+        """The record of a level's response (flat_response.py)."""
+        response, put = level.response, self.buffers.put
         maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-        basis, reached = self._basis(response.basis), self.buffers.take("ints", 2 * p)
-        record = put("ints", [r, basis, reached, *(put("waves", values) for values in maps)])
+        alone = (level.squares == 0) & ~np.any(level.damping, axis=1) | response.diagonal
+        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
+        basis, reached = self._basis(response.basis), self.buffers.take("ints", 2 * len(poles))
+        places = [put("waves", values) for values in maps]
+        places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
+        places += [put("ints", alone), put("ints", poles)]
+        record = put("ints", [level.modes, basis, reached, *places])
         flat_response.reached_modes(self.ints, self.buffers.waves, record)
         return record
 
@@ -255,10 +274,9 @@ class LevelArrays:
 
     def _signal(self, level: LoadedLevel, row: Row) -> list[int]:
         """A signal's record."""
-        own = level.level
-        r = own.modes - int(self.ints[a.CHANNELS])
+        plain = self._plain(level).level
+        r, shapes = plain.modes, plain.response.shapes
         at = self.buffers.put("numbers", np.concatenate([row.position, row.rate, [row.constant]]))
-        shapes = own.response.shapes
         waves = self.buffers.put("waves", np.concatenate([row.position[:r] @ shapes, row.rate[:r] @ shapes]))
         return [at, waves, int(np.any(row.rate))]
 

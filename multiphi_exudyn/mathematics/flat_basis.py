@@ -32,10 +32,12 @@ __all__ = [
     "differentiate",
     "exponential_size",
     "exponentials",
+    "magnitude",
 ]
 
 SIZE, POWERS, RATES, SCALES, PURE, ETERNAL = 0, 1, 2, 3, 4, 5
 BASIS = 6  # ints of the record
+SMALL, LARGE = 1e-280, 1e280  # squares between them have lost no digit
 LARGEST_EXPONENT = 709.0  # exp of more is no finite number
 
 
@@ -43,6 +45,14 @@ LARGEST_EXPONENT = 709.0  # exp of more is no finite number
 def exponential_size(exponent: float) -> float:
     """exp, infinite where that is too large for a number."""
     return math.exp(exponent) if exponent < LARGEST_EXPONENT else math.inf
+
+
+@compiled
+def magnitude(waves: Waves, at: int) -> float:
+    """|z| of a wave; the square root of its square where that is a number far from zero and infinity."""
+    z = waves[at]
+    square = z.real * z.real + z.imag * z.imag
+    return math.sqrt(square) if SMALL < square < LARGE else abs(z)
 
 
 @compiled
@@ -71,6 +81,8 @@ def exponentials(ints: Ints, numbers: Numbers, waves: Waves, basis: int, u: floa
     for j in range(ints[basis + SIZE]):
         if ints[powers + j] > 0:
             waves[result + j] = waves[result + j - 1] * ratio
+        elif u == 0.0:
+            waves[result + j] = 1 + 0j
         else:
             rate = waves[rates + j]
             size, angle = exponential_size(rate.real * u), rate.imag * u

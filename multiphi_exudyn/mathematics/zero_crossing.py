@@ -32,6 +32,7 @@ from multiphi_exudyn.mathematics.flat_basis import (
     differentiate,
     exponential_size,
     exponentials,
+    magnitude,
 )
 from multiphi_exudyn.mathematics.round_off import ZERO
 
@@ -76,6 +77,13 @@ CONSTANT, ORIGIN, BOUNDS, NOISE, ROOT, SAMPLES, STACK = 20, 21, 22, 29, 32, 33, 
 DEEPEST = 64  # divisions: 1e-13 is reached after 44
 SUSPECT = STACK + DEEPEST * (1 + SAMPLED)  # numbers of the record
 UNDECIDED, NO_DESCENT, DESCENT = 0, 1, 2
+
+# Waves, in p: the suspect's derivatives (5, p), phi where it is sampled, at the left and the right end of an interval,
+# factors of phi over 1, 2, 4, ... sample distances, coefficients of the signals, and of their derivatives, from a
+# block's start.
+PHI = SAMPLED
+HERE, THERE, FACTORS = PHI + 1, PHI + 2, PHI + 3
+LOCAL = FACTORS + 1 + WIDEST
 DOUBTFUL, NO_ROOT, ROOM = 0, 1, 2  # what an interval leaves to a signal
 
 
@@ -86,7 +94,7 @@ def scratch_numbers(p: int, count: int) -> int:
 
 def scratch_waves(p: int, count: int) -> int:
     """Waves that it works in."""
-    return p * (2 * count + SAMPLED + WIDEST + 5)
+    return p * (LOCAL + 2 * count)
 
 
 @compiled
@@ -177,7 +185,7 @@ def bound(
             numbers[bounds + DERIVATIVES * s + k] = 0.0
         if ints[basis + PURE] == 1:
             for j in range(p):
-                size, fast = abs(waves[signals + s * p + j]) * numbers[envelope + j], abs(waves[rates + j])
+                size, fast = magnitude(waves, signals + s * p + j) * numbers[envelope + j], magnitude(waves, rates + j)
                 for k in range(DERIVATIVES):
                     numbers[bounds + DERIVATIVES * s + k] += size
                     size *= fast
@@ -187,7 +195,7 @@ def bound(
             for k in range(DERIVATIVES):
                 total = 0.0
                 for j in range(p):
-                    total += abs(waves[scratch_wave + j]) * numbers[envelope + j]
+                    total += magnitude(waves, scratch_wave + j) * numbers[envelope + j]
                 numbers[bounds + DERIVATIVES * s + k] = total
                 differentiate(ints, numbers, waves, basis, scratch_wave, scratch_wave)
 
@@ -229,8 +237,13 @@ def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, r
 
 @compiled
 def power_of_two_above(value: float) -> float:
-    """The smallest power of two that is greater than ``value``."""
-    return math.ldexp(1.0, math.frexp(value)[1])
+    """The smallest power of two that is greater than a positive ``value``."""
+    power = 2.0 ** float(math.floor(math.log2(value)))
+    while power > value:  # a logarithm is rounded
+        power /= 2
+    while power <= value:
+        power *= 2
+    return power
 
 
 @compiled
@@ -309,21 +322,9 @@ def descent_in_block(
     scratch_wave: int,
 ) -> int:
     """The signal that falls first in a block of intervals, NONE if none does."""
-    p, unit = ints[basis + SIZE], numbers[ints[basis + SCALES]]
-    slopes, rows = scratch_wave + count * p, scratch_wave + 2 * count * p
-    here, there, factors = rows + (SAMPLED + 1) * p, rows + (SAMPLED + 2) * p, rows + (SAMPLED + 3) * p
-    values = bounds + DERIVATIVES * count + p
-    local = signals
-    if start > 0.0:
-        local = scratch_wave
-        exponentials(ints, numbers, waves, basis, start, unit, here)
-        for s in range(count):
-            multiply(waves, signals + s * p, here, p, local + s * p)
-    for s in range(count):
-        differentiate(ints, numbers, waves, basis, local + s * p, slopes + s * p)
-    exponentials(ints, numbers, waves, basis, 0.0, start, here)
-    sample(numbers, waves, local, slopes, constants, count, p, here, values)
-    exponentials(ints, numbers, waves, basis, step, unit, factors)
+    p, values = ints[basis + SIZE], bounds + DERIVATIVES * count + ints[basis + SIZE]
+    here, there, factors = scratch_wave + HERE * p, scratch_wave + THERE * p, scratch_wave + FACTORS * p
+    local = begin_block(ints, numbers, waves, basis, signals, constants, count, start, step, values, scratch_wave)
     known, wide, place, end, found = 0, 0, 0, horizon - start, NONE
     while found == NONE and place < INTERVALS and place * step < end:
         while place + (1 << wide) > INTERVALS:
@@ -333,16 +334,16 @@ def descent_in_block(
             known += 1
         left, width = place * step, step * (1 << wide)
         advance_exponentials(ints, numbers, waves, basis, here, factors + wide * p, start + left + width, there)
-        sample(numbers, waves, local, slopes, constants, count, p, there, values + 2 * count)
+        sample(numbers, waves, local, constants, count, p, there, values + 2 * count)
         numbers[suspect + SAMPLES] += 1.0
-        room = least_room(numbers, constants, noise, bounds, count, values, width, place)
+        room = least_room(numbers, constants, noise, bounds, count, 0, count, values, width, place)
         if room == DOUBTFUL and wide > 0:
             wide = 0
             continue
         if room == DOUBTFUL:
             found = descent_in_interval(
                 ints, numbers, waves, basis, local, constants, noise, bounds, count, start, left, width, end, place,
-                values, suspect, rows,
+                values, here, there, suspect, scratch_wave,
             )  # fmt: skip
         here, there = there, here
         for k in range(2 * count):
@@ -350,6 +351,36 @@ def descent_in_block(
         place += 1 << wide
         wide = wide + 1 if room == ROOM and wide < WIDEST else wide
     return found
+
+
+@compiled
+def begin_block(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    basis: int,
+    signals: int,
+    constants: int,
+    count: int,
+    start: float,
+    step: float,
+    values: int,
+    scratch_wave: int,
+) -> int:
+    """Where the coefficients of the signals (count, p) from a block's start on begin, those of g' (count, p) behind.
+
+    The first of its values, and the exponentials there and their factors from one sample to the next, as well.
+    """
+    p, unit = ints[basis + SIZE], numbers[ints[basis + SCALES]]
+    here, local = scratch_wave + HERE * p, scratch_wave + LOCAL * p
+    exponentials(ints, numbers, waves, basis, start, unit, here)
+    for s in range(count):
+        multiply(waves, signals + s * p, here, p, local + s * p)
+        differentiate(ints, numbers, waves, basis, local + s * p, local + (count + s) * p)
+    exponentials(ints, numbers, waves, basis, 0.0, start, here)
+    exponentials(ints, numbers, waves, basis, step, unit, scratch_wave + FACTORS * p)
+    sample(numbers, waves, local, constants, count, p, here, values)
+    return local
 
 
 @compiled
@@ -374,48 +405,50 @@ def advance_exponentials(
 
 @compiled
 def sample(
-    numbers: Numbers, waves: Waves, local: int, slopes: int, constants: int, count: int, p: int, phi: int, result: int
+    numbers: Numbers, waves: Waves, local: int, constants: int, count: int, p: int, phi: int, result: int
 ) -> None:
     """g and g' of every signal, (count, 2), where the exponentials are phi."""
     for s in range(count):
-        value, slope = numbers[constants + s], 0.0
+        value, slope, a = numbers[constants + s], 0.0, local + s * p
         for j in range(p):
-            value += (waves[local + s * p + j] * waves[phi + j]).real
-            slope += (waves[slopes + s * p + j] * waves[phi + j]).real
+            value += (waves[a + j] * waves[phi + j]).real
+            slope += (waves[a + count * p + j] * waves[phi + j]).real
         numbers[result + 2 * s] = value
         numbers[result + 2 * s + 1] = slope
 
 
 @compiled
 def least_room(
-    numbers: Numbers, constants: int, noise: int, bounds: int, count: int, values: int, width: float, place: int
+    numbers: Numbers,
+    constants: int,
+    noise: int,
+    bounds: int,
+    count: int,
+    first: int,
+    last: int,
+    values: int,
+    width: float,
+    place: int,
 ) -> int:
-    """The least of what ``room_of`` says of the signals in an interval."""
-    room = ROOM
-    for s in range(count):
-        room = min(room, room_of(numbers, constants, noise, bounds, count, s, values, width, place))
-    return room
+    """DOUBTFUL where one of the signals from ``first`` to before ``last`` may have a root in an interval.
 
-
-@compiled
-def room_of(
-    numbers: Numbers, constants: int, noise: int, bounds: int, count: int, s: int, values: int, width: float, place: int
-) -> int:
-    """DOUBTFUL where a signal may have a root in an interval, NO_ROOT where it has none, ROOM where the next is wider.
-
-    values: g and g' at both ends. In a block's first interval a signal may rise from zero: then the Bernstein
-    coefficients of (g - g0 (1 - u)^3) / u, u = t / h, exceed the remainder, at most h^4/162 max|g^(4)| u.
+    NO_ROOT where none has, ROOM where moreover the next interval may be wider. values: g and g' at both ends. In a
+    block's first interval a signal may rise from zero: then the Bernstein coefficients of (g - g0 (1 - u)^3) / u,
+    u = t / h, exceed the remainder, at most h^4/162 max|g^(4)| u.
     """
-    first = bounds + DERIVATIVES * s
-    left, right, after = numbers[values + 2 * s], numbers[values + 2 * (count + s)], values + 2 * (count + s) + 1
-    inner_left, inner_right = left + width * numbers[values + 2 * s + 1] / 3, right - width * numbers[after] / 3
-    spread = width * width * width * width * numbers[first + 4]
-    if not min(left, inner_left, inner_right, right) > HERMITE * spread:
-        sunk = left < -round_off(numbers[first], numbers[constants + s], numbers[noise + s])
-        lifted = min(3 * inner_left, 1.5 * inner_right, right) > LIFTED * spread
-        if place > 0 or sunk or not lifted:
-            return DOUBTFUL
-    return ROOM if right + width * numbers[after] > ROOMY * HERMITE * spread else NO_ROOT
+    room = ROOM
+    for s in range(first, last):
+        left, right = numbers[values + 2 * s], numbers[values + 2 * (count + s)]
+        rise, after = width * numbers[values + 2 * s + 1], width * numbers[values + 2 * (count + s) + 1]
+        spread = width * width * width * width * numbers[bounds + DERIVATIVES * s + 4]
+        if not min(left, left + rise / 3, right - after / 3, right) > HERMITE * spread:
+            sunk = left < -round_off(numbers[bounds + DERIVATIVES * s], numbers[constants + s], numbers[noise + s])
+            lifted = min(3 * left + rise, 1.5 * right - after / 2, right) > LIFTED * spread
+            if place > 0 or sunk or not lifted:
+                return DOUBTFUL
+        if not right + after > ROOMY * HERMITE * spread:
+            room = NO_ROOT
+    return room
 
 
 @compiled
@@ -441,18 +474,25 @@ def descent_in_interval(
     end: float,
     place: int,
     values: int,
+    here: int,
+    there: int,
     suspect: int,
     rows: int,
 ) -> int:
-    """The signal that falls first in an interval of a block, up to its ``end``; of several at once the last one."""
+    """The signal that falls first in an interval of a block, up to its ``end``; of several at once the last one.
+
+    values, here, there: g and g' of all signals, and the exponentials, at its ends.
+    """
     p, found, earliest = ints[basis + SIZE], NONE, end
     for s in range(count):
-        doubt = room_of(numbers, constants, noise, bounds, count, s, values, width, place) == DOUBTFUL
+        doubt = least_room(numbers, constants, noise, bounds, count, s, s + 1, values, width, place) == DOUBTFUL
         if doubt and left < earliest:
             take_up(
                 ints, numbers, waves, basis, local + s * p, numbers[constants + s], numbers[noise + s],
                 bounds + DERIVATIVES * s, start, suspect, rows,
             )  # fmt: skip
+            combine(numbers, waves, p, here, suspect, suspect + LEFT, rows)
+            combine(numbers, waves, p, there, suspect, suspect + RIGHT, rows)
             verdict = divide(ints, numbers, waves, basis, left, left + width, suspect, rows)
             if verdict == DESCENT and numbers[suspect + ROOT] <= earliest:
                 found, earliest = s, numbers[suspect + ROOT]
@@ -494,15 +534,21 @@ def sample_at(
     ints: Ints, numbers: Numbers, waves: Waves, basis: int, u: float, suspect: int, result: int, rows: int
 ) -> None:
     """The suspect and its first four derivatives (5,) a time u after its origin."""
-    p, phi = ints[basis + SIZE], rows + SAMPLED * ints[basis + SIZE]
+    p, phi = ints[basis + SIZE], rows + PHI * ints[basis + SIZE]
     exponentials(ints, numbers, waves, basis, u, numbers[suspect + ORIGIN] + u, phi)
+    combine(numbers, waves, p, phi, suspect, result, rows)
+    numbers[suspect + SAMPLES] += 1.0
+
+
+@compiled
+def combine(numbers: Numbers, waves: Waves, p: int, phi: int, suspect: int, result: int, rows: int) -> None:
+    """The suspect and its first four derivatives (5,) where the exponentials are phi."""
     for k in range(SAMPLED):
         value = 0.0
         for j in range(p):
             value += (waves[rows + k * p + j] * waves[phi + j]).real
         numbers[result + k] = value
     numbers[result] += numbers[suspect + CONSTANT]
-    numbers[suspect + SAMPLES] += 1.0
 
 
 @compiled
@@ -516,10 +562,11 @@ def divide(
     suspect: int,
     rows: int,
 ) -> int:
-    """DESCENT, at the suspect's root, or NO_DESCENT in [left, right], by division until every part is decided."""
+    """DESCENT, at the suspect's root, or NO_DESCENT in [left, right], by division until every part is decided.
+
+    The suspect is known at both ends.
+    """
     narrowest, depth = NARROWEST * right, 0
-    sample_at(ints, numbers, waves, basis, left, suspect, suspect + LEFT, rows)
-    sample_at(ints, numbers, waves, basis, right, suspect, suspect + RIGHT, rows)
     while True:
         verdict = decide(ints, numbers, waves, basis, left, right, narrowest, suspect, rows)
         if verdict == DESCENT:
@@ -603,7 +650,7 @@ def highest(numbers: Numbers, suspect: int, order: int, width: float) -> float:
 def rises(numbers: Numbers, suspect: int, width: float) -> int:
     """1 where the suspect starts at zero or above and stays above it.
 
-    By g/t, as ``room_of`` says; or by the first derivative that counts, with Taylor's remainder.
+    By g/t, as ``least_room`` says; or by the first derivative that counts, with Taylor's remainder.
     """
     left, right, bounds = suspect + LEFT, suspect + RIGHT, suspect + BOUNDS
     if numbers[left] < -numbers[suspect + NOISE]:
@@ -728,7 +775,7 @@ def simultaneous(
             a, phi = waves[signals + s * p + j], waves[scratch_wave + j]
             value += (a * phi).real
             slope += (a * phi * waves[rates + j]).real
-            terms += abs(a) * abs(phi)
+            terms += magnitude(waves, signals + s * p + j) * magnitude(waves, scratch_wave + j)
             if ints[powers + j] > 0:
                 slope += ints[powers + j] / numbers[scales] * (a * waves[scratch_wave + j - 1]).real
         soon = max(ZERO * terms, -slope * instant)
@@ -777,7 +824,7 @@ def first_sign(
         differentiate(ints, numbers, waves, basis, scratch_wave, scratch_wave)
         for j in range(p):
             size = numbers[scratch + j]
-            numbers[scratch + j] = size * abs(waves[rates + j])
+            numbers[scratch + j] = size * magnitude(waves, rates + j)
             if ints[powers + j] > 0:
                 numbers[scratch + j - 1] += ints[powers + j] / unit * size
     return 0

@@ -13,12 +13,17 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.state import Event, State
+from multiphi_exudyn.time.driven.arrays import DrivenArrays
+from multiphi_exudyn.time.driven.flow import Flow
+from multiphi_exudyn.time.driven.level import DrivenLevel
+from multiphi_exudyn.time.driven.segment import DrivenSegment
+from multiphi_exudyn.time.driven.state import DrivenState
 from multiphi_exudyn.time.loop import ACCUMULATED, advance
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.record import PHASES, Record
+from multiphi_exudyn.time.record import PHASES, Record, Segments
 from multiphi_exudyn.time.segment import Segment
 
-__all__ = ["FlatMotion"]
+__all__ = ["FlatDrivenMotion", "FlatMotion"]
 
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
@@ -137,3 +142,43 @@ class FlatMotion(Motion):
     def _keep_event(self, event: Event) -> None:
         self.events.append(event)
         self.record.add_event(event)
+
+
+@dataclass
+class FlatDrivenMotion(FlatMotion):
+    """A run under an excitation that the loop carries."""
+
+    arrays: DrivenArrays = None  # type: ignore[assignment]
+
+    def _enter(self) -> None:
+        self.arrays.set_drive()
+        super()._enter()
+        patterns = self.arrays.rule.excitation.patterns
+        moved = self.state.level.configuration(self.state.displacement) - self.start.displacement
+        w = self.state.displacement[len(self.state.displacement) - patterns.shape[1] :]
+        self.arrays.numbers[a.WORK] = float((patterns @ w) @ moved)
+
+    def _leave(self) -> State:
+        state, time = super()._leave(), float(self.arrays.numbers[a.TIME])
+        drive = self.arrays.drives[int(self.arrays.ints[a.PIECE])]
+        rule = self.arrays.rule
+        assert isinstance(state.level, DrivenLevel)
+        drive = drive.after(time - drive.time)
+        return DrivenState(
+            state.level, state.displacement, state.velocity, state.phases, drive, rule.until, rule.finders
+        )
+
+    def _work_since(self) -> float:
+        return float(self.arrays.numbers[a.WORK])
+
+    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
+        return Segments(self.record, self._driven_segment), self.record.events()
+
+    def _driven_segment(self, i: int) -> DrivenSegment:
+        """The i-th segment of the record."""
+        record, level = self.record, self.record.level(i)
+        assert isinstance(level, DrivenLevel)
+        start, end, armed_at, horizon, work = record.spans[i].tolist()
+        drive = self.arrays.drives[record.rows[i, 1]]
+        flow = Flow.of(level, *record.state(i), drive.after(start - drive.time), horizon)
+        return DrivenSegment(start, end, level, flow.coefficients, record.standing(i), armed_at, flow, work)

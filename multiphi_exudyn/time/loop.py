@@ -15,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     ARMED,
     ASKED,
     ASKING,
+    CARRIED,
     CAUSE,
     CHAINS,
     CHAIN_COUNT,
@@ -30,6 +31,7 @@ from multiphi_exudyn.events.arrays import (
     COORDINATE_NUMBERS,
     CURRENT,
     DECISIONS,
+    DRIVE,
     ELEMENT,
     ELEMENTS,
     ENDS,
@@ -49,6 +51,8 @@ from multiphi_exudyn.events.arrays import (
     FALLEN,
     FLOW_BASIS,
     FLOW_COUNT,
+    FORCED_ROOM,
+    FORCED_WANTED,
     FOUND,
     FULL,
     GIVEN_UP,
@@ -61,6 +65,9 @@ from multiphi_exudyn.events.arrays import (
     LOST,
     MODES,
     NEED,
+    NEEDED,
+    NEED_PIECES,
+    NEED_ROOM,
     NOISES,
     NOT_FINITE,
     NUMBER,
@@ -69,6 +76,8 @@ from multiphi_exudyn.events.arrays import (
     PHASE_COUNT,
     PHASE_INTS,
     PIECE,
+    PIECES,
+    PIECE_COUNT,
     PIECE_TIMES,
     PLACE,
     REACH,
@@ -133,16 +142,86 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     while numbers[TIME] < end:
         if ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
             return FULL
-        until = end
-        if ints[CHANNELS] > 0:
-            until = min(end, numbers[ints[ints[PIECE] + PIECE_TIMES] + 1])
-        status = one_segment(ints, numbers, waves, until)
-        if status == NEED and ints[GIVEN_UP] == 1:
-            ints[CAUSE] = UNAVAILABLE
-            return FAILED
+        known = ints[EVENT_COUNT]
+        status = OK
+        if ints[CHANNELS] > 0 and numbers[TIME] >= piece_end(ints, numbers):
+            status = next_piece(ints, numbers, waves, end)
+        if status >= 0:
+            until = min(end, piece_end(ints, numbers)) if ints[CHANNELS] > 0 else end
+            status = one_segment(ints, numbers, waves, until)
+        status = given_up(ints, status)
+        if status >= 0 and ints[EVENT_COUNT] > known:
+            status = EVENT
         if status < 0 or (status == EVENT and ints[STOP_AT_EVENT] == 1):
             return status
     return END_REACHED
+
+
+@compiled
+def given_up(ints: Ints, status: int) -> int:
+    """What is needed and cannot be had is a failure."""
+    if status == NEED and ints[GIVEN_UP] == 1:
+        ints[CAUSE] = UNAVAILABLE
+        return FAILED
+    return status
+
+
+@compiled
+def piece_end(ints: Ints, numbers: Numbers) -> float:
+    """When [s] the present piece of the channels ends."""
+    return numbers[ints[ints[ints[PIECES] + ints[PIECE]] + PIECE_TIMES] + 1]
+
+
+@compiled
+def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """The same state on the piece that follows; a load that jumps may make elements ask; OK, NEED, FULL or FAILED."""
+    r, q, level = ints[ints[CURRENT + LEVEL] + MODES], ints[CHANNELS], ints[CURRENT + LEVEL]
+    if ints[PIECE] + 1 >= ints[PIECE_COUNT]:
+        ints[NEEDED] = NEED_PIECES
+        return NEED
+    energy = kinetic(ints, numbers, CURRENT) + potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
+    ints[PIECE] += 1
+    set_drive(ints, numbers, waves, numbers[TIME], end)
+    copy_state(ints, numbers, CURRENT, REACHED)
+    x, v, row = ints[REACHED + PLACE], ints[REACHED + SPEED], ints[level + CARRIED]
+    for k in range(q):
+        numbers[x + r + k] = numbers[ints[DRIVE] + k]
+        jump = numbers[v + r + k] - numbers[ints[DRIVE] + q + k]
+        numbers[v + r + k] -= jump
+        for i in range(r if row >= 0 else 0):
+            numbers[v + i] += numbers[row + k * (r + q) + i] * jump
+    measure(ints, numbers, REACHED)
+    status = given_up(ints, decide_jump(ints, numbers, waves))
+    if status == NEED or ints[EVENT_COUNT] + ints[CHANGE_COUNT] > ints[EVENT_ROOM]:
+        ints[PIECE] -= 1
+        return NEED if status == NEED else FULL
+    after = REACHED if status != EVENT else WORKED
+    work = kinetic(ints, numbers, REACHED) + potential(ints, numbers, REACHED) - energy
+    numbers[WORK] += work + pattern_work(ints, numbers, after)
+    copy_state(ints, numbers, after, CURRENT)
+    if status == EVENT:
+        ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
+        keep_events(ints, numbers)
+    return OK if status >= 0 else status
+
+
+@compiled
+def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """The decision after channels have jumped: OK where nobody asks, EVENT where somebody does; NEED or FAILED."""
+    exits, asking = ints[ints[REACHED + LEVEL] + EXITS], 0
+    for i in range(ints[ELEMENTS]):
+        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[AGAIN] + i] = 0
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        exit_ = exits + k * EXIT_INTS
+        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL) < 0:
+            ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
+            asking = 1
+    ints[CHANGE_COUNT] = 0
+    if asking == 0:
+        return OK
+    status = decide(ints, numbers, waves)
+    return status if status < 0 else EVENT
 
 
 @compiled
@@ -153,6 +232,8 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     """
     level, started, samples = ints[CURRENT + LEVEL], numbers[TIME], numbers[ints[FOUND] + 1]
     horizon, reached, armed_at, asking = end - started, 0.0, 0.0, 0
+    if ints[CHANNELS] > 0:
+        set_drive(ints, numbers, waves, started, end)
     expand(ints, numbers, waves, CURRENT)
     copy_state(ints, numbers, CURRENT, REACHED)
     while asking == 0:
@@ -180,21 +261,25 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
             armed_at = reached
     numbers[INSTANT_TIME] = end if reached == horizon else started + reached
     state_at(ints, numbers, waves, level, reached, ints[REACHED + PLACE], ints[REACHED + SPEED])
+    unit = numbers[HORIZON]
+    if ints[CHANNELS] > 0:
+        set_drive(ints, numbers, waves, numbers[INSTANT_TIME], end)
     measure(ints, numbers, REACHED)
-    at_once = reached * numbers[ints[ints[FLOW_BASIS] + SCALES] + 1] <= INSTANT
+    fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
+    at_once = reached <= (INSTANT / fastest if fastest > 0.0 else 0.0)
     status = OK
     if asking > 0:
         flag_again(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
         status = decide(ints, numbers, waves)
     else:
         ints[CHANGE_COUNT] = 0
-    if status == NEED and ints[GIVEN_UP] == 1:
-        ints[CAUSE] = UNAVAILABLE
-        status = FAILED
+    status = given_up(ints, status)
+    if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
+        ints[NEEDED], status = NEED_ROOM, NEED
     if status == NEED or ints[EVENT_COUNT] + ints[CHANGE_COUNT] > ints[EVENT_ROOM]:
         numbers[ints[FOUND] + 1] = samples
         return NEED if status == NEED else FULL
-    keep_segment(ints, numbers, armed_at)
+    keep_segment(ints, numbers, armed_at, unit)
     if asking == 0:
         copy_state(ints, numbers, REACHED, CURRENT)
         return OK
@@ -347,7 +432,7 @@ def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int,
 
 
 @compiled
-def keep_segment(ints: Ints, numbers: Numbers, armed_at: float) -> None:
+def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) -> None:
     """Record the segment from CURRENT to the instant, which becomes the present time."""
     k, level = ints[SEGMENT_COUNT], ints[CURRENT + LEVEL]
     n, row = ints[level + MODES] + ints[CHANNELS], ints[SEGMENT_INTS] + k * SEGMENT_WIDTH
@@ -364,7 +449,7 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float) -> None:
     numbers[given] = numbers[TIME]
     numbers[given + 1] = numbers[INSTANT_TIME]
     numbers[given + 2] = armed_at
-    numbers[given + 3] = numbers[HORIZON]
+    numbers[given + 3] = horizon
     numbers[given + 4] = numbers[WORK]
     kept = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
     for i in range(n):

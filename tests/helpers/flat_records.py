@@ -51,9 +51,10 @@ class Buffers:
 
 
 class Search:
-    """``DescentFinder`` on flat buffers, for the signals of one basis."""
+    """``DescentFinder`` on flat buffers, for the signals of one basis; ``run``: compiled.entry, or as they are."""
 
-    def __init__(self, basis, signals):
+    def __init__(self, basis, signals, run=lambda function: function):
+        self._run = run
         self.count, self.p = signals.coefficients.shape
         self.buffers = Buffers()
         noise = np.zeros(self.count) if signals.noise is None else signals.noise
@@ -68,7 +69,7 @@ class Search:
     def first(self, horizon, start=0.0):
         """The signal that falls first, or what is in its stead, and when."""
         with np.errstate(all="ignore"):
-            found = zero_crossing.first_descent(
+            found = self._run(zero_crossing.first_descent)(
                 *self.buffers.all, self.basis, self.signals, self.constants, self.noise, self.count, start, horizon,
                 self.scratch, self.scratch_wave, self.result,
             )  # fmt: skip
@@ -79,7 +80,7 @@ class Search:
         return self.buffers.numbers[self.result + 1]
 
     def simultaneous(self, found: Descent):
-        total = zero_crossing.simultaneous(
+        total = self._run(zero_crossing.simultaneous)(
             *self.buffers.all, self.basis, self.signals, self.constants, self.count, found.signal, found.time,
             self.scratch_wave, self.flags,
         )  # fmt: skip
@@ -92,7 +93,7 @@ class Search:
 
     def _sign(self, s, sizes, since):
         constant = float(self.buffers.numbers[self.constants + s])
-        return zero_crossing.first_sign(
+        return self._run(zero_crossing.first_sign)(
             *self.buffers.all, self.basis, self.signals + s * self.p, constant, sizes, since, self.scratch,
             self.scratch_wave,
         )  # fmt: skip

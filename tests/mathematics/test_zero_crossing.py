@@ -1,17 +1,20 @@
 """The flat search gives the answers of ``DescentFinder``, and exact ones where they are known."""
 
+import functools
+
 import numpy as np
 import pytest
 from flat_records import Search
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics import zero_crossing
+from multiphi_exudyn.mathematics import compiled, zero_crossing
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.first_descent import Descent, DescentFinder, Signals
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 CASES = 30  # of every kind
+ENTRIES = functools.cache(compiled.entry)
 
 
 def exponentials(kind, random):
@@ -163,7 +166,7 @@ def test_motion_that_is_not_finite_is_told():
 def test_a_search_that_would_take_for_ever_is_refused_as_by_the_descent_finder():
     basis = Exponentials(np.array([1e9j, 2e9j]), np.zeros(2, int))
     never = Signals(np.array([[1, 1]], complex), np.array([1.2]))
-    search = Search(basis, never)
+    search = Search(basis, never, ENTRIES)
     assert search.first(1e-7)[0] == zero_crossing.NONE
     assert search.first(1.0)[0] == zero_crossing.TOO_LONG
     step, left = search.buffers.numbers[search.result + 2 : search.result + 4]
@@ -177,3 +180,20 @@ def test_of_two_signals_that_fall_together_it_names_the_one_the_descent_finder_n
     found = DescentFinder(basis).first(twice, 10.0)
     assert Search(basis, twice).first(10.0)[0] == found.signal
     assert Search(basis, twice).simultaneous(Descent(found.time, found.signal)) == [0, 1]
+
+
+@pytest.mark.skipif(not compiled.available(), reason="needs numba")
+@pytest.mark.parametrize("kind", KINDS)
+def test_compiled_it_gives_what_it_gives_as_plain_python(kind):
+    for seed in range(CASES):
+        basis, own, start, horizon = some(kind, seed)
+        plain, fast = Search(basis, own), Search(basis, own, ENTRIES)
+        (signal, time), (expected, exact) = fast.first(horizon, start), plain.first(horizon, start)
+        assert signal == expected
+        assert fast.samples == plain.samples
+        assert_allclose(time, exact, rtol=1e-13)
+        if signal >= 0:
+            found = Descent(time, signal)
+            assert fast.simultaneous(found) == plain.simultaneous(found)
+        sizes = np.abs(own.coefficients)
+        assert fast.signs(sizes) == plain.signs(sizes)

@@ -1,0 +1,126 @@
+"""Levels under an excitation, and the pieces of its channels, as arrays (events/arrays.py)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events import flow
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.mathematics import flat_basis
+from multiphi_exudyn.mathematics.free_response import ModalResponse
+from multiphi_exudyn.time.driven.excitation import Drive
+from multiphi_exudyn.time.driven.level import DrivenLevel
+from multiphi_exudyn.time.driven.rule import DrivenRule
+
+__all__ = ["DrivenArrays"]
+
+POWERS = 96  # of a response to one term: where a carrier meets a pole it takes some 40
+PIECES_AT_ONCE = 256  # packed when the loop comes to the end of those it knows
+
+
+class DrivenArrays(LevelArrays):
+    """What the loop knows of the levels of a rule under an excitation. drives: the pieces so far."""
+
+    rule: DrivenRule
+
+    def __init__(self, rule: DrivenRule) -> None:
+        self.drives: list[Drive] = []
+        self._records: list[int] = []
+        self._powers = POWERS
+        super().__init__(rule)
+
+    def _describe_elements(self) -> None:
+        super()._describe_elements()
+        self.ints[a.CHANNELS] = self.rule.excitation.channels
+        self.ints[a.FORCED_ROOM] = self._powers
+        self._reserve_pieces()
+
+    def _supply_channels(self) -> None:
+        if self.ints[a.NEEDED] == a.NEED_PIECES:
+            self._reserve_pieces()
+            return
+        self._powers = self.ints[a.FORCED_ROOM] = 2 * int(self.ints[a.FORCED_WANTED])
+        self.ints[a.FORCED_WANTED] = 0
+        n, _, exits = self._most
+        self._reserve(n, max(self._exponentials(self._plain(level).level.response) for level in self.loaded), exits)
+
+    def _scratch(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
+        q, degree = int(self.ints[a.CHANNELS]), max(h.coefficients.shape[1] for h in self.rule.excitation.histories)
+        sizes, room = super()._scratch(n, p, signals), max(self._powers, degree)
+        sizes["numbers"] |= {a.DRIVE: 6 * q, a.FLOW_STATE: 4 * n}
+        sizes["waves"] |= {a.DRIVE_WAVES: q * degree * q, a.SCALED_TERM: degree * q, a.FORCES: degree * n}
+        sizes["waves"] |= {a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n}
+        take = self.buffers.take
+        given = {flat_basis.POWERS: take("ints", p), flat_basis.RATES: take("waves", p)}
+        given[flat_basis.SCALES], record = take("numbers", 3), take("ints", flat_basis.BASIS)
+        for slot, value in given.items():
+            self.ints[record + slot] = value
+        self.ints[a.FLOW_RECORD] = record
+        return sizes
+
+    def _parts(self, level: LoadedLevel) -> dict[int, np.ndarray]:
+        assert isinstance(level, DrivenLevel)
+        own, plain, r = level.level, level.plain.level, level.plain.level.modes
+        motion = [-np.diag(plain.squares), level.force, -plain.damping, level.force_rate, level.asymptotic.drive]
+        carried = np.hstack([level.carried.T @ plain.vectors, level.carried.T @ level.carried])
+        patterns = level.excitation.patterns.T
+        return {
+            a.MOTION: np.column_stack(motion),
+            a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
+            a.SPEEDS: np.column_stack([own.speeds, np.zeros(len(own.speeds))]),
+            a.POTENTIAL: self._potential(level, r),
+            a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
+            **({a.CARRIED: carried} if np.any(level.carried) else {}),
+        }
+
+    @staticmethod
+    def _potential(level: DrivenLevel, r: int) -> np.ndarray:
+        """Strain energy less the potential of the loads as a form in xi: constant, linear, squares (r,), rows of w."""
+        own, base, y = level.level, level.level.base, level.asymptotic.configuration
+        index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
+        springs, rows, gaps = base.stiffnesses[index], own.gap_rows[index], level.gap_constants[index]
+        bent = base.modes.omega[:, None] * own.vectors
+        form = bent.T @ bent + (rows.T * springs) @ rows
+        pulled = level.excitation.patterns.T @ own.vectors
+        form[r:] -= pulled
+        form[:, r:] -= pulled.T
+        load = base.modes.omega**2 * y - base.preload - level.excitation.static
+        linear = own.vectors.T @ load + rows.T @ (springs * gaps)
+        linear[r:] -= level.excitation.patterns.T @ y
+        constant = 0.5 * float(np.sum((base.modes.omega * y) ** 2) + gaps**2 @ springs) + base.energy_offset
+        constant -= float(y @ (base.preload + level.excitation.static))
+        return np.concatenate([[constant], linear, np.diagonal(form)[:r], form[r:].ravel()])
+
+    def _plain(self, level: LoadedLevel) -> LoadedLevel:
+        assert isinstance(level, DrivenLevel)
+        return level.plain
+
+    def _exponentials(self, response: ModalResponse) -> int:
+        return len(response.basis.rates) + int(self.ints[a.CHANNELS]) * self._powers
+
+    # ------------------------------------------------------------------ pieces
+
+    def _reserve_pieces(self) -> None:
+        """Records of the pieces that follow."""
+        put, time = self.buffers.put, self.drives[-1].until if self.drives else self.rule.drive.time
+        for _ in range(PIECES_AT_ONCE):
+            drive = self.rule.excitation.drive(time)
+            terms = [(len(given), put("waves", [rate, *given.ravel()])) for rate, given in drive.terms]
+            times = put("numbers", [drive.time, drive.until])
+            self._records.append(put("ints", [times, len(terms), *np.ravel(terms)]))
+            self.drives.append(drive)
+            time = drive.until
+            if not math.isfinite(time) or time >= self.rule.until:
+                break
+        self.ints[a.PIECES] = put("ints", self._records)
+        self.ints[a.PIECE_COUNT] = len(self._records)
+
+    def set_drive(self) -> None:
+        """The channels at the start in the scratch memory, for the scales of the first state."""
+        self.ints[a.PIECE] = 0
+        self.level(())
+        flow.set_drive(*self.buffers.all, self.rule.drive.time, self.rule.until)
