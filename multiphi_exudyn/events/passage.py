@@ -128,6 +128,12 @@ class Passage(ContactFunctions):
         """How many coordinates of a level an impulse can change, the first ones."""
         return level.level.modes
 
+    def _same_velocity(self, before: State, after: State) -> bool:
+        """Whether an impact, between two states of one level, has changed no more than round-off."""
+        free = self._free(before.level)
+        change = np.linalg.norm(after.velocity[:free] - before.velocity[:free])
+        return bool(change <= RESTING * np.linalg.norm(before.velocity[:free]))
+
     @staticmethod
     def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
         """Energy [J] that an impact dissipates: what the structure lost, as long as no stop moves."""

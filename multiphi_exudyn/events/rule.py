@@ -259,7 +259,7 @@ class EventRule(Passage):
             before = entered
             entered, impulses, lost = self._collided(before, opened)
             entered, loss = self._with_phases(entered), loss + lost
-            if np.linalg.norm(entered.velocity - before.velocity) > RESTING * np.linalg.norm(before.velocity):
+            if not self._same_velocity(before, entered):
                 pushed = dict(zip(opened, impulses.tolist(), strict=True))
         changes = [Change(i, "open" if i in state.closed else "close", pushed.get(i, 0.0)) for i in sorted(asking)]
         return entered, loss, changes
@@ -276,7 +276,7 @@ class EventRule(Passage):
         touching = sorted(held | striking)
         released, loss = self._moved(state, self.level(compliant))
         struck, impulses, plastic = self._collided(released, touching)
-        same = np.linalg.norm(struck.velocity - released.velocity) <= RESTING * np.linalg.norm(released.velocity)
+        same = self._same_velocity(released, struck)
         if same:
             impulses = np.zeros_like(impulses)  # round-off of them: nothing was struck
         closed = self._pressing(released, struck, touching)

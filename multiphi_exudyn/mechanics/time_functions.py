@@ -2,9 +2,9 @@
 
     u(t):   Harmonic, Sampled, Smooth, Sweep
 
-Each becomes a history (piecewise_exponential.py), pieces of which are polynomials times exponentials, to which the
-response is known in closed form. A harmonic and straight lines between samples are histories as they stand; a smooth
-function and a sweep are interpolated, to their tolerance.
+Each becomes a piecewise exponential (piecewise_exponential.py), to which the response is known in closed form. A
+harmonic and straight lines between samples are exact as they stand; a smooth function and a sweep are interpolated, to
+their tolerance.
 """
 
 from __future__ import annotations

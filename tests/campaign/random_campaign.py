@@ -4,7 +4,7 @@
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
 (run_checks.py). Cases of the kind "plain" (strategies.py) run in both loops and have the same motion; events of a
-contact on which nothing presses may differ. All other kinds (campaign_scenes.py) are judged by brute force
+contact on which nothing presses may differ. All other kinds (campaign_scenes) are judged by brute force
 (campaign_judge.py). With ``--kernels Prescott,Haswell`` the same cases run under each of these kernels of the linear
 algebra library, each in its own process, and their statuses, numbers of events and answers are compared.
 

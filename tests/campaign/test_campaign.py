@@ -44,6 +44,11 @@ def test_an_impulse_that_is_round_off_closes_no_contact():
     assert judged("truncated", 3030)[0] == [("ok", "")]
 
 
+def test_a_load_whose_numbers_are_large_hides_no_impact():
+    """In other units the speeds of the channels outweigh those of the structure, of which an impact is judged."""
+    assert judged("units", 6)[0] == [("ok", "")]
+
+
 def test_a_scene_comes_from_its_kind_and_number_alone():
     first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
     assert np.array_equal(first.velocity, again.velocity)
@@ -71,6 +76,15 @@ class TestBruteForce:
         answer = bf.solved(system, np.zeros(1), -np.ones(1), np.array([math.pi / 4, math.pi / 2 + 1.0]))
         assert answer.displacement[0] == pytest.approx([-0.5, 1.0], abs=1e-13)
         assert answer.impulse[0] == pytest.approx(2.0, abs=1e-13)
+
+    def test_sees_a_short_contact_wherever_its_steps_begin(self):
+        """x = cos t dips a part of a step long below a stop at t = pi, from many starts before it."""
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.eye(1), [bf.Stop(np.ones(1), 1 - 1e-4, 1.0)])
+        found = [
+            len(bf.solved(system, np.array([math.cos(start)]), -np.array([math.sin(start)]), np.array([6.0])).events)
+            for start in np.linspace(0.2, 3, 281)
+        ]
+        assert set(found) == {2}
 
     def test_follows_a_resonant_load(self):
         """x'' + x = cos t from rest: x = t sin(t) / 2."""

@@ -1,0 +1,186 @@
+"""Instants for brute force: impacts and what closes after them, decided by trying every set of contacts."""
+
+import itertools
+
+import numpy as np
+
+from brute_force.levels import STEP
+from brute_force.system import NoAnswer
+
+ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
+MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
+SLOW = 1e-7  # of the scene's speeds: what endless impacts end with
+ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
+DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
+
+
+class Instants:
+    """What follows an instant. length, speed: of the scene [m, m/s]; touch: of the length, see TOUCH."""
+
+    def __init__(self, levels, length, speed, touch):
+        self.levels, self.length, self.speed, self.touch = levels, length, speed, touch
+        self.n, self.rows, self.inverse = levels.n, levels.rows, levels.inverse
+
+    def settled(self, before, y, t, answer):
+        """The state after an instant, and y behind its impacts."""
+        w = self.levels.inputs(np.array([t]))[0]
+        touching = self._touching(y, w)
+        y = self._without_drift(y, w, touching)
+        y = self._struck(y, w, touching, answer)
+        resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
+        best, worst = None, np.inf
+        for count in range(len(resting) + 1):
+            for held in itertools.combinations(resting, count):
+                if worst <= ZERO or not self._independent(held):
+                    continue
+                state = self._compliant(before, held, y, t)
+                violation = self._violation(state, resting, y, t)
+                if violation < worst:
+                    best, worst = state, violation
+        if best is None or worst > 1e-3:
+            raise NoAnswer(f"no admissible set at t = {t:g}")
+        for i, (old, new) in enumerate(zip(before, best, strict=True)):
+            if old != new:
+                answer.events.append((t, i, new))
+        return best, y
+
+    def at_rest(self, y, t):
+        """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
+        w = self.levels.inputs(np.array([t]))[0]
+        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= SLOW * self.speed]
+        if not slow:
+            return y
+        rows, u = self.rows[slow], np.array([self._rate(i, y, w) for i in slow])
+        impulses = -np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ u
+        y = y.copy()
+        y[self.n : 2 * self.n] += self.inverse @ rows.T @ impulses
+        return y
+
+    def _without_drift(self, y, w, touching):
+        """y with round-off of the gaps of what touches taken away, which a long contact has added up."""
+        if not touching:
+            return y
+        rows = self.rows[touching]
+        gaps = [rows[k] @ y[: self.n] + self._offset(i, w) for k, i in enumerate(touching)]
+        pulled = np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ np.array(gaps)
+        y = y.copy()
+        y[: self.n] -= self.inverse @ rows.T @ pulled
+        return y
+
+    def _offset(self, i, w):
+        """gap_i - z_i [m]."""
+        return self.levels.system.stops[i].gap - (0.0 if self.levels.ways[i] is None else w[self.levels.ways[i]])
+
+    def _touching(self, y, w):
+        gaps = self.rows @ y[: self.n] + [s.gap for s in self.levels.system.stops]
+        gaps -= [0.0 if k is None else w[k] for k in self.levels.ways]
+        near = [i for i in self.levels.rigid if gaps[i] <= 10 * self.touch * self.length * np.sum(np.abs(self.rows[i]))]
+        if any(gaps[i] < -1e-6 * self.length for i in near):
+            raise NoAnswer("inside a rigid stop")
+        return near
+
+    def _rate(self, i, y, w):
+        return self.rows[i] @ y[self.n : 2 * self.n] - (
+            0.0 if self.levels.speeds[i] is None else w[self.levels.speeds[i]]
+        )
+
+    def _independent(self, held):
+        if not held:
+            return True
+        values = np.linalg.eigvalsh(self.rows[list(held)] @ self.inverse @ self.rows[list(held)].T)
+        return values[0] > DEPENDENT * values[-1]
+
+    def _struck(self, y, w, touching, answer):
+        """Moreau's impact: impulses p >= 0, speeds u >= 0, p u = 0, by trying every set."""
+        u = np.array([self._rate(i, y, w) for i in touching])
+        if not len(u) or np.min(u) >= -ZERO * self.speed:
+            return y
+        rows = self.rows[touching]
+        flexibility, best = rows @ self.inverse @ rows.T, (np.inf, None)
+        for count in range(1, len(touching) + 1):
+            for chosen in itertools.combinations(range(len(touching)), count):
+                pushed = list(chosen)
+                if not self._independent([touching[i] for i in pushed]):
+                    continue
+                impulses = np.zeros(len(touching))
+                impulses[pushed] = np.linalg.solve(flexibility[np.ix_(pushed, pushed)], -u[pushed])
+                after = u + flexibility @ impulses
+                violation = max(np.max(-impulses) * np.max(np.diag(flexibility)), np.max(-after)) / self.speed
+                if violation < 0.1 * best[0]:
+                    best = max(violation, ZERO / 10), impulses
+        if best[0] > 1e-8:
+            raise NoAnswer("no admissible impact")
+        y = y.copy()
+        answer.impact += float(-best[1] @ u - 0.5 * best[1] @ flexibility @ best[1])
+        y[self.n : 2 * self.n] += self.inverse @ rows.T @ best[1]
+        y[2 * self.n :][touching] += best[1]
+        return y
+
+    def moment(self, t):
+        """A short time [s]: of the fastest motion, less where loads change within a step."""
+        k = min(int(np.searchsorted(self.levels.nodes, t, side="right")), len(self.levels.nodes) - 1)
+        return (
+            MOMENT
+            * STEP
+            / self.levels.rate_of_all
+            * float(np.clip(100 * (self.levels.nodes[k] - t) * self.levels.rate_of_all, 0.02, 1))
+        )
+
+    def _compliant(self, before, held, y, t):
+        """The state with these rigid contacts closed: the others by where they are, or will be a moment later."""
+        state = list(before)
+        for i in self.levels.rigid:
+            state[i] = "closed" if i in held else "open"
+        for _ in range(6):
+            level, tau = self.levels.level(tuple(state)), self.moment(t)
+            later, known = self.levels.inside(level, y, t)(tau), tuple(state)
+            now, then = self.levels.inputs(np.array([t, t + tau]))
+            for i, stop in enumerate(self.levels.system.stops):
+                if i not in self.levels.rigid:
+                    state[i] = self._by_place(i, stop, (y, now), (later, then))
+            for j, law in enumerate(self.levels.system.laws):
+                q = law.row @ y[: self.n]
+                if np.min(np.abs(law.knots - q)) <= ZERO * self.length:
+                    q = law.row @ later[: self.n]
+                state[self.levels.c + j] = int(np.clip(np.searchsorted(law.knots, q) - 1, 0, len(law.knots) - 2))
+            if tuple(state) == known:
+                break
+        return tuple(state)
+
+    def _by_place(self, i, stop, now, later):
+        def gap(at):
+            return (
+                self.rows[i] @ at[0][: self.n]
+                + stop.gap
+                - (0.0 if self.levels.ways[i] is None else at[1][self.levels.ways[i]])
+            )
+
+        g = gap(now)
+        place = now if abs(g) > ZERO * self.length else later
+        g = gap(place)
+        if g > 0 or not stop.damping:
+            return "open" if g > 0 else "closed"
+        force = -stop.stiffness * g - stop.damping * self._rate(i, *place)
+        if abs(force) <= ZERO * (stop.stiffness * self.length + stop.damping * self.speed):
+            force = -stop.stiffness * gap(later) - stop.damping * self._rate(i, *later)
+        return "closed" if force > 0 else "inside"
+
+    def _violation(self, state, resting, y, t):
+        """By how much the motion of a state leaves what is admissible a moment later, of what it could."""
+        if not resting:
+            return 0.0
+        level, tau = self.levels.level(state), self.moment(t)
+        at = self.levels.inside(level, y, t)
+        worst = 0.0
+        for share in (0.5, 1.0):
+            later = at(share * tau)
+            w = self.levels.inputs(np.array([t + share * tau]))[0]
+            s = level.signals @ later + level.signal_inputs @ w
+            for value, i, row, row_w in zip(s, level.turns, level.signals, level.signal_inputs, strict=True):
+                if i in resting:
+                    size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
+                    if state[i] == "open":
+                        value = value if abs(value) > ROUND_OFF * size else 0.0
+                        size = self.length * (self.levels.rate_of_all * share * tau) ** 2
+                    worst = max(worst, -value / size if size else 0.0)
+        return worst

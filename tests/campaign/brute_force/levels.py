@@ -1,0 +1,210 @@
+"""Levels for brute force: the linear system of a state, its exact steps, and the motion inside a step."""
+
+import functools
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm
+
+STEP = 0.35  # times the fastest rate of any level: a step
+NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
+TERMS = 16  # of the exponential's series inside a step
+
+
+@dataclass(frozen=True)
+class Level:
+    """y' = A y + W w(t); signals s = S y + T w(t) >= 0, each of (item, what it turns to)."""
+
+    matrix: np.ndarray
+    inputs: np.ndarray
+    signals: np.ndarray
+    signal_inputs: np.ndarray
+    turns: list
+    steps: dict = field(default_factory=dict)
+
+    def step(self, h):
+        """exp(A h), and what the inputs at the nodes of a step add, (y, nodes w)."""
+        key = float(f"{h:.11e}")
+        if key not in self.steps:
+            parts = [
+                h * b * expm(self.matrix * (h * (1 - c))) @ self.inputs for b, c in zip(WEIGHTS, NODES, strict=True)
+            ]
+            self.steps[key] = expm(self.matrix * h), np.hstack(parts)
+        return self.steps[key]
+
+
+class Levels:
+    """All levels of a system, on a grid of steps up to the last of ``times``.
+
+    ways, speeds, accelerations: of the stops, as columns of the inputs w(t); nodes: of the grid.
+    """
+
+    def __init__(self, system, times):
+        self.system, self.end = system, times[-1]
+        self.n, self.c = len(system.mass), len(system.stops)
+        self.inverse = np.linalg.inv(system.mass)
+        self.rows = np.array([s.row for s in system.stops]).reshape(self.c, self.n)
+        self.rigid = [i for i, s in enumerate(system.stops) if np.isinf(s.stiffness)]
+        self._built = {}
+        self.functions = [lambda t: np.ones_like(t)]
+        self.loads = [self._input(course.value) for _, course in system.loads]
+        moving = [(s.course, s.course.rate, s.course.acceleration) if s.course else (None,) * 3 for s in system.stops]
+        self.ways = [self._input(course and course.value) for course, _, _ in moving]
+        self.speeds = [self._input(rate) for _, rate, _ in moving]
+        self.accelerations = [self._input(acceleration) for _, _, acceleration in moving]
+        self.nodes = self._grid()
+        self.at_nodes = self.inputs(self.nodes)
+        widths = np.diff(self.nodes)
+        self.at_quadrature = self.inputs((self.nodes[:-1, None] + widths[:, None] * NODES).ravel())
+        self.at_quadrature = self.at_quadrature.reshape(len(widths), -1)
+
+    def _input(self, function):
+        if function is None:
+            return None
+        self.functions.append(function)
+        return len(self.functions) - 1
+
+    def inputs(self, t):
+        return np.column_stack([function(t) for function in self.functions])
+
+    def _courses(self):
+        return [course for _, course in self.system.loads] + [s.course for s in self.system.stops if s.course]
+
+    def _grid(self):
+        end, courses = self.end, self._courses()
+        longest = min([STEP / self.rate_of_all, end / 8, *(course.step for course in courses)])
+        fine = [span for course in courses for span in course.fine]
+        marks = {0.0, end, *(b for course in courses for b in course.breaks if 0 < b < end)}
+        marks |= {float(np.clip(t, 0, end)) for span in fine for t in span[:2]}
+        marks = sorted(marks)
+        nodes = [0.0]
+        for first, last in itertools.pairwise(marks):
+            own = min([longest, *(step for a, b, step in fine if a < last and b > first)])
+            nodes.extend(np.linspace(first, last, max(1, int(np.ceil((last - first) / own))) + 1)[1:])
+        return np.array(nodes)
+
+    @functools.cached_property
+    def rate_of_all(self):
+        """Rate [1/s] of the fastest motion of any level."""
+        stiff, damped = self.system.stiffness.copy(), self.system.damping.copy()
+        for stop in self.system.stops:
+            if np.isfinite(stop.stiffness):
+                stiff += stop.stiffness * np.outer(stop.row, stop.row)
+                damped += stop.damping * np.outer(stop.row, stop.row)
+        for law in self.system.laws:
+            stiff += np.max(np.abs(np.diff(law.forces) / np.diff(law.knots))) * np.outer(law.row, law.row)
+        matrix = np.block([[np.zeros_like(stiff), np.eye(self.n)], [-self.inverse @ stiff, -self.inverse @ damped]])
+        omega = np.sqrt(np.max(np.abs(np.linalg.eigvals(self.inverse @ stiff))))
+        return max(omega, np.max(np.abs(np.linalg.eigvals(matrix))), 1 / self.end)
+
+    def level(self, state):
+        """The linear system of a state: of every contact "open", "closed" or "inside", of every law its segment."""
+        if state not in self._built:
+            self._built[state] = self._level(state)
+        return self._built[state]
+
+    def _level(self, state):
+        """Everything is linear in (y, w): forces first, then accelerations, reactions and signals."""
+        n, c, w = self.n, self.c, len(self.functions)
+        gap, rate, force = np.zeros((3, c, 2 * n + c)), None, None
+        gap, rate, force = gap
+        gap_w, rate_w, force_w = np.zeros((3, c, w))
+        for i, stop in enumerate(self.system.stops):
+            gap[i, :n], gap_w[i, 0], rate[i, n : 2 * n] = stop.row, stop.gap, stop.row
+            if self.ways[i] is not None:
+                gap_w[i, self.ways[i]] -= 1
+            if self.speeds[i] is not None:
+                rate_w[i, self.speeds[i]] -= 1
+            if i not in self.rigid:
+                force[i] = -stop.stiffness * gap[i] - stop.damping * rate[i]
+                force_w[i] = -stop.stiffness * gap_w[i] - stop.damping * rate_w[i]
+        total, total_w = self.smooth_forces(state)
+        closed = [i for i in range(c) if state[i] == "closed"]
+        for i in closed:
+            if i not in self.rigid:
+                total = total + np.outer(self.rows[i], force[i])
+                total_w = total_w + np.outer(self.rows[i], force_w[i])
+        held = [i for i in closed if i in self.rigid]
+        if held:
+            rows = self.rows[held]
+            wanted = np.zeros((len(held), w))
+            for k, i in enumerate(held):
+                if self.accelerations[i] is not None:
+                    wanted[k, self.accelerations[i]] = 1
+            flexibility = rows @ self.inverse @ rows.T
+            force[held] = np.linalg.solve(flexibility, -rows @ self.inverse @ total)
+            force_w[held] = np.linalg.solve(flexibility, wanted - rows @ self.inverse @ total_w)
+            total, total_w = total + rows.T @ force[held], total_w + rows.T @ force_w[held]
+        matrix, inputs = np.zeros((2 * n + c, 2 * n + c)), np.zeros((2 * n + c, w))
+        matrix[:n, n : 2 * n] = np.eye(n)
+        matrix[n : 2 * n], inputs[n : 2 * n] = self.inverse @ total, self.inverse @ total_w
+        for i in closed:
+            matrix[2 * n + i], inputs[2 * n + i] = force[i], force_w[i]
+        return Level(matrix, inputs, *self._signals(state, (gap, gap_w), (force, force_w)))
+
+    def smooth_forces(self, state):
+        """Of structure, loads and laws: rows (n, y) and (n, w)."""
+        n, system = self.n, self.system
+        total, total_w = np.zeros((n, 2 * n + self.c)), np.zeros((n, len(self.functions)))
+        total[:, :n], total[:, n : 2 * n] = -system.stiffness, -system.damping
+        total_w[:, 0] = system.constant
+        for (row, _), k in zip(system.loads, self.loads, strict=True):
+            total_w[:, k] += row
+        for law, segment in zip(system.laws, state[self.c :], strict=True):
+            slope = np.diff(law.forces)[segment] / np.diff(law.knots)[segment]
+            total[:, :n] -= slope * np.outer(law.row, law.row)
+            total_w[:, 0] -= (law.forces[segment] - slope * law.knots[segment]) * law.row
+        return total, total_w
+
+    def _signals(self, state, gaps, forces):
+        found, turns = [], []
+        for i, stop in enumerate(self.system.stops):
+            gap, force = (gaps[0][i], gaps[1][i]), (forces[0][i], forces[1][i])
+            minus_gap, minus_force = (-gap[0], -gap[1]), (-force[0], -force[1])
+            if state[i] == "open":
+                found.append(gap)
+            elif state[i] == "inside":
+                found += [minus_gap, minus_force]
+                turns.append(i)
+            else:
+                found.append(force if i in self.rigid or stop.damping else minus_gap)
+            turns.append(i)
+        for j, law in enumerate(self.system.laws):
+            row, segment = np.zeros(2 * self.n + self.c), state[self.c + j]
+            row[: self.n], one = law.row, np.eye(1, len(self.functions))[0]
+            if segment > 0:
+                found.append((row, -law.knots[segment] * one))
+                turns.append(self.c + j)
+            if segment < len(law.knots) - 2:
+                found.append((-row, law.knots[segment + 1] * one))
+                turns.append(self.c + j)
+        if not found:
+            return np.zeros((0, 2 * self.n + self.c)), np.zeros((0, len(self.functions))), []
+        return np.array([row for row, _ in found]), np.array([row for _, row in found]), turns
+
+    def lowest(self):
+        return ("open",) * self.c + (0,) * len(self.system.laws)
+
+    def inside(self, level, y, t):
+        """y(tau) after (y, t), within a step: (y,) of one tau, (y, k) of (k,)."""
+        vectors = [y, level.matrix @ y + level.inputs[:, 0]]
+        for i in range(2, TERMS + 1):
+            vectors.append(level.matrix @ vectors[-1] / i)
+        series, powers, varying = np.array(vectors).T, np.arange(TERMS + 1), level.inputs[:, 1:]
+
+        def at(tau):
+            taus = np.atleast_1d(tau)
+            moved = series @ taus ** powers[:, None]
+            if varying.size:
+                times = taus[:, None] * NODES
+                part = varying @ (self.inputs((t + times).ravel())[:, 1:] * (taus[:, None] * WEIGHTS).reshape(-1, 1)).T
+                left = (taus[:, None] - times).ravel()
+                total = part.copy()
+                for i in range(1, TERMS + 1):
+                    part = level.matrix @ part * (left / i)
+                    total += part
+                moved = moved + total.reshape(len(y), len(taus), len(NODES)).sum(axis=2)
+            return moved if np.ndim(tau) else moved[:, 0]
+
+        return at

@@ -1,0 +1,71 @@
+"""Systems for brute force: matrices, rows and functions of time come in, motion goes out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+class NoAnswer(Exception):
+    """The integrator gives up: too many events, or no admissible set of contacts."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """u(t), u'(t), u''(t) of (k,) times; fine: (t0, t1, step) of shorter steps; breaks: where u is not smooth."""
+
+    value: Callable
+    rate: Callable | None = None
+    acceleration: Callable | None = None
+    breaks: tuple = ()
+    fine: tuple = ()
+    step: float = np.inf
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A contact: row h, gap [m], stiffness k and damping c; course of its stop."""
+
+    row: np.ndarray
+    gap: float
+    stiffness: float = np.inf
+    damping: float = 0.0
+    course: Course | None = None
+
+
+@dataclass(frozen=True)
+class Law:
+    """A force law along a row: F through (knots, forces)."""
+
+    row: np.ndarray
+    knots: np.ndarray
+    forces: np.ndarray
+
+
+@dataclass(frozen=True)
+class System:
+    """M, C, K (n, n), contacts, laws, loads [(row, course)]; base: (e, course), which fixed stops hear as well."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    stops: Sequence[Stop] = ()
+    laws: Sequence[Law] = ()
+    loads: Sequence[tuple[np.ndarray, Course]] = ()
+    constant: np.ndarray | float = 0.0
+
+
+@dataclass
+class Answer:
+    """x, x' (n, k) at the times asked for, events [(time, contact, state)], impulses (c,), energy lost by impacts.
+
+    length, speed: of the scene, what its gaps, start, stops and loads make [m, m/s].
+    """
+
+    displacement: np.ndarray
+    velocity: np.ndarray
+    events: list = field(default_factory=list)
+    impulse: np.ndarray | None = None
+    impact: float = 0.0
+    length: float = 0.0
+    speed: float = 0.0
