@@ -76,6 +76,12 @@ def of_arrays(numbers: Numbers) -> float:
 
 
 @compiled
+def of_a_list(numbers: Numbers, n: int) -> float:
+    found = [numbers[k] for k in range(n)]
+    return found[0]
+
+
+@compiled
 def endless(n: int) -> int:
     return endless(n - 1)
 
@@ -206,6 +212,7 @@ def test_an_entry_refuses_what_is_no_buffer_of_its_kind(argument, got):
     [
         (complex_ratio, "got an operation that raises"),
         (of_arrays, "got NOTHING of type ndarray"),
+        (of_a_list, "arrays, lists"),
         (endless, "got a recursion"),
         (without_kind, "annotations: got without_kind"),
         (of_a_wave, "annotations: got of_a_wave"),
