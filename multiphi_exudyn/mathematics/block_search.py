@@ -52,7 +52,7 @@ def descent_in_block(
     scratch_wave: int,
 ) -> int:
     """The signal that falls first in a block of intervals, NONE if none does."""
-    p, values = ints[basis + SIZE], bounds + DERIVATIVES * count + ints[basis + SIZE]
+    p, values = ints[basis + SIZE], bounds + DERIVATIVES * count
     here, there, factors = scratch_wave + HERE * p, scratch_wave + THERE * p, scratch_wave + FACTORS * p
     local = begin_block(ints, numbers, waves, basis, signals, constants, count, start, step, values, scratch_wave)
     known, wide, place, end, found = 0, 0, 0, horizon - start, NONE
@@ -125,12 +125,10 @@ def advance_exponentials(
     ints: Ints, numbers: Numbers, waves: Waves, basis: int, here: int, factors: int, t: float, there: int
 ) -> None:
     """phi (p,) at a next sample: those of power zero times their factors, the others times t / T."""
-    powers, ratio = ints[basis + POWERS], t / numbers[ints[basis + SCALES]]
+    powers, ratio, phi = ints[basis + POWERS], t / numbers[ints[basis + SCALES]], 0j
     for j in range(ints[basis + SIZE]):
-        if ints[powers + j] > 0:
-            waves[there + j] = waves[there + j - 1] * ratio
-        else:
-            waves[there + j] = waves[here + j] * waves[factors + j]
+        phi = phi * ratio if ints[powers + j] > 0 else waves[here + j] * waves[factors + j]
+        waves[there + j] = phi
 
 
 @compiled

@@ -12,17 +12,16 @@ import math
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.flat_basis import (
     POWERS,
-    PURE,
     RATES,
     SCALES,
     SIZE,
-    differentiate,
     exponential_size,
     magnitude,
 )
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = [
+    "BOUNDING",
     "DERIVATIVES",
     "HERMITE",
     "INTERVALS",
@@ -35,6 +34,7 @@ __all__ = [
 ]
 
 DERIVATIVES = 7  # g and its derivatives up to the sixth are bounded
+BOUNDING = 4  # in p: numbers that are worked in behind the bounds
 INTERVALS = 64  # in a block
 RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
 HERMITE = 1 / 384
@@ -52,39 +52,37 @@ def bound(
     start: float,
     latest: float,
     bounds: int,
-    scratch_wave: int,
 ) -> None:
     """Upper bounds (count, 7) of |g|, |g'|, ..., |g^(6)| on [start, latest], constants left out.
 
-    sum_j |a_j^(k)| e_j, e_j = (latest / T)^d_j exp(min(Re lambda_j, 0) start + max(Re lambda_j, 0) latest); where every
-    power is zero a_j^(k) = a_j lambda_j^k. The e_j (p,) are left behind the bounds.
+    sum_j b_j with b_j = |a_j| (latest / T)^d_j exp(min(Re lambda_j, 0) start + max(Re lambda_j, 0) latest) for g; every
+    derivative has |lambda_j| b_j + d_j+1 / latest b_j+1 in place of b_j, where j + 1 is of the next power. BOUNDING p
+    numbers behind the bounds are worked in.
     """
     p, powers, rates = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES]
-    envelope, ratio = bounds + DERIVATIVES * count, latest / numbers[ints[basis + SCALES]]
+    sizes, fast, envelope, link = bounds + DERIVATIVES * count, p, 2 * p, 3 * p
+    ratio, height = latest / numbers[ints[basis + SCALES]], 1.0
     for j in range(p):
+        decay = waves[rates + j].real
+        numbers[sizes + link + j] = 0.0
         if ints[powers + j] > 0:
-            numbers[envelope + j] = numbers[envelope + j - 1] * ratio
+            height *= ratio
+            numbers[sizes + link + j - 1] = ints[powers + j] / latest
         else:
-            decay = waves[rates + j].real
-            numbers[envelope + j] = exponential_size(decay * (start if decay < 0 else latest)) if decay != 0 else 1.0
+            height = exponential_size(decay * (start if decay < 0.0 else latest)) if decay != 0.0 else 1.0
+        numbers[sizes + envelope + j] = height
+        numbers[sizes + fast + j] = magnitude(waves, rates + j)
     for s in range(count):
+        for j in range(p):
+            numbers[sizes + j] = magnitude(waves, signals + s * p + j) * numbers[sizes + envelope + j]
         for k in range(DERIVATIVES):
-            numbers[bounds + DERIVATIVES * s + k] = 0.0
-        if ints[basis + PURE] == 1:
+            total = 0.0
             for j in range(p):
-                size, fast = magnitude(waves, signals + s * p + j) * numbers[envelope + j], magnitude(waves, rates + j)
-                for k in range(DERIVATIVES):
-                    numbers[bounds + DERIVATIVES * s + k] += size
-                    size *= fast
-        else:
-            for j in range(p):
-                waves[scratch_wave + j] = waves[signals + s * p + j]
-            for k in range(DERIVATIVES):
-                total = 0.0
-                for j in range(p):
-                    total += magnitude(waves, scratch_wave + j) * numbers[envelope + j]
-                numbers[bounds + DERIVATIVES * s + k] = total
-                differentiate(ints, numbers, waves, basis, scratch_wave, scratch_wave)
+                size = numbers[sizes + j]
+                total += size
+                linked = numbers[sizes + link + j] * numbers[sizes + j + 1]  # the last one to none
+                numbers[sizes + j] = size * numbers[sizes + fast + j] + linked
+            numbers[bounds + DERIVATIVES * s + k] = total
 
 
 @compiled

@@ -36,6 +36,7 @@ from multiphi_exudyn.mathematics.flat_basis import (
 )
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mathematics.signal_bounds import (
+    BOUNDING,
     DERIVATIVES,
     INTERVALS,
     all_above,
@@ -79,7 +80,7 @@ INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes l
 
 def scratch_numbers(p: int, count: int) -> int:
     """Numbers that a search among so many signals on p exponentials works in."""
-    return SUSPECT + p + (DERIVATIVES + 4) * count
+    return SUSPECT + BOUNDING * p + (DERIVATIVES + 4) * count
 
 
 def scratch_waves(p: int, count: int) -> int:
@@ -115,7 +116,7 @@ def first_descent(
     while found == NONE and begin < horizon and count > 0:
         until = min(horizon, begin + window)
         latest = 2 * until - begin  # a block may end behind
-        bound(ints, numbers, waves, basis, signals, count, begin, latest, bounds, scratch_wave)
+        bound(ints, numbers, waves, basis, signals, count, begin, latest, bounds)
         if ints[basis + ETERNAL] == 1 and all_above(numbers, constants, bounds, count) == 1:
             break
         if all_finite(numbers, bounds, count) == 0:
@@ -164,7 +165,7 @@ def near_descent(
     2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
     valid: how long the bounds hold, for ever where nothing grows. Every power is zero.
     """
-    p, rates, starts = ints[basis + SIZE], ints[basis + RATES], bounds + DERIVATIVES * count + ints[basis + SIZE]
+    p, rates, starts = ints[basis + SIZE], ints[basis + RATES], bounds + DERIVATIVES * count
     for s in range(count):
         value, slope = numbers[constants + s], 0.0
         for j in range(p):
