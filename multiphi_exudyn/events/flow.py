@@ -226,7 +226,7 @@ def add_forced(
         value = waves[ints[FORCED] + i]
         slope = rate * value
         if rows > 1:
-            slope += waves[ints[FORCED] + r + i] / numbers[HORIZON]
+            slope += 1.0 / numbers[HORIZON] * waves[ints[FORCED] + r + i]
         numbers[own + i] -= value.real
         numbers[own + r + i] -= slope.real
         numbers[own + 2 * r + i] += value.real

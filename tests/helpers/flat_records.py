@@ -1,9 +1,13 @@
 """Flat buffers filled from the objects whose meaning the flat functions share, to compare the two."""
 
+import functools
+
 import numpy as np
 
-from multiphi_exudyn.mathematics import flat_basis, flat_response, zero_crossing
+from multiphi_exudyn.mathematics import compiled, flat_basis, flat_response, zero_crossing
 from multiphi_exudyn.mathematics.first_descent import Descent
+
+fast = functools.cache(compiled.entry)  # a function compiled, once in a process
 
 
 class Buffers:
@@ -51,7 +55,7 @@ class Buffers:
 
 
 class Search:
-    """``DescentFinder`` on flat buffers, for the signals of one basis; ``run``: compiled.entry, or as they are."""
+    """``DescentFinder`` on flat buffers, for the signals of one basis; run: ``fast``, or as they are."""
 
     def __init__(self, basis, signals, run=lambda function: function):
         self._run = run

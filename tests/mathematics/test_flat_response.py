@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from flat_records import Buffers
+from flat_records import Buffers, fast
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics import flat_response
+from multiphi_exudyn.mathematics import compiled, flat_response
 from multiphi_exudyn.mathematics.forced_response import particular
 from multiphi_exudyn.mathematics.free_response import modal_response
 
@@ -60,13 +60,15 @@ def test_an_exponential_of_one_mode_reaches_that_mode_only():
 MOST = 80  # rows of a forced response
 
 
-def forced(squares, damping, rate, forces, horizon, most=MOST):
+def forced(squares, damping, rate, forces, horizon, most=MOST, run=lambda function: function):
     """Rows of the response, of which as many as there is room for."""
     buffers, (count, r) = Buffers(), forces.shape
     record = buffers.put_response(modal_response(squares, damping), squares, damping)
     carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
     scratch, x = buffers.put_waves(np.full(2 * most, np.nan)), buffers.put_waves(np.full(most * r, np.nan))
-    rows = flat_response.forced_response(*buffers.all, record, carrier, given, count - 1, horizon, most, scratch, x)
+    rows = run(flat_response.forced_response)(
+        *buffers.all, record, carrier, given, count - 1, horizon, most, scratch, x
+    )
     return rows, buffers.waves[x : x + min(rows, most) * r].reshape(-1, r)
 
 
@@ -127,3 +129,15 @@ def test_it_says_how_many_rows_it_needs_where_there_are_too_few():
     rows, x = forced(SQUARES, DIAGONAL, 1j, forces, 2.0, most=4)
     assert enough >= rows > 4
     assert not np.any(np.isnan(x[:1]))
+
+
+@pytest.mark.skipif(not compiled.available(), reason="needs numba")
+@pytest.mark.parametrize("damping", DAMPING)
+def test_compiled_it_gives_what_it_gives_as_plain_python(damping):
+    for rate, horizon, degree in CARRIERS:
+        forces = np.random.default_rng(1).normal(size=(degree + 1, 6)) + 0j
+        given = SQUARES, DAMPING[damping], rate, forces, horizon
+        rows, x = forced(*given, run=fast)
+        plain_rows, plain_x = forced(*given)
+        assert rows == plain_rows
+        assert_allclose(x, plain_x, rtol=0, atol=1e-14 * np.max(np.abs(plain_x)))

@@ -1,10 +1,8 @@
 """The flat search gives the answers of ``DescentFinder``, and exact ones where they are known."""
 
-import functools
-
 import numpy as np
 import pytest
-from flat_records import Search
+from flat_records import Search, fast
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.errors import NumericalFailure
@@ -14,7 +12,6 @@ from multiphi_exudyn.mathematics.first_descent import Descent, DescentFinder, Si
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 CASES = 30  # of every kind
-ENTRIES = functools.cache(compiled.entry)
 
 
 def exponentials(kind, random):
@@ -166,7 +163,7 @@ def test_motion_that_is_not_finite_is_told():
 def test_a_search_that_would_take_for_ever_is_refused_as_by_the_descent_finder():
     basis = Exponentials(np.array([1e9j, 2e9j]), np.zeros(2, int))
     never = Signals(np.array([[1, 1]], complex), np.array([1.2]))
-    search = Search(basis, never, ENTRIES)
+    search = Search(basis, never, fast)
     assert search.first(1e-7)[0] == zero_crossing.NONE
     assert search.first(1.0)[0] == zero_crossing.TOO_LONG
     step, left = search.buffers.numbers[search.result + 2 : search.result + 4]
@@ -187,13 +184,13 @@ def test_of_two_signals_that_fall_together_it_names_the_one_the_descent_finder_n
 def test_compiled_it_gives_what_it_gives_as_plain_python(kind):
     for seed in range(CASES):
         basis, own, start, horizon = some(kind, seed)
-        plain, fast = Search(basis, own), Search(basis, own, ENTRIES)
-        (signal, time), (expected, exact) = fast.first(horizon, start), plain.first(horizon, start)
+        plain, quick = Search(basis, own), Search(basis, own, fast)
+        (signal, time), (expected, exact) = quick.first(horizon, start), plain.first(horizon, start)
         assert signal == expected
-        assert fast.samples == plain.samples
+        assert quick.samples == plain.samples
         assert_allclose(time, exact, rtol=1e-13)
         if signal >= 0:
             found = Descent(time, signal)
-            assert fast.simultaneous(found) == plain.simultaneous(found)
+            assert quick.simultaneous(found) == plain.simultaneous(found)
         sizes = np.abs(own.coefficients)
-        assert fast.signs(sizes) == plain.signs(sizes)
+        assert quick.signs(sizes) == plain.signs(sizes)
