@@ -33,7 +33,7 @@ __all__ = ["Buffers"]
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
-PIECES, PIECE_COUNT, PIECE, PIECE_NOW = 13, 14, 15, 47  # records of pieces, how many, the present one, its record
+PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = 13, 14, 15, 47, 48, 49  # records of pieces, how many, the present one, its record; terms
 NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
 CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
 TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
@@ -64,7 +64,7 @@ RUN_INTS = 176
 
 # ---------------------------------------------------------------------- run record, numbers
 
-TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME = 0, 1, 2, 3, 4, 5
+TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 RUN_NUMBERS = 36
@@ -95,7 +95,7 @@ STATE_INTS = 8
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
 CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
 SHARED = -1
-SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 5
+SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
 EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
 
 # ---------------------------------------------------------------------- answers

@@ -14,6 +14,7 @@ import math
 from multiphi_exudyn.events.arrays import (
     CHANNELS,
     DRIVE,
+    DRIVE_NEXT,
     DRIVE_WAVES,
     FLOW_BASIS,
     FLOW_COUNT,
@@ -37,13 +38,13 @@ from multiphi_exudyn.events.arrays import (
     PIECES,
     PIECE_NOW,
     PIECE_TERMS,
-    PIECE_TIMES,
     PLACE,
     RATED,
     RESPONSE,
     ROW,
     SCALED_TERM,
     SPEED,
+    TERMS_NOW,
     TERM_INTS,
     WAVE,
     WORK_WAVES,
@@ -70,48 +71,70 @@ from multiphi_exudyn.mathematics.flat_response import (
     forced_response,
 )
 
-__all__ = ["expand", "set_drive", "signal_sizes", "signal_waves", "state_at"]
+__all__ = ["expand", "keep_drive", "load_piece", "set_drive", "signal_sizes", "signal_waves", "state_at"]
 
 
 @compiled
-def set_drive(ints: Ints, numbers: Numbers, waves: Waves, time: float, end: float) -> None:
-    """The channels at a time on the present piece: w, w', w'' (3, q), the sizes of their terms (3, q), and its terms from then on.
-
-    The terms are moved on by synthetic division. The horizon of motions that begin there is the power of two above what
-    is left of the piece, or of the run: bases are shared among pieces of about the same length.
-    """
-    q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECES] + ints[PIECE]
-    piece = ints[piece]
+def load_piece(ints: Ints, waves: Waves) -> None:
+    """The terms of the present piece, as they are at its start, become those that hold now."""
+    piece, moved, q = ints[ints[PIECES] + ints[PIECE]], ints[DRIVE_WAVES], ints[CHANNELS]
     ints[PIECE_NOW] = piece
-    start, until = numbers[ints[piece + PIECE_TIMES]], min(numbers[ints[piece + PIECE_TIMES] + 1], end)
+    for term in range(ints[piece + PIECE_TERMS]):
+        count, given = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
+        for k in range(count * q):
+            waves[moved + k] = waves[given + 1 + k]
+        moved += count * q
+
+
+@compiled
+def set_drive(
+    ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float
+) -> None:
+    """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
+
+    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the power
+    of two above what is left: bases are shared among pieces of about the same length.
+    """
+    q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
     numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])
+    ints[TERMS_NOW] = result
     for k in range(6 * q):
         numbers[drive + k] = 0.0
     for term in range(ints[piece + PIECE_TERMS]):
-        count, given = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
-        rate, delay = waves[given], time - start
+        count, rate = ints[piece + TERM_INTS + 2 * term], waves[ints[piece + TERM_INTS + 2 * term + 1]]
         size, angle = exponential_size(rate.real * delay), rate.imag * delay
         factor = complex(size * math.cos(angle), size * math.sin(angle))
         for k in range(count * q):
-            waves[moved + k] = waves[given + 1 + k] * factor
+            waves[result + k] = waves[moved + k] * factor
         for k in range(q):
             for lowest in range(count - 1):
                 for d in range(count - 2, lowest - 1, -1):
-                    waves[moved + d * q + k] += delay * waves[moved + (d + 1) * q + k]
-            first = rate * waves[moved + k]
+                    waves[result + d * q + k] += delay * waves[result + (d + 1) * q + k]
+            first = rate * waves[result + k]
             second = rate * first
             if count > 1:
-                first += waves[moved + q + k]
-                second += 2.0 * rate * waves[moved + q + k]
+                first += waves[result + q + k]
+                second += 2.0 * rate * waves[result + q + k]
             if count > 2:
-                second += 2.0 * waves[moved + 2 * q + k]
-            numbers[drive + k] += waves[moved + k].real
+                second += 2.0 * waves[result + 2 * q + k]
+            numbers[drive + k] += waves[result + k].real
             numbers[drive + q + k] += first.real
             numbers[drive + 2 * q + k] += second.real
-            numbers[drive + 3 * q + k] += abs(waves[moved + k])
+            numbers[drive + 3 * q + k] += abs(waves[result + k])
             numbers[drive + 4 * q + k] += abs(first)
             numbers[drive + 5 * q + k] += abs(second)
         moved += count * q
+        result += count * q
+
+
+@compiled
+def keep_drive(ints: Ints, waves: Waves) -> None:
+    """The terms of the instant become those that hold now."""
+    q, piece, count = ints[CHANNELS], ints[PIECE_NOW], 0
+    for term in range(ints[piece + PIECE_TERMS]):
+        count += ints[piece + TERM_INTS + 2 * term] * q
+    for k in range(count):
+        waves[ints[DRIVE_WAVES] + k] = waves[ints[DRIVE_NEXT] + k]
 
 
 @compiled
@@ -140,7 +163,7 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     they are the sums. Where there is no room for as many powers as a response takes, FORCED_WANTED says for how many.
     """
     level, q, horizon = ints[state + LEVEL], ints[CHANNELS], numbers[HORIZON]
-    r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[DRIVE_WAVES]
+    r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
     own, record, most = ints[FLOW_STATE], ints[FLOW_RECORD], ints[FORCED_ROOM]
     basis = ints[FLOW_BASIS]
     for i in range(r):

@@ -159,11 +159,10 @@ class FlatDrivenMotion(FlatMotion):
         self.arrays.numbers[a.WORK] = float((patterns @ w) @ moved)
 
     def _leave(self) -> State:
-        state, time = super()._leave(), float(self.arrays.numbers[a.TIME])
-        drive = self.arrays.drives[int(self.arrays.ints[a.PIECE])]
+        state, drive = super()._leave(), self.arrays.drives[int(self.arrays.ints[a.PIECE])]
         rule = self.arrays.rule
         assert isinstance(state.level, DrivenLevel)
-        drive = drive.after(time - drive.time)
+        drive = drive.after(float(self.arrays.numbers[a.AGE]))
         return DrivenState(
             state.level, state.displacement, state.velocity, state.phases, drive, rule.until, rule.finders
         )
@@ -178,7 +177,7 @@ class FlatDrivenMotion(FlatMotion):
         """The i-th segment of the record."""
         record, level = self.record, self.record.level(i)
         assert isinstance(level, DrivenLevel)
-        start, end, armed_at, horizon, work = record.spans[i].tolist()
+        start, end, armed_at, horizon, work, age = record.spans[i].tolist()
         drive = self.arrays.drives[record.rows[i, 1]]
-        flow = Flow.of(level, *record.state(i), drive.after(start - drive.time), horizon)
+        flow = Flow.of(level, *record.state(i), drive.after(age), horizon)
         return DrivenSegment(start, end, level, flow.coefficients, record.standing(i), armed_at, flow, work)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from multiphi_exudyn.events.arrays import (
     ACCELERATION,
     AGAIN,
+    AGE,
     ALLOWED,
     ARMED,
     ASKED,
@@ -32,6 +33,8 @@ from multiphi_exudyn.events.arrays import (
     CURRENT,
     DECISIONS,
     DRIVE,
+    DRIVE_NEXT,
+    DRIVE_WAVES,
     ELEMENT,
     ELEMENTS,
     ENDS,
@@ -124,7 +127,7 @@ from multiphi_exudyn.events.flat_state import (
     potential,
     row_sign,
 )
-from multiphi_exudyn.events.flow import expand, set_drive, signal_waves, state_at
+from multiphi_exudyn.events.flow import expand, keep_drive, load_piece, set_drive, signal_waves, state_at
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.flat_basis import SCALES, differentiate
 from multiphi_exudyn.mathematics.round_off import CLEAR
@@ -181,7 +184,8 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         return NEED
     energy = kinetic(ints, numbers, CURRENT) + potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
     ints[PIECE] += 1
-    set_drive(ints, numbers, waves, numbers[TIME], end)
+    load_piece(ints, waves)
+    set_drive(ints, numbers, waves, ints[DRIVE_WAVES], 0.0, numbers[TIME], min(end, piece_end(ints, numbers)))
     copy_state(ints, numbers, CURRENT, REACHED)
     x, v, row = ints[REACHED + PLACE], ints[REACHED + SPEED], ints[level + CARRIED]
     for k in range(q):
@@ -199,6 +203,7 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     work = kinetic(ints, numbers, REACHED) + potential(ints, numbers, REACHED) - energy
     numbers[WORK] += work + pattern_work(ints, numbers, after)
     copy_state(ints, numbers, after, CURRENT)
+    numbers[AGE] = 0.0
     if status == EVENT:
         ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
         keep_events(ints, numbers)
@@ -233,7 +238,7 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     level, started, samples = ints[CURRENT + LEVEL], numbers[TIME], numbers[ints[FOUND] + 1]
     horizon, reached, armed_at, asking = end - started, 0.0, 0.0, 0
     if ints[CHANNELS] > 0:
-        set_drive(ints, numbers, waves, started, end)
+        set_drive(ints, numbers, waves, ints[DRIVE_WAVES], 0.0, started, end)
     expand(ints, numbers, waves, CURRENT)
     copy_state(ints, numbers, CURRENT, REACHED)
     while asking == 0:
@@ -263,7 +268,7 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     state_at(ints, numbers, waves, level, reached, ints[REACHED + PLACE], ints[REACHED + SPEED])
     unit = numbers[HORIZON]
     if ints[CHANNELS] > 0:
-        set_drive(ints, numbers, waves, numbers[INSTANT_TIME], end)
+        set_drive(ints, numbers, waves, ints[DRIVE_NEXT], reached, numbers[INSTANT_TIME], end)
     measure(ints, numbers, REACHED)
     fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
     at_once = reached <= (INSTANT / fastest if fastest > 0.0 else 0.0)
@@ -280,6 +285,9 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         numbers[ints[FOUND] + 1] = samples
         return NEED if status == NEED else FULL
     keep_segment(ints, numbers, armed_at, unit)
+    if ints[CHANNELS] > 0:
+        keep_drive(ints, waves)
+        numbers[AGE] += reached
     if asking == 0:
         copy_state(ints, numbers, REACHED, CURRENT)
         return OK
@@ -451,6 +459,7 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) 
     numbers[given + 2] = armed_at
     numbers[given + 3] = horizon
     numbers[given + 4] = numbers[WORK]
+    numbers[given + 5] = numbers[AGE]
     kept = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
     for i in range(n):
         numbers[kept + i] = numbers[ints[CURRENT + PLACE] + i]

@@ -82,7 +82,7 @@ class Record:
     """Segments and events of a run, in arrays that grow.
 
     rows (n, 5): number of the level, piece, events before, where coordinates and phases stand (-1: all armed).
-    spans (n, 5): start, end, armed at, horizon [s], work [J] at the start. coordinates: xi, xi' of every start.
+    spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] the piece lasts. coordinates: xi, xi' of every start.
     phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
     amounts (m, 7): time [s], five losses [J], impulse [N s]. places: which of them are events.
     """
@@ -175,7 +175,7 @@ class Record:
 
     def segment(self, i: int) -> Segment:
         """The i-th segment."""
-        level, (start, end, armed_at, _, _) = self.level(i), self.spans[i].tolist()
+        level, (start, end, armed_at) = self.level(i), self.spans[i, :3].tolist()
         drive = level.asymptotic.drive if level.driven else None
         coefficients = level.level.response.coefficients(*self.state(i), drive)
         return Segment(start, end, level, coefficients, self.standing(i), armed_at)

@@ -52,7 +52,7 @@ class DrivenArrays(LevelArrays):
         q, degree = int(self.ints[a.CHANNELS]), max(h.coefficients.shape[1] for h in self.rule.excitation.histories)
         sizes, room = super()._scratch(n, p, signals), max(self._powers, degree)
         sizes["numbers"] |= {a.DRIVE: 6 * q, a.FLOW_STATE: 4 * n}
-        sizes["waves"] |= {a.DRIVE_WAVES: q * degree * q, a.SCALED_TERM: degree * q, a.FORCES: degree * n}
+        sizes["waves"] |= {a.DRIVE_WAVES: q * degree * q, a.DRIVE_NEXT: q * degree * q, a.SCALED_TERM: degree * q, a.FORCES: degree * n}
         sizes["waves"] |= {a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n}
         take = self.buffers.take
         given = {flat_basis.POWERS: take("ints", p), flat_basis.RATES: take("waves", p)}
@@ -122,5 +122,8 @@ class DrivenArrays(LevelArrays):
     def set_drive(self) -> None:
         """The channels at the start in the scratch memory, for the scales of the first state."""
         self.ints[a.PIECE] = 0
+        self.numbers[a.AGE] = 0.0
         self.level(())
-        flow.set_drive(*self.buffers.all, self.rule.drive.time, self.rule.until)
+        flow.load_piece(self.ints, self.buffers.waves)
+        start, until = self.rule.drive.time, min(self.rule.until, self.drives[0].until)
+        flow.set_drive(*self.buffers.all, int(self.ints[a.DRIVE_WAVES]), 0.0, start, until)
