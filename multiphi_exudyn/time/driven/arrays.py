@@ -37,6 +37,7 @@ class DrivenArrays(LevelArrays):
         super()._describe_elements()
         self.ints[a.CHANNELS] = self.rule.excitation.channels
         self.ints[a.FORCED_ROOM] = self._powers
+        self._reserve_terms()
         self._reserve_pieces()
 
     def _supply_channels(self) -> None:
@@ -48,12 +49,25 @@ class DrivenArrays(LevelArrays):
         n, _, exits = self._most
         self._reserve(n, max(self._exponentials(self._plain(level).level.response) for level in self.loaded), exits)
 
+    @property
+    def _terms(self) -> int:
+        """The largest number of coefficients of a channel's piece."""
+        return max(history.coefficients.shape[1] for history in self.rule.excitation.histories)
+
+    def _reserve_terms(self) -> None:
+        """Memory for the channels at an instant, which lasts as long as the run."""
+        q, count = int(self.ints[a.CHANNELS]), self._terms
+        self.ints[a.DRIVE] = self.buffers.take("numbers", 6 * q)
+        for slot in (a.DRIVE_WAVES, a.DRIVE_NEXT):
+            self.ints[slot] = self.buffers.take("waves", q * count * q)
+        self.ints[a.SCALED_TERM] = self.buffers.take("waves", count * q)
+
     def _scratch(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
-        q, degree = int(self.ints[a.CHANNELS]), max(h.coefficients.shape[1] for h in self.rule.excitation.histories)
-        sizes, room = super()._scratch(n, p, signals), max(self._powers, degree)
-        sizes["numbers"] |= {a.DRIVE: 6 * q, a.FLOW_STATE: 4 * n}
-        sizes["waves"] |= {a.DRIVE_WAVES: q * degree * q, a.DRIVE_NEXT: q * degree * q, a.SCALED_TERM: degree * q, a.FORCES: degree * n}
-        sizes["waves"] |= {a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n}
+        q, room = int(self.ints[a.CHANNELS]), max(self._powers, self._terms)
+        sizes = super()._scratch(n, p, signals)
+        sizes["numbers"] |= {a.FLOW_STATE: 4 * n}
+        sizes["waves"] |= {a.FORCES: self._terms * n, a.FORCED: room * n, a.FORCED_WORK: 2 * room}
+        sizes["waves"] |= {a.FLOW_FORCED: q * room * n}
         take = self.buffers.take
         given = {flat_basis.POWERS: take("ints", p), flat_basis.RATES: take("waves", p)}
         given[flat_basis.SCALES], record = take("numbers", 3), take("ints", flat_basis.BASIS)
