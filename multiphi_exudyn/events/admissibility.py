@@ -49,7 +49,7 @@ class ContactFunctions:
         self.model = model
         self.load = load
         self.transitions = 0
-        self.compiled: Any = None  # what the compiled loop keeps for later runs
+        self.arrays: Any = None  # what the loop keeps for later runs (level_arrays.py)
         self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
         self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
         self._armed = (Phase.ARMED,) * len(self._rigid)

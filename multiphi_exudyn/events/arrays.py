@@ -33,12 +33,19 @@ __all__ = ["Buffers"]
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
-PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = 13, 14, 15, 47, 48, 49  # records of pieces, how many, the present one, its record; terms
+PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
+    13,
+    14,
+    15,
+    47,
+    48,
+    49,
+)  # records of pieces, how many, the present one, its record; terms
 NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
 CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
 TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
-CHANGES, CHANGE_IMPULSES, CHANGE_COUNT = 25, 26, 27  # of the decision under way: ints, numbers
-WINDOW, DECISIONS, RING = 28, 29, 30  # chatter: size of the window, decisions so far, where their ring begins
+CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the decision under way: ints, numbers
+WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, where their ring begins
 STOP_AT_EVENT = 31
 SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
 COORDINATE_NUMBERS, COORDINATE_COUNT, COORDINATE_ROOM = 36, 37, 38
@@ -48,8 +55,13 @@ EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM, EVENTS_TAKEN = 42, 43, 44, 4
 # scratch memory: where it begins
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
 FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS = 53, 54, 55, 56
-FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(105, 112)  # response to channels
-DRIVE, DRIVE_WAVES = 59, 60  # w, w', w'' (3, q) and of which terms they are the sums (3, q); terms of the piece, moved on
+FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(
+    105, 112
+)  # response to channels
+DRIVE, DRIVE_WAVES = (
+    59,
+    60,
+)  # w, w', w'' (3, q) and of which terms they are the sums (3, q); terms of the piece, moved on
 SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
 SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
 ACCELERATION = 70
@@ -59,8 +71,8 @@ HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_M
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
 
 # states, as records in the run record
-CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(112, 176, 8)
-RUN_INTS = 176
+CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
+RUN_INTS = 184
 
 # ---------------------------------------------------------------------- run record, numbers
 

@@ -19,13 +19,14 @@ from multiphi_exudyn.events.arrays import (
     ASKING,
     CAUSE,
     CAUSED_BY,
-    CHAINS,
     CHAIN_COUNT,
     CHAIN_MARKS,
-    CHANGES,
+    CHAINS,
     CHANGE_COUNT,
     CHANGE_IMPULSES,
+    CHANGE_ROOM,
     CHANGE_WIDTH,
+    CHANGES,
     CHANNELS,
     CLOSE,
     CLOSED,
@@ -33,13 +34,13 @@ from multiphi_exudyn.events.arrays import (
     DENIED,
     ELEMENT,
     ELEMENTS,
-    ENDS,
     END_COUNT,
+    ENDS,
     ENTERED,
     ENTERED_STATE,
-    EXITS,
     EXIT_COUNT,
     EXIT_INTS,
+    EXITS,
     FAILED,
     FIRST_EXITS,
     FLOW_BASIS,
@@ -62,10 +63,10 @@ from multiphi_exudyn.events.arrays import (
     MATRIX,
     MODES,
     NEED,
+    NEED_ENTERED,
     NEEDED,
     NEEDED_FROM,
     NEEDED_KEY,
-    NEED_ENTERED,
     NOT_ADMISSIBLE,
     OFFSET,
     OK,
@@ -104,25 +105,24 @@ from multiphi_exudyn.events.arrays import (
     UNION,
     VISCOUS,
     WISHES,
-    WORKED,
     WORK_WAVES,
+    WORKED,
 )
-from multiphi_exudyn.events.flow import expand, signal_sizes, signal_waves
 from multiphi_exudyn.events.flat_state import (
-    acceleration_sizes,
     accelerate,
+    acceleration_sizes,
     copy_state,
     find_level,
     find_map,
     kinetic,
     lose,
-    measure,
     move,
     rate_sign,
     row_sign,
     same_level,
     sign_of,
 )
+from multiphi_exudyn.events.flow import expand, signal_sizes, signal_waves
 from multiphi_exudyn.events.impact import (
     RESTING,
     collide,
@@ -296,6 +296,8 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         left = find_refused(ints)
         if left == 0:
             return OK
+        if ints[CHANGE_COUNT] + 3 * c > ints[CHANGE_ROOM]:
+            break
         status = OK
         if left == 1:
             for i in range(c):

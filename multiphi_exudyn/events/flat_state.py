@@ -8,8 +8,6 @@ A sum is judged by the sizes of its own terms (round_off.py), to which belong ho
 
 from __future__ import annotations
 
-import math
-
 from multiphi_exudyn.events.arrays import (
     ACCELERATION,
     CARRIED,
@@ -22,29 +20,29 @@ from multiphi_exudyn.events.arrays import (
     KINDS,
     KINETIC,
     LEVEL,
-    LEVELS,
     LEVEL_SLOTS,
-    MAPS,
+    LEVELS,
     MAP_ENTRY,
     MAP_SLOTS,
+    MAPS,
     MATRIX,
     MODES,
     MOTION,
     NEED,
+    NEED_LEVEL,
+    NEED_MAP,
     NEEDED,
     NEEDED_FROM,
     NEEDED_KEY,
-    NEED_LEVEL,
-    NEED_MAP,
     OFFSET,
     PATTERNS,
     PERIODS,
     PHASES,
     PLACE,
     POTENTIAL,
-    RATED,
     RATE_MATRIX,
     RATE_OFFSET,
+    RATED,
     REACH,
     ROW,
     SETTLED,

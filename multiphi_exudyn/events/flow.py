@@ -35,17 +35,17 @@ from multiphi_exudyn.events.arrays import (
     MODES,
     MOTION,
     PIECE,
-    PIECES,
     PIECE_NOW,
     PIECE_TERMS,
+    PIECES,
     PLACE,
     RATED,
     RESPONSE,
     ROW,
     SCALED_TERM,
     SPEED,
-    TERMS_NOW,
     TERM_INTS,
+    TERMS_NOW,
     WAVE,
     WORK_WAVES,
 )
@@ -87,9 +87,7 @@ def load_piece(ints: Ints, waves: Waves) -> None:
 
 
 @compiled
-def set_drive(
-    ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float
-) -> None:
+def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float) -> None:
     """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
 
     With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the power
@@ -198,9 +196,7 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 
 
 @compiled
-def force_modes(
-    ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int
-) -> None:
+def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int) -> None:
     """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
     r, q, horizon, rate = ints[level + MODES], ints[CHANNELS], numbers[HORIZON], waves[carrier]
     n, scale, scaled = r + q, 1.0, ints[SCALED_TERM]

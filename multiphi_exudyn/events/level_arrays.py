@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.admissibility import ContactFunctions
 from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.flat_rule import ROUNDS
 from multiphi_exudyn.events.flat_state import level_hash, map_hash, measure
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.events.transition import LoadedLevel
@@ -20,24 +22,33 @@ from multiphi_exudyn.mathematics.free_response import ModalResponse
 
 __all__ = ["LevelArrays"]
 
+ROOM = 1024  # segments, and events, that the loop records before they are taken
 SLOTS = 64  # of a table at first: twice as many as it holds, or more
 STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
 
 
 class LevelArrays:
-    """What the loop knows of the levels of ``rule``; ``loaded``: the levels themselves, by their number."""
+    """What the loop knows of the levels of ``rule``; ``loaded``: the levels themselves, by their number.
+
+    owner: the run whose state stands in the arrays.
+    """
 
     def __init__(self, rule: ContactFunctions) -> None:
         self.rule = rule
+        self.owner: Callable[[], Any] | None = None
+        self._count = 0  # of levels packed so far
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, without any level."""
         self.buffers = Buffers()
-        self.loaded: list[LoadedLevel] = []
+        self.loaded: dict[int, LoadedLevel] = {}
         self._offsets: dict[int, int] = {}  # of levels in the ints, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by closed contacts
         self._maps: list[tuple[int, int, int]] = []
         self._most = 0, 0, 0  # coordinates, exponentials and exits for which there is scratch memory
         self._ring: int | None = None
-        self.record_room = 0  # coordinates for which the record has room
-        self.change_room = 3 * (len(rule.model.contacts) + 1) * (len(rule.model.contacts) + 22)
+        self._recorded = 0  # coordinates for which the record has room
         self._describe_elements()
 
     @property
@@ -50,15 +61,10 @@ class LevelArrays:
         """The numbers."""
         return self.buffers.numbers
 
-    @property
-    def most_coordinates(self) -> int:
-        """The largest number of coordinates of a level so far."""
-        return self._most[0]
-
-    def ring(self, window: int) -> int:
-        """Where the ring of decisions of a chatter check begins, of this window."""
+    def ring(self, count: int) -> int:
+        """Where the ring of a chatter check begins, so many numbers."""
         if self._ring is None:
-            self._ring = self.buffers.take("numbers", 2 * (window + 1))
+            self._ring = self.ints[a.RING] = self.buffers.take("numbers", count)
         return self._ring
 
     def set_state(self, level: int, place: np.ndarray, speed: np.ndarray, phases: Sequence[int]) -> None:
@@ -72,6 +78,35 @@ class LevelArrays:
         self.ints[start : start + len(phases)] = phases
         self.ints[state + a.SETTLED] = int(not any(phases))
         measure(self.ints, self.numbers, state)
+
+    @property
+    def outgrown(self) -> bool:
+        """Whether a level has come that is larger than the record has room for."""
+        return self._recorded < self._most[0]
+
+    def begin_record(self) -> None:
+        """An empty record to write to."""
+        n, c = self._most[0], int(self.ints[a.ELEMENTS])
+        events = max(ROOM, self._changes)
+        wanted = {
+            a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * ROOM),
+            a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * ROOM),
+            a.COORDINATE_NUMBERS: ("numbers", 2 * n * ROOM),
+            a.PHASE_INTS: ("ints", c * ROOM),
+            a.EVENT_INTS: ("ints", a.EVENT_WIDTH * events),
+            a.EVENT_NUMBERS: ("numbers", a.EVENT_WIDTH_NUMBERS * events),
+        }
+        for slot, (name, count) in wanted.items() if self.outgrown else ():
+            self.ints[slot] = self.buffers.take(name, count)
+        self._recorded = n
+        self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = ROOM, events
+        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
+            self.ints[slot] = 0
+
+    @property
+    def _changes(self) -> int:
+        """Changes at one instant for which there is room: more are an endless exchange."""
+        return ROUNDS * (3 * len(self.rule.model.contacts) + 1)
 
     def level(self, closed: Sequence[int]) -> int:
         """Where the level with these contacts closed stands in the ints, packed if it was not."""
@@ -134,7 +169,7 @@ class LevelArrays:
     def _reserve_sets(self, c: int, rigid: int) -> None:
         """Scratch memory that depends on the number of elements alone."""
         take, m = self.buffers.take, int(self.ints[a.COORDINATES])
-        struck, changes = max(2 * rigid, 1), self.change_room
+        struck, changes = max(2 * rigid, 1), self._changes
         sizes = {
             "ints": dict.fromkeys((*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY), 2 * c + 1)
             | {a.CHAIN_MARKS: len(self.rule.model.chains), a.LEAST_INTS: least_distance_ints(struck)}
@@ -146,6 +181,7 @@ class LevelArrays:
         for name, slots in sizes.items():
             for slot, count in slots.items():
                 self.ints[slot] = take(name, count)
+        self.ints[a.CHANGE_ROOM] = changes
 
     def _reserve(self, n: int, p: int, exits: int) -> None:
         """Scratch memory for levels of n coordinates, p exponentials and so many exits."""
@@ -202,7 +238,7 @@ class LevelArrays:
         periods = np.divide(1.0, omega, out=np.zeros(r), where=omega > 0)
         exits = self._exits(level, states)
         given = {
-            a.NUMBER: len(self.loaded),
+            a.NUMBER: self._count,
             a.MODES: r,
             a.STATES: put("ints", states),
             a.RESPONSE: self._response(plain),
@@ -221,9 +257,10 @@ class LevelArrays:
         given.setdefault(a.SPEEDS, given[a.GAPS])
         for slot, value in given.items():
             self.ints[record + slot] = value
-        self._levels[own.indices] = len(self.loaded)
-        self._offsets[len(self.loaded)] = record
-        self.loaded.append(level)
+        self._levels[own.indices] = self._count
+        self._offsets[self._count] = record
+        self.loaded[self._count] = level
+        self._count += 1
         self._enter_level(record)
 
     def _parts(self, level: LoadedLevel) -> dict[int, np.ndarray]:
@@ -268,7 +305,12 @@ class LevelArrays:
         records = self.buffers.take("ints", a.EXIT_INTS * len(states))
         for i, state in enumerate(states):
             stays = kinds[i] == a.VISCOUS or (kinds[i] == a.RIGID and state == a.CLOSE)
-            values = [i, a.OPEN if state == a.CLOSE else a.CLOSE, stays, *self._signal(level, self.rule.function(level, i))]
+            values = [
+                i,
+                a.OPEN if state == a.CLOSE else a.CLOSE,
+                stays,
+                *self._signal(level, self.rule.function(level, i)),
+            ]
             self.ints[records + a.EXIT_INTS * i : records + a.EXIT_INTS * (i + 1)] = [*values, -1]
         return records
 
@@ -282,7 +324,7 @@ class LevelArrays:
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """The signal that an exit's element would have in the level entered alone."""
-        level = self.loaded[self.ints[source + a.NUMBER]]
+        level = self.loaded[int(self.ints[source + a.NUMBER])]
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
         row = self.rule.entered_function(level, int(self.ints[record + a.ELEMENT]))
         entered = self.buffers.put("ints", self._signal(level, row))
@@ -292,7 +334,7 @@ class LevelArrays:
 
     def _add_map(self, source: int, target: int) -> None:
         put = self.buffers.put
-        ends = [self.loaded[self.ints[end + a.NUMBER]] for end in (source, target)]
+        ends = [self.loaded[int(self.ints[end + a.NUMBER])] for end in (source, target)]
         move = self.rule.transition(*ends)
         matrix = put("numbers", move.matrix)
         rates = matrix if move.velocity_matrix is move.matrix else put("numbers", move.velocity_matrix)

@@ -163,7 +163,14 @@ def most_lacking(
 
 @compiled
 def enter(
-    ints: Ints, numbers: Numbers, count: int, unknowns: int, pushers: int, entering: int, scratch: int, scratch_ints: int
+    ints: Ints,
+    numbers: Numbers,
+    count: int,
+    unknowns: int,
+    pushers: int,
+    entering: int,
+    scratch: int,
+    scratch_ints: int,
 ) -> int:
     """How many push after one more has come in and those that would have to pull have gone; -1 where it cannot."""
     k2 = count * unknowns
@@ -234,7 +241,14 @@ def factor(
 
 @compiled
 def split(
-    ints: Ints, numbers: Numbers, count: int, unknowns: int, pushers: int, entering: int, scratch: int, scratch_ints: int
+    ints: Ints,
+    numbers: Numbers,
+    count: int,
+    unknowns: int,
+    pushers: int,
+    entering: int,
+    scratch: int,
+    scratch_ints: int,
 ) -> float:
     """|way|^2 of what is left of a row beside those that push, zero where it follows from them; their shares in it."""
     k2 = count * unknowns

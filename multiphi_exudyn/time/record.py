@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar, overload
 
@@ -15,7 +16,6 @@ from multiphi_exudyn.time.segment import Batch, Segment
 
 __all__ = ["PHASES", "Record"]
 
-ROOM = 1024  # segments, and events, that the loop records before they are taken
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK)  # in the order of their numbers
 
 T = TypeVar("T")
@@ -63,6 +63,11 @@ class Segments(Made[Segment]):
         """By level and exponentials, in arrays."""
         return self._record.batches()
 
+    @property
+    def starts(self) -> np.ndarray:
+        """Their starts (n,) [s]."""
+        return self._record.spans[: len(self), 0]
+
 
 class Events(Made[Event]):
     """The events of a record."""
@@ -84,48 +89,31 @@ class Record:
     rows (n, 5): number of the level, piece, events before, where coordinates and phases stand (-1: all armed).
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] the piece lasts. coordinates: xi, xi' of every start.
     phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
-    amounts (m, 7): time [s], five losses [J], impulse [N s]. places: which of them are events.
+    amounts (m, 7): time [s], five losses [J], impulse [N s]. names: of the contacts.
     """
 
-    def __init__(self, arrays: LevelArrays) -> None:
-        self._arrays = arrays
-        self._names = [contact.name for contact in arrays.rule.model.contacts]
+    def __init__(self, names: list[str]) -> None:
+        self._names = names
+        self._levels: dict[int, LoadedLevel] = {}
         self.rows, self.spans = np.empty((0, a.SEGMENT_WIDTH), np.int64), np.empty((0, a.SEGMENT_WIDTH_NUMBERS))
         self.coordinates, self.phases = np.empty(0), np.empty(0, np.int64)
         self.kinds, self.amounts = np.empty((0, a.EVENT_WIDTH), np.int64), np.empty((0, a.EVENT_WIDTH_NUMBERS))
 
-    def begin(self) -> None:
-        """Give the loop an empty record to write to."""
-        arrays, take = self._arrays, self._arrays.buffers.take
-        n, c = arrays.most_coordinates, len(self._names)
-        room = max(ROOM, int(arrays.change_room))
-        wanted = {
-            a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * ROOM),
-            a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * ROOM),
-            a.COORDINATE_NUMBERS: ("numbers", 2 * n * ROOM),
-            a.PHASE_INTS: ("ints", c * ROOM),
-            a.EVENT_INTS: ("ints", a.EVENT_WIDTH * room),
-            a.EVENT_NUMBERS: ("numbers", a.EVENT_WIDTH_NUMBERS * room),
-        }
-        if arrays.record_room < n:
-            for slot, (name, count) in wanted.items():
-                arrays.ints[slot] = take(name, count)
-            arrays.record_room = n
-        arrays.ints[a.SEGMENT_ROOM], arrays.ints[a.EVENT_ROOM] = ROOM, room
-        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
-            arrays.ints[slot] = 0
-
-    def take(self) -> None:
+    def take(self, arrays: LevelArrays) -> None:
         """Take over what the loop has written."""
-        ints, numbers = self._arrays.ints, self._arrays.numbers
+        ints, numbers = arrays.ints, arrays.numbers
         n, m = int(ints[a.SEGMENT_COUNT]), int(ints[a.EVENT_COUNT])
         rows = ints[ints[a.SEGMENT_INTS] :][: n * a.SEGMENT_WIDTH].reshape(n, a.SEGMENT_WIDTH).copy()
+        for number in set(rows[:, 0].tolist()) - set(self._levels):
+            self._levels[number] = arrays.loaded[number]
         rows[:, 2] += len(self.kinds)
         rows[:, 3] += len(self.coordinates)
         rows[rows[:, 4] >= 0, 4] += len(self.phases)
         parts = {
             "rows": rows,
-            "spans": numbers[ints[a.SEGMENT_NUMBERS] :][: n * a.SEGMENT_WIDTH_NUMBERS].reshape(n, a.SEGMENT_WIDTH_NUMBERS),
+            "spans": numbers[ints[a.SEGMENT_NUMBERS] :][: n * a.SEGMENT_WIDTH_NUMBERS].reshape(
+                n, a.SEGMENT_WIDTH_NUMBERS
+            ),
             "coordinates": numbers[ints[a.COORDINATE_NUMBERS] :][: ints[a.COORDINATE_COUNT]],
             "phases": ints[ints[a.PHASE_INTS] :][: ints[a.PHASE_COUNT]],
             "kinds": ints[ints[a.EVENT_INTS] :][: m * a.EVENT_WIDTH].reshape(m, a.EVENT_WIDTH),
@@ -133,9 +121,11 @@ class Record:
         }
         for name, part in parts.items():
             setattr(self, name, np.concatenate([getattr(self, name), part]))
-        self.begin()
+        vars(self).pop("places", None)
+        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
+            ints[slot] = 0
 
-    @property
+    @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
         return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
@@ -148,12 +138,9 @@ class Record:
         kinds = [*((i, a.SHARED) for i in places), (self._names.index(event.contact), int(event.kind == "close"))]
         self.kinds = np.concatenate([self.kinds, kinds])
         self.amounts = np.concatenate([self.amounts, [*shared, (event.time, *own, event.impulse)]])
+        vars(self).pop("places", None)
 
     # ------------------------------------------------------------------ objects
-
-    def segments(self) -> Segments:
-        """All segments so far."""
-        return Segments(self, self.segment)
 
     def events(self) -> Events:
         """All events so far."""
@@ -161,7 +148,7 @@ class Record:
 
     def level(self, i: int) -> LoadedLevel:
         """The level of the i-th segment."""
-        return self._arrays.loaded[self.rows[i, 0]]
+        return self._levels[int(self.rows[i, 0])]
 
     def state(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """xi, xi' (n,) at the start of the i-th segment."""
@@ -193,10 +180,11 @@ class Record:
 
     def batches(self) -> list[Batch]:
         """The segments by level and exponentials."""
-        return [self._batch(number, np.flatnonzero(self.rows[:, 0] == number)) for number in np.unique(self.rows[:, 0])]
+        numbers = self.rows[:, 0]
+        return [self._batch(number, np.flatnonzero(numbers == number)) for number in sorted(set(numbers.tolist()))]
 
     def _batch(self, number: int, places: np.ndarray) -> Batch:
-        level = self._arrays.loaded[number]
+        level = self._levels[number]
         response, n = level.level.response, level.level.modes
         states = self.coordinates[self.rows[places, 3][:, None] + np.arange(2 * n)]
         coefficients = states @ np.hstack([response.from_displacement, response.from_velocity]).T

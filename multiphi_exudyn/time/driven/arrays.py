@@ -27,11 +27,12 @@ class DrivenArrays(LevelArrays):
 
     rule: DrivenRule
 
-    def __init__(self, rule: DrivenRule) -> None:
+    def forget(self) -> None:
+        """Begin anew, without any level, and with the pieces from the first one on."""
         self.drives: list[Drive] = []
         self._records: list[int] = []
         self._powers = POWERS
-        super().__init__(rule)
+        super().forget()
 
     def _describe_elements(self) -> None:
         super()._describe_elements()
@@ -47,7 +48,9 @@ class DrivenArrays(LevelArrays):
         self._powers = self.ints[a.FORCED_ROOM] = 2 * int(self.ints[a.FORCED_WANTED])
         self.ints[a.FORCED_WANTED] = 0
         n, _, exits = self._most
-        self._reserve(n, max(self._exponentials(self._plain(level).level.response) for level in self.loaded), exits)
+        self._reserve(
+            n, max(self._exponentials(self._plain(level).level.response) for level in self.loaded.values()), exits
+        )
 
     @property
     def _terms(self) -> int:
@@ -133,11 +136,13 @@ class DrivenArrays(LevelArrays):
         self.ints[a.PIECES] = put("ints", self._records)
         self.ints[a.PIECE_COUNT] = len(self._records)
 
-    def set_drive(self) -> None:
-        """The channels at the start in the scratch memory, for the scales of the first state."""
-        self.ints[a.PIECE] = 0
-        self.numbers[a.AGE] = 0.0
+    def set_drive(self, piece: int, age: float, time: float) -> None:
+        """The channels a time ``age`` after the beginning of a piece, for the scales of the first state."""
+        while len(self.drives) <= piece:
+            self._reserve_pieces()
+        self.ints[a.PIECE], self.numbers[a.AGE] = piece, age
         self.level(())
         flow.load_piece(self.ints, self.buffers.waves)
-        start, until = self.rule.drive.time, min(self.rule.until, self.drives[0].until)
-        flow.set_drive(*self.buffers.all, int(self.ints[a.DRIVE_WAVES]), 0.0, start, until)
+        until = min(self.rule.until, self.drives[piece].until)
+        flow.set_drive(*self.buffers.all, int(self.ints[a.DRIVE_NEXT]), age, time, until)
+        flow.keep_drive(self.ints, self.buffers.waves)
