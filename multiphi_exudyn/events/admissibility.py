@@ -57,6 +57,9 @@ class ContactFunctions:
         self.mapped = 0  # ways between levels that have been computed
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "arrays": None}
+
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed, under this load."""
         key = tuple(sorted(closed))

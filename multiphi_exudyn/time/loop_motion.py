@@ -15,13 +15,12 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.state import Event, State
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.time.driven.arrays import DrivenArrays
-from multiphi_exudyn.time.driven.flow import Flow
 from multiphi_exudyn.time.driven.level import DrivenLevel
-from multiphi_exudyn.time.driven.segment import DrivenSegment
+from multiphi_exudyn.time.driven.record import DrivenRecord
 from multiphi_exudyn.time.driven.state import DrivenState
 from multiphi_exudyn.time.loop import ACCUMULATED, advance
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.record import PHASES, Record, Segments
+from multiphi_exudyn.time.record import PHASES, Record
 from multiphi_exudyn.time.segment import Segment
 
 __all__ = ["DrivenLoopMotion", "LoopMotion"]
@@ -49,7 +48,7 @@ class LoopMotion(Motion):
     arrays: LevelArrays = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        self.record = Record([contact.name for contact in self.model.contacts])
+        self.record = self._new_record()
         self._kept = _Kept(np.zeros(2 * (self.window + 1)))
         self._unavailable: Exception | None = None
         super().__post_init__()
@@ -166,8 +165,11 @@ class LoopMotion(Motion):
         }
         return NumericalFailure(sentences[cause])
 
+    def _new_record(self) -> Record:
+        return Record([contact.name for contact in self.model.contacts])
+
     def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
-        return Segments(self.record, self.record.segment), self.record.events()
+        return self.record.segments(), self.record.events()
 
     def _keep_event(self, event: Event) -> None:
         self.record.add_event(event)
@@ -208,14 +210,5 @@ class DrivenLoopMotion(LoopMotion):
     def _work_since(self) -> float:
         return self._work
 
-    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
-        return Segments(self.record, self._driven_segment), self.record.events()
-
-    def _driven_segment(self, i: int) -> DrivenSegment:
-        """The i-th segment of the record."""
-        record, level = self.record, self.record.level(i)
-        assert isinstance(level, DrivenLevel)
-        start, end, armed_at, horizon, work, age = record.spans[i].tolist()
-        drive = self.arrays.drives[record.rows[i, 1]].after(age)
-        flow = Flow.of(level, *record.state(i), drive, horizon)
-        return DrivenSegment(start, end, level, flow.coefficients, record.standing(i), armed_at, flow, work)
+    def _new_record(self) -> Record:
+        return DrivenRecord([contact.name for contact in self.model.contacts], self.arrays.drives)

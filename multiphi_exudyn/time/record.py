@@ -55,8 +55,8 @@ class Made(Sequence[T], Generic[T]):
 class Segments(Made[Segment]):
     """The segments of a record."""
 
-    def __init__(self, record: Record, make: Callable[[int], Segment]) -> None:
-        super().__init__(make, len(record.spans), {})
+    def __init__(self, record: Record) -> None:
+        super().__init__(record.segment, len(record.spans), {})
         self._record = record
 
     def batches(self) -> list[Batch]:
@@ -141,6 +141,10 @@ class Record:
         vars(self).pop("places", None)
 
     # ------------------------------------------------------------------ objects
+
+    def segments(self) -> Segments:
+        """All segments so far."""
+        return Segments(self)
 
     def events(self) -> Events:
         """All events so far."""

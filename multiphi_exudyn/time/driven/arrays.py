@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
@@ -27,9 +25,12 @@ class DrivenArrays(LevelArrays):
 
     rule: DrivenRule
 
+    def __init__(self, rule: DrivenRule) -> None:
+        self.drives: list[Drive] = []
+        super().__init__(rule)
+
     def forget(self) -> None:
         """Begin anew, without any level, and with the pieces from the first one on."""
-        self.drives: list[Drive] = []
         self._records: list[int] = []
         self._powers = POWERS
         super().forget()
@@ -123,22 +124,23 @@ class DrivenArrays(LevelArrays):
 
     def _reserve_pieces(self) -> None:
         """Records of the pieces that follow."""
-        put, time = self.buffers.put, self.drives[-1].until if self.drives else self.rule.drive.time
-        for _ in range(PIECES_AT_ONCE):
-            drive = self.rule.excitation.drive(time)
+        put = self.buffers.put
+        for k in range(len(self._records), len(self._records) + PIECES_AT_ONCE):
+            if k == len(self.drives):
+                time = self.drives[-1].until if k else self.rule.drive.time
+                if k and time >= self.rule.until:
+                    break
+                self.drives.append(self.rule.excitation.drive(time))
+            drive = self.drives[k]
             terms = [(len(given), put("waves", [rate, *given.ravel()])) for rate, given in drive.terms]
             times = put("numbers", [drive.time, drive.until])
             self._records.append(put("ints", [times, len(terms), *np.ravel(terms)]))
-            self.drives.append(drive)
-            time = drive.until
-            if not math.isfinite(time) or time >= self.rule.until:
-                break
         self.ints[a.PIECES] = put("ints", self._records)
         self.ints[a.PIECE_COUNT] = len(self._records)
 
     def set_drive(self, piece: int, age: float, time: float) -> None:
         """The channels a time ``age`` after the beginning of a piece, for the scales of the first state."""
-        while len(self.drives) <= piece:
+        while len(self._records) <= piece:
             self._reserve_pieces()
         self.ints[a.PIECE], self.numbers[a.AGE] = piece, age
         self.level(())
