@@ -1,25 +1,28 @@
 """Arrays: what the loop works on, in three flat buffers: ints (int64), numbers (float64), waves (complex128).
 
-Offsets are ints. n = r + q coordinates xi = (eta, w) of a level with r modes and q channels, p exponentials, c elements.
+Offsets are ints. n = r + q coordinates xi = (eta, w) of a level of r modes and q channels, p exponentials, c elements.
 
-record     where                     what stands in it
----------  ------------------------  -----------------------------------------------------------------------------------
-run        ints[0 ...]               sizes, where tables and scratch memory begin, states, counts, what is needed, causes
-           numbers[0 ...]            times, energies lost, chatter, what a failure is told with
-element    ints[ints[KINDS] + i]     COMPLIANT, RIGID or VISCOUS; chain, stiffness and direction in tables of their own
-level      ints[level ...]           its key: a small integer for every element; its sizes; where its parts begin:
-                                     motion (r, 2n + 1)  eta'' = motion . (xi, xi', 1), gaps (c, n + 1), speeds (c, n + 1),
-                                     potential, carried, patterns (energies), its response (flat_response.py), its exits
-exit       ints[exit ...]            element, the state it asks for, whether it may recover, its signal, and the signal
-                                     that the element would have in the level entered alone, -1 while nobody needed it
-signal     ints[signal ...]          s = row . (xi, xi', 1): where the row (2n + 1,) stands, and the rows times V (2, p)
-map        ints[map ...]             xi_m = matrix xi_l + offset, xi'_m = rates xi'_l + rate_offset: channels included
-state      ints[state ...]           level, where xi, xi' and their scales stand, the phase of every exit
-piece      ints[piece ...]           of the channels: w(t) = Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: its terms
-segment    ints, numbers[...]        level, piece, first event, phases; start, end, armed at, horizon, work at its start; xi, xi'
-event      ints, numbers[...]        element, state entered (SHARED: an impulse on one that stays); time, losses, impulse
+record    where                   what stands in it
+--------  ----------------------  -------------------------------------------------------------------------------------
+run       ints[0 ...]             sizes, where tables and scratch memory begin, states, counts, what is needed, causes
+          numbers[0 ...]          times, energies lost, what a failure is told with
+element   ints[ints[KINDS] + i]   COMPLIANT, RIGID or VISCOUS; chain, stiffness, direction (m,) in tables of their own
+level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
+                                  motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
+                                  (c, n + 1); energies as forms in xi, xi'; its response (flat_response.py); its exits
+exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
+                                  that the element would have in the level entered alone, -1 while nobody needed it
+signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
+map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included
+state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
+piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
+segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
+          SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
+event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event)
+          EVENT_NUMBERS           time, five losses, impulse
 
-A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for: ``NEED``.
+A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
+an element is, and what friction will make of one (more states, more exits, channels that maps set), is data alone.
 """
 
 from __future__ import annotations
@@ -61,7 +64,7 @@ FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM
 DRIVE, DRIVE_WAVES = (
     59,
     60,
-)  # w, w', w'' (3, q) and of which terms they are the sums (3, q); terms of the piece, moved on
+)  # w, w', w'' (3, q), of which terms they are the sums (3, q); terms of the piece now
 SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
 SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
 ACCELERATION = 70

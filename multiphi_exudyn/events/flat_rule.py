@@ -1,8 +1,8 @@
-"""Event rule in flat arrays: when an element changes state, and which level follows. Its sentences are those of rule.py.
+"""Event rule in flat arrays: when an element changes state, and which level follows; its sentences are in rule.py.
 
-Sets of elements are flags (c,) in the ints; who asks, the state that each asks for, or NOBODY. The decision of an instant
-works on the state WORKED, which begins as the one REACHED, and leaves that one as it was: where something is missing
-(NEED) it is made again from the start.
+Sets of elements are flags (c,) in the ints; who asks, the state that each asks for, or NOBODY. The decision of an
+instant works on the state WORKED, which begins as the one REACHED, and leaves that one as it was: where something is
+missing (NEED) it is made again from the start.
 """
 
 from __future__ import annotations
@@ -319,9 +319,9 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def find_refused(ints: Ints) -> int:
-    """0: no exit of WORKED is refused; 1: there are elements not heard yet, in PENDING; 2: closed rigid ones, in PULLING.
+    """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: of closed rigid ones, PULLING.
 
-    3: others only. Who has changed has been heard.
+    3: of others only. Who has changed has been heard.
     """
     level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[CHANGE_COUNT]):
@@ -441,8 +441,8 @@ def transfer(ints: Ints, numbers: Numbers, state: int, key: int, result: int) ->
 def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """Rigid contacts strike: velocities, then which of all that touch stay closed, then their level: AFTER.
 
-    STRIKING: who strikes. COMPLIANT_KEY: the level in which all that touch are open. One of FREED stays closed only with
-    a reaction that is more than round-off of zero, and not in the level and at the speed at which it fell to zero.
+    STRIKING: who strikes. COMPLIANT_KEY: the level in which all that touch are open. One of FREED stays closed only
+    with a reaction that is more than round-off of zero, and not in the level and at the speed at which it fell to zero.
     Changes and losses (LOST_NOW) are of the whole impact. OK, NEED or FAILED.
     """
     c, touching, count = ints[ELEMENTS], ints[TOUCHING], 0
@@ -753,7 +753,7 @@ def close_without_impact(ints: Ints, numbers: Numbers, waves: Waves, asking: int
     return OK
 
 
-# ---------------------------------------------------------------------- 3, 4, 7: rigid contacts open, compliant ones change
+# ---------------------------------------------------------------------- 3, 4, 7: rigid ones open, compliant ones change
 
 
 @compiled

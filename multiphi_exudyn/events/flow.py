@@ -3,8 +3,8 @@
     xi(t) = Re V (c phi(t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
 
 xi = (eta, w); phi the p exponentials of the free response, x (n,) its response to the channels' pieces and these
-themselves, T the horizon, a power of two. What is made of a state stands in the scratch memory of the flow: its basis, the
-coefficients c of its exponentials (one for each x), of which terms they are the sums, and the x.
+themselves, T the horizon, a power of two. What is made of a state stands in the scratch memory of the flow: its basis,
+the coefficients c of its exponentials (one for each x), of which terms they are the sums, and the x.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ def load_piece(ints: Ints, waves: Waves) -> None:
 def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float) -> None:
     """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
 
-    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the power
-    of two above what is left: bases are shared among pieces of about the same length.
+    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the
+    power of two above what is left: bases are shared among pieces of about the same length.
     """
     q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
     numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])

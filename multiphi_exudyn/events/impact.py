@@ -1,6 +1,6 @@
 """Impact in flat arrays: rigid contacts strike, or their motion presses them to their stops.
 
-    v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l                          (Moreau, restitution 0)
+    v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l                         (Moreau, restitution 0)
 
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 """

@@ -185,10 +185,10 @@ class LevelArrays:
 
     def _reserve(self, n: int, p: int, exits: int) -> None:
         """Scratch memory for levels of n coordinates, p exponentials and so many exits."""
-        wider = tuple(map(max, (n, p, exits), self._most))
-        if wider == self._most:
+        n, p, exits = map(max, (n, p, exits), self._most)
+        if (n, p, exits) == self._most:
             return
-        self._most = n, p, exits = wider
+        self._most = n, p, exits
         for name, slots in self._scratch(n, p, 2 * exits).items():
             for slot, count in slots.items():
                 self.ints[slot] = self.buffers.take(name, count)

@@ -1,9 +1,9 @@
 """Loop: a run from event to event, in flat arrays (events/arrays.py). There is no time step.
 
 Within a level the motion is a sum of exponentials; the next event is the certified first descent of a few of them
-(zero_crossing.py); the event rule (flat_rule.py) gives the state that follows. Nothing of a segment is kept before it is
-complete: where something is missing (NEED), or the record is full (FULL), the loop is called again, and the segment is
-made again from its start.
+(zero_crossing.py); the event rule (flat_rule.py) gives the state that follows. Nothing of a segment is kept before it
+is complete: where something is missing (NEED), or the record is full (FULL), the loop is called again, and the segment
+is made again from its start.
 """
 
 from __future__ import annotations

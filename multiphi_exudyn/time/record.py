@@ -87,7 +87,8 @@ class Record:
     """Segments and events of a run, in arrays that grow.
 
     rows (n, 5): number of the level, piece, events before, where coordinates and phases stand (-1: all armed).
-    spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] the piece lasts. coordinates: xi, xi' of every start.
+    spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
+    coordinates: xi, xi' of every start.
     phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
     amounts (m, 7): time [s], five losses [J], impulse [N s]. names: of the contacts.
     """

@@ -20,12 +20,11 @@ BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, an
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": ("multiphi_exudyn/study",),
-    "numba": ("multiphi_exudyn/time/compiled", "multiphi_exudyn/mathematics/compilation.py"),
+    "numba": ("multiphi_exudyn/mathematics/compilation.py",),
     "llvmlite": ("multiphi_exudyn/mathematics/compilation.py", "multiphi_exudyn/mathematics/machine_code.py"),
     "distributed": ("multiphi_exudyn/study/sweep",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
-    "multiphi_exudyn.time.compiled",
     "multiphi_exudyn.mathematics.compilation",
     "multiphi_exudyn.mathematics.machine_code",
 )

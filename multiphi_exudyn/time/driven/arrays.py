@@ -89,7 +89,7 @@ class DrivenArrays(LevelArrays):
         return {
             a.MOTION: np.column_stack(motion),
             a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
-            a.SPEEDS: np.column_stack([own.speeds, np.zeros(len(own.speeds))]),
+            a.SPEEDS: np.column_stack([own.speed_rows, np.zeros(len(own.gap_rows))]),
             a.POTENTIAL: self._potential(level, r),
             a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
             **({a.CARRIED: carried} if np.any(level.carried) else {}),
