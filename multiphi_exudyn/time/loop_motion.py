@@ -181,13 +181,16 @@ class DrivenLoopMotion(LoopMotion):
 
     arrays: DrivenArrays = field(kw_only=True)
 
+    def __post_init__(self) -> None:
+        self._piece, self._age, self._work = 0, 0.0, 0.0
+        super().__post_init__()
+
     def _begin(self) -> None:
         super()._begin()
         patterns = self.arrays.rule.excitation.patterns
         w = self.state.displacement[len(self.state.displacement) - patterns.shape[1] :]
         moved = self.state.level.configuration(self.state.displacement) - self.start.displacement
         self._work = float((patterns @ w) @ moved)
-        self._piece, self._age = 0, 0.0
 
     def _enter(self) -> None:
         self.arrays.set_drive(self._piece, self._age, self.time)
