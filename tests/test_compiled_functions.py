@@ -61,6 +61,11 @@ def ratio(numbers: Numbers) -> float:
 
 
 @compiled
+def power_of_two_above(value: float) -> float:
+    return math.ldexp(1.0, math.frexp(value)[1])
+
+
+@compiled
 def complex_ratio(waves: Waves) -> None:
     waves[0] = waves[1] / waves[2]
 
@@ -68,6 +73,12 @@ def complex_ratio(waves: Waves) -> None:
 @compiled
 def of_arrays(numbers: Numbers) -> float:
     return numbers[0] * NOTHING[0]
+
+
+@compiled
+def of_a_list(numbers: Numbers, n: int) -> float:
+    found = [numbers[k] for k in range(n)]
+    return found[0]
 
 
 @compiled
@@ -156,6 +167,11 @@ def test_a_compiled_function_returns_an_integer_or_nothing():
     assert Entry(turn)(*buffers()[1:], 2) is None
 
 
+def test_a_number_is_taken_apart_and_put_together_as_in_python():
+    for value in (0.75, -3.0, 1e-310, 1e300):
+        assert Entry(power_of_two_above)(value) == power_of_two_above(value)
+
+
 def test_a_division_by_zero_is_infinite_and_no_error():
     assert Entry(ratio)(np.array([1.0, 0.0])) == math.inf
 
@@ -196,6 +212,7 @@ def test_an_entry_refuses_what_is_no_buffer_of_its_kind(argument, got):
     [
         (complex_ratio, "got an operation that raises"),
         (of_arrays, "got NOTHING of type ndarray"),
+        (of_a_list, "arrays, lists"),
         (endless, "got a recursion"),
         (without_kind, "annotations: got without_kind"),
         (of_a_wave, "annotations: got of_a_wave"),
@@ -209,7 +226,7 @@ def test_what_cannot_be_compiled_is_refused_with_its_reason(function, message):
 def test_what_is_compiled_is_loaded_from_the_disk_by_the_next_process(made, capsys):
     assert program()(ONES) == 6.0
     assert made == ["scaled", "inner", "outer"]
-    assert capsys.readouterr().err == "compiling the loop: about 1 s, once on this machine\n"
+    assert capsys.readouterr().err == "compiling the loop: about 2 s, once on this machine\n"
     assert program()(ONES) == 6.0
     assert len(made) == 3
     assert capsys.readouterr().err == ""
@@ -260,6 +277,32 @@ def test_a_damaged_file_is_compiled_again(made, damage):
     assert len(made) == 6
     assert program()(ONES) == 6.0
     assert len(made) == 6
+
+
+@pytest.fixture
+def two_processes(monkeypatch):
+    """Work that is shared between two processes, however little it is."""
+    monkeypatch.setattr(compilation, "WORTH_A_PROCESS", 0.01)
+    monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
+
+
+def test_a_few_lines_are_compiled_by_one_process(monkeypatch):
+    monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
+    assert len(compilation.shares([square, turn, total])) == 1
+
+
+@pytest.mark.usefixtures("two_processes")
+def test_processes_share_out_functions_by_their_work():
+    assert compilation.shares([square, turn, total]) == [[total], [turn, square]]
+    assert compilation.compile_elsewhere([turn, square]).keys() == {turn, square}
+    assert Entry(total)(*buffers(), 4, 1.5) == pytest.approx(total(*buffers(), 4, 1.5), rel=1e-15)
+
+
+@pytest.mark.usefixtures("two_processes")
+def test_what_another_process_cannot_import_is_compiled_here():
+    run = program()
+    assert compilation.compile_elsewhere([run.function]) == {}
+    assert run(ONES) == 6.0
 
 
 def test_without_a_folder_that_can_be_written_every_process_compiles_and_says_so(made, monkeypatch, tmp_path, capsys):
@@ -334,7 +377,7 @@ def test_two_processes_compile_at_once_and_a_third_needs_no_numba(tmp_path):
     for process in [started(tmp_path), started(tmp_path)]:
         out, err = process.communicate(timeout=120)
         assert out == "6.0 True\n"
-        assert err == "compiling the loop: about 1 s, once on this machine\n"
+        assert err == "compiling the loop: about 2 s, once on this machine\n"
     assert started(tmp_path).communicate(timeout=120) == ("6.0 False\n", "")
 
 

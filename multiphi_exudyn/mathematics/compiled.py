@@ -37,7 +37,6 @@ __all__ = ["Entry", "Ints", "Numbers", "Waves", "available", "compile_entries", 
 
 TYPES: dict[Any, np.dtype] = {Ints: np.dtype(np.int64), Numbers: np.dtype(float), Waves: np.dtype(complex)}
 SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
-START, EACH_LINE = 1.0, 0.01  # s, of a compilation on a busy machine, to tell how long one has to wait
 
 _one_at_a_time = threading.RLock()  # neither numba nor LLVM is meant for two threads
 _entries: list[Entry] = []
@@ -117,11 +116,10 @@ def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
 
 def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
     """The object files of functions, announced by a line on stderr."""
-    from multiphi_exudyn.mathematics.compilation import compile_functions
+    from multiphi_exudyn.mathematics.compilation import compile_functions, expected_seconds
 
-    lines = sum(len({line for *_, line in function.__code__.co_lines()}) for function in functions)
     often = "once on this machine" if writable_folder() else "in every process: no folder to keep it in is writable"
-    print(f"compiling the loop: about {START + EACH_LINE * lines:.0f} s, {often}", file=sys.stderr)
+    print(f"compiling the loop: about {expected_seconds(functions):.0f} s, {often}", file=sys.stderr)
     return compile_functions(functions)
 
 

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Ints", "Numbers", "Signature", "Waves", "callees", "check", "compiled", "digest", "reached", "signature"]
-__all__ += ["symbol"]
+__all__ = ["Ints", "Numbers", "Signature", "Waves", "callees", "check", "compiled", "digest", "lines", "reached"]
+__all__ += ["signature", "symbol"]
 
 Ints = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -114,6 +114,11 @@ def check(function: FunctionType) -> None:
                 f"{function.__qualname__}: got {name} of type {type(value).__name__}, need numbers and compiled "
                 "functions of its module, math and cmath"
             )
+
+
+def lines(function: FunctionType) -> int:
+    """How many lines of a function are code."""
+    return len({line for *_, line in function.__code__.co_lines()})
 
 
 def symbol(function: FunctionType) -> str:

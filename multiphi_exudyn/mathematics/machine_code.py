@@ -13,7 +13,8 @@ from multiphi_exudyn.errors import MultiPhiTypeError
 __all__ = ["load", "object_code", "this_cpu"]
 
 RAISES = re.compile(r"@\.const\.picklebuf|@numba_unpickle")  # what numba keeps of an exception to raise
-IN_NUMBA = re.compile(r"^declare [^\n]*@(numba_\w+)", re.MULTILINE)  # what numba's own library has
+IN_NUMBA = re.compile(r"^declare [^\n]*@(?:numba|NRT)_\w+", re.MULTILINE)  # what numba's own library has
+OF_C = re.compile(r"@numba_(ldexp|frexp)\b")  # what numba's own library has of C's, under a name of its own
 ERROR_FUNCTION = re.compile(r"^declare (?P<rest>[^\n]*@(?:numba_gil_|Py)\w+\([^\n]*)$", re.MULTILINE)
 
 
@@ -42,11 +43,11 @@ def object_code(text: str, wrapper: str, symbol: str, cpu: str, features: str) -
     That function would print an error; as nothing here can raise, what it would print with is left out, and the code
     needs nothing but the C library and the functions it calls.
     """
-    text = ERROR_FUNCTION.sub(r"define internal \g<rest> { unreachable }", text)
+    text = OF_C.sub(r"@\1", ERROR_FUNCTION.sub(r"define internal \g<rest> { unreachable }", text))
     if RAISES.search(text) or IN_NUMBA.search(text):
         raise MultiPhiTypeError(
-            f"{symbol}: got an operation that raises an error or is numba's own, need none (complex / complex, complex "
-            "powers, int ** int, a range with a variable step, ldexp and gamma are)"
+            f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided or "
+            "to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
         )
     module = llvm.parse_assembly(text)
     for function in module.functions:

@@ -282,7 +282,7 @@ class TestWithoutNumba:
         assert len(run.events) == 2
 
     def test_the_compiled_one_is_refused(self):
-        with pytest.raises(MultiPhiError, match="need it: pip install multiphi-exudyn\\[fast\\]"):
+        with pytest.raises(MultiPhiError, match="need it: pip install numba"):
             mp.simulate(oscillator(), 1.0, compiled=True)
 
 
