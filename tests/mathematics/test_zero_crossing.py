@@ -158,6 +158,8 @@ def test_no_signals_never_fall():
 def test_motion_that_is_not_finite_is_told():
     assert first([1e4 + 1j], [1.0], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE  # it overflows before it falls
     assert first([1j], [np.inf], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE
+    assert first([1j], [np.nan], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE
+    assert first([1j], [1.0], np.nan, 10.0)[0] == zero_crossing.NOT_FINITE
 
 
 def test_a_search_that_would_take_for_ever_is_refused_as_by_the_descent_finder():
