@@ -116,7 +116,8 @@ def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, r
         fourth = numbers[bounds + DERIVATIVES * s + 4]
         if fourth > 0.0:
             wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + DERIVATIVES * s]) / HERMITE
-            step = min(step, math.sqrt(math.sqrt(wanted / fourth)))
+            distance = math.sqrt(math.sqrt(wanted / fourth))
+            step = min(step, distance) if distance > 0.0 else step  # what has decayed below all numbers limits nothing
     return min(longest, power_of_two_above(step) / 2) if step < math.inf else longest
 
 
