@@ -46,8 +46,8 @@ def object_code(text: str, wrapper: str, symbol: str, cpu: str, features: str) -
     text = OF_C.sub(r"@\1", ERROR_FUNCTION.sub(r"define internal \g<rest> { unreachable }", text))
     if RAISES.search(text) or IN_NUMBA.search(text):
         raise MultiPhiTypeError(
-            f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided or "
-            "to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
+            f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided "
+            "or to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
         )
     module = llvm.parse_assembly(text)
     for function in module.functions:
