@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+import sys
 from collections.abc import Iterable
 
 import llvmlite.binding as llvm
@@ -20,6 +21,8 @@ ERROR_FUNCTION = re.compile(r"^declare (?P<rest>[^\n]*@(?:numba_gil_|Py)\w+\([^\
 
 @functools.cache
 def _target() -> llvm.Target:
+    if sys.platform == "win32":
+        import numba  # noqa: F401  tells LLVM of what C's library lacks there
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_triple(llvm.get_process_triple())
