@@ -1,17 +1,18 @@
 """Functions on flat buffers compiled by numba, each by itself.
 
 numba links and optimises a function again in every one that calls it: 60 functions of 20 lines that call one another
-take minutes. Each by itself, calling the others by their symbols, they take 10 to 20 ms a line, nearly all of it
-numba's reading of Python; and as none needs another one to be compiled before, processes can share them out.
+take minutes. Each by itself, calling the others by their symbols, they take 0.3 s each, nearly all of it numba's
+reading of Python; and as none needs another one to be compiled before, processes can share them out.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import FunctionType, NoneType
 from typing import Any
@@ -45,8 +46,8 @@ KINDS = {
     NoneType: numba.types.void,
 }
 NEVER_CALLED = 1  # numba wants an address for a function that it will not run
-START, EACH_LINE = 1.0, 0.018  # s, on one core of 2020
-WORTH_A_PROCESS = 200  # lines: 4 s, while a process takes 1 to 2 s to start
+START, EACH_FUNCTION, EACH_LINE = 1.5, 0.05, 0.011  # s, on one core of 2020
+WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
 MOST_PROCESSES = 4  # of some 250 MB each
 ANSWER = "from multiphi_exudyn.mathematics.compilation import answer; answer()"
 
@@ -56,10 +57,7 @@ def compile_functions(functions: Sequence[FunctionType]) -> list[bytes]:
     own, *others = shares(functions)
     with ThreadPoolExecutor() as pool, tqdm(total=len(functions), disable=None, leave=False, unit="function") as bar:
         answers = [pool.submit(compile_elsewhere, share) for share in others]
-        codes = {}
-        for function in own:
-            codes[function] = _compile(function)
-            bar.update()
+        codes = _compile_all(own, bar.update)
         for each in answers:
             codes |= each.result()
             bar.update(len(each.result()))
@@ -68,7 +66,11 @@ def compile_functions(functions: Sequence[FunctionType]) -> list[bytes]:
 
 def expected_seconds(functions: Sequence[FunctionType]) -> float:
     """About how long it will take to compile functions."""
-    return START + EACH_LINE * max(sum(map(lines, share)) for share in shares(functions))
+    return START + max(sum(map(_seconds, share)) for share in shares(functions))
+
+
+def _seconds(function: FunctionType) -> float:
+    return EACH_FUNCTION + EACH_LINE * lines(function)
 
 
 def _most_processes() -> int:
@@ -78,11 +80,11 @@ def _most_processes() -> int:
 
 
 def shares(functions: Sequence[FunctionType]) -> list[list[FunctionType]]:
-    """Functions in shares of about as many lines, as many shares as are worth a process."""
-    count = max(1, min(_most_processes(), sum(map(lines, functions)) // WORTH_A_PROCESS))
+    """Functions in shares of about as much work, as many shares as are worth a process."""
+    count = max(1, min(_most_processes(), int(sum(map(_seconds, functions)) / WORTH_A_PROCESS)))
     found: list[list[FunctionType]] = [[] for _ in range(count)]
-    for function in sorted(functions, key=lines, reverse=True):
-        min(found, key=lambda share: sum(map(lines, share))).append(function)
+    for function in sorted(functions, key=_seconds, reverse=True):
+        min(found, key=lambda share: sum(map(_seconds, share))).append(function)
     return found
 
 
@@ -105,8 +107,22 @@ def compile_elsewhere(functions: Sequence[FunctionType]) -> dict[FunctionType, b
 
 def answer() -> None:
     """What another process does: read functions, give {digest: object file}."""
-    functions = pickle.load(sys.stdin.buffer)
-    pickle.dump({digest(function): _compile(function) for function in functions}, sys.stdout.buffer)
+    codes = _compile_all(pickle.load(sys.stdin.buffer), lambda: None)
+    pickle.dump({digest(function): code for function, code in codes.items()}, sys.stdout.buffer)
+
+
+def _compile_all(functions: Sequence[FunctionType], tell: Callable[[], Any]) -> dict[FunctionType, bytes]:
+    """The object files of functions; Python looks for no garbage meanwhile, a tenth of the time."""
+    codes, collects = {}, gc.isenabled()
+    gc.disable()
+    try:
+        for function in functions:
+            codes[function] = _compile(function)
+            tell()
+    finally:
+        if collects:
+            gc.enable()
+    return codes
 
 
 def _compile(function: FunctionType) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+import sys
 from collections.abc import Iterable
 
 import llvmlite.binding as llvm
@@ -20,6 +21,8 @@ ERROR_FUNCTION = re.compile(r"^declare (?P<rest>[^\n]*@(?:numba_gil_|Py)\w+\([^\
 
 @functools.cache
 def _target() -> llvm.Target:
+    if sys.platform == "win32":
+        import numba  # noqa: F401  tells LLVM of what C's library lacks there
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_triple(llvm.get_process_triple())
@@ -46,8 +49,8 @@ def object_code(text: str, wrapper: str, symbol: str, cpu: str, features: str) -
     text = OF_C.sub(r"@\1", ERROR_FUNCTION.sub(r"define internal \g<rest> { unreachable }", text))
     if RAISES.search(text) or IN_NUMBA.search(text):
         raise MultiPhiTypeError(
-            f"{symbol}: got an operation that raises an error or is numba's own, need none (complex / complex, complex "
-            "powers, int ** int, a range with a variable step, arrays, lists and gamma are)"
+            f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided "
+            "or to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
         )
     module = llvm.parse_assembly(text)
     for function in module.functions:

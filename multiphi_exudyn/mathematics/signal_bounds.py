@@ -95,11 +95,11 @@ def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
 
 
 @compiled
-def all_finite(numbers: Numbers, bounds: int, count: int) -> int:
+def all_finite(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
     """1 where the signals and their highest derivatives are bounded by finite numbers."""
     for s in range(count):
         first = bounds + DERIVATIVES * s
-        if not numbers[first] + numbers[first + DERIVATIVES - 1] < math.inf:
+        if not abs(numbers[constants + s]) + numbers[first] + numbers[first + DERIVATIVES - 1] < math.inf:
             return 0
     return 1
 
@@ -116,19 +116,15 @@ def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, r
         fourth = numbers[bounds + DERIVATIVES * s + 4]
         if fourth > 0.0:
             wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + DERIVATIVES * s]) / HERMITE
-            step = min(step, math.sqrt(math.sqrt(wanted / fourth)))
+            distance = math.sqrt(math.sqrt(wanted / fourth))
+            step = min(step, distance) if distance > 0.0 else step  # what has decayed below all numbers limits nothing
     return min(longest, power_of_two_above(step) / 2) if step < math.inf else longest
 
 
 @compiled
 def power_of_two_above(value: float) -> float:
-    """The smallest power of two that is greater than a positive ``value``."""
-    power = 2.0 ** float(math.floor(math.log2(value)))
-    while power > value:  # a logarithm is rounded
-        power /= 2
-    while power <= value:
-        power *= 2
-    return power
+    """The smallest power of two that is greater than ``value``."""
+    return math.ldexp(1.0, math.frexp(value)[1])
 
 
 @compiled

@@ -152,43 +152,34 @@ def decide(
     """
     width, noise = right - left, numbers[suspect + NOISE]
     at_left, at_right = numbers[suspect + LEFT], numbers[suspect + RIGHT]
-    low = lowest(numbers, suspect, 0, width)
-    if low > 0.0 or max(-low, highest(numbers, suspect, 0, width)) <= noise or rises(numbers, suspect, width) == 1:
+    low, minus_high = lowest(numbers, suspect, 0, 1.0, width), lowest(numbers, suspect, 0, -1.0, width)
+    if low > 0.0 or min(low, minus_high) >= -noise or rises(numbers, suspect, width) == 1:
         return NO_DESCENT
     if at_left < -noise:
         numbers[suspect + ROOT] = left
         return DESCENT
-    if lowest(numbers, suspect, 1, width) > 0.0:
+    if lowest(numbers, suspect, 1, 1.0, width) > 0.0:
         return NO_DESCENT
-    falls = highest(numbers, suspect, 1, width) < 0.0 or width < narrowest or highest(numbers, suspect, 2, width) < 0.0
+    falls = lowest(numbers, suspect, 1, -1.0, width) > 0.0 or width < narrowest
+    falls = falls or lowest(numbers, suspect, 2, -1.0, width) > 0.0
     if falls and at_right < -noise:
         find_root(ints, numbers, waves, basis, 0, left, right, suspect, suspect + RIGHT, rows)
         return DESCENT
     if falls:
         return NO_DESCENT
-    if lowest(numbers, suspect, 2, width) > 0.0:
+    if lowest(numbers, suspect, 2, 1.0, width) > 0.0:
         return decide_convex(ints, numbers, waves, basis, left, right, suspect, rows)
     return UNDECIDED
 
 
 @compiled
-def lowest(numbers: Numbers, suspect: int, order: int, width: float) -> float:
-    """What a derivative of the suspect is certainly above: its Bernstein coefficients less their remainder."""
-    left, right = suspect + LEFT + order, suspect + RIGHT + order
-    inner_left = numbers[left] + width * numbers[left + 1] / 3
-    inner_right = numbers[right] - width * numbers[right + 1] / 3
+def lowest(numbers: Numbers, suspect: int, order: int, sign: float, width: float) -> float:
+    """What sign times a derivative of the suspect is certainly above: its Bernstein coefficients less the remainder."""
+    left, right = sign * numbers[suspect + LEFT + order], sign * numbers[suspect + RIGHT + order]
+    inner_left = left + sign * width * numbers[suspect + LEFT + order + 1] / 3
+    inner_right = right - sign * width * numbers[suspect + RIGHT + order + 1] / 3
     remainder = HERMITE * width * width * width * width * numbers[suspect + BOUNDS + order + 4]
-    return min(numbers[left], numbers[right], inner_left, inner_right) - remainder
-
-
-@compiled
-def highest(numbers: Numbers, suspect: int, order: int, width: float) -> float:
-    """What a derivative of the suspect is certainly below; see ``lowest``."""
-    left, right = suspect + LEFT + order, suspect + RIGHT + order
-    inner_left = numbers[left] + width * numbers[left + 1] / 3
-    inner_right = numbers[right] - width * numbers[right + 1] / 3
-    remainder = HERMITE * width * width * width * width * numbers[suspect + BOUNDS + order + 4]
-    return max(numbers[left], numbers[right], inner_left, inner_right) + remainder
+    return min(left, right, inner_left, inner_right) - remainder
 
 
 @compiled

@@ -119,7 +119,7 @@ def first_descent(
         bound(ints, numbers, waves, basis, signals, count, begin, latest, bounds)
         if ints[basis + ETERNAL] == 1 and all_above(numbers, constants, bounds, count) == 1:
             break
-        if all_finite(numbers, bounds, count) == 0:
+        if all_finite(numbers, constants, bounds, count) == 0:
             return NOT_FINITE
         if begin == 0.0 and count > 1 and ints[basis + PURE] == 1:
             found = near_descent(

@@ -150,6 +150,11 @@ def test_a_touch_from_above_is_no_descent(clearance):
     assert first([1j], [1.0], 1 + clearance, 100.0)[0] == zero_crossing.NONE
 
 
+@pytest.mark.parametrize("horizon", [0.5, 0.8, 5.0])
+def test_what_decays_below_the_smallest_number_never_falls(horizon):
+    assert first([-1000.0], [1.0], 0.0, horizon)[0] == zero_crossing.NONE
+
+
 def test_no_signals_never_fall():
     none = Signals(np.zeros((0, 1), complex), np.zeros(0))
     assert Search(Exponentials(np.array([1j]), np.zeros(1, int)), none).first(1.0)[0] == zero_crossing.NONE
@@ -158,6 +163,8 @@ def test_no_signals_never_fall():
 def test_motion_that_is_not_finite_is_told():
     assert first([1e4 + 1j], [1.0], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE  # it overflows before it falls
     assert first([1j], [np.inf], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE
+    assert first([1j], [np.nan], 1.0, 10.0)[0] == zero_crossing.NOT_FINITE
+    assert first([1j], [1.0], np.nan, 10.0)[0] == zero_crossing.NOT_FINITE
 
 
 def test_a_search_that_would_take_for_ever_is_refused_as_by_the_descent_finder():
