@@ -118,7 +118,8 @@ def missed(run, segments, samples, metre=1.0):
     for segment, contact, heard, signal in looked_at:
         size = largest[contact, contact in segment.level.level.indices]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
-        if lowest < -(MISSED if heard else LAW) * size:
+        unresolved = np.finfo(float).eps * segment.end * signal.steepness(at)
+        if lowest < -(MISSED if heard else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
     return None
@@ -181,6 +182,10 @@ class Signal:
 
     def __call__(self, t):
         return (self.basis.at(t) @ self.coefficients).real + self.constant
+
+    def steepness(self, t):
+        """|s'| at t: with the resolution of time it is what s may be at its root."""
+        return float(np.abs((self.basis.at(t) @ self.basis.derivative(self.coefficients)).real))
 
     def exactly(self, t):
         """The same in extended precision."""

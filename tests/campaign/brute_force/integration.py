@@ -111,6 +111,8 @@ class _Integration:
             low = (s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:]) & (s[1:-1] < 2 * bends)
             curved[:-1] |= low
             curved[1:] |= low
+        rate = (states @ level.matrix.T + inputs @ level.inputs.T) @ level.signals.T
+        curved |= (rate[:-1] < 0) & (rate[1:] > 0)  # it turns inside the step
         curved[0] |= s[0] < 4 * np.abs(s[1] - s[0]) + 2 * np.abs(bends[0])
         curved[-1] |= s[-1] < 4 * np.abs(s[-1] - s[-2]) + 2 * np.abs(bends[-1])
         for j in np.flatnonzero(np.any(below | curved, axis=1)):
@@ -134,6 +136,10 @@ class _Integration:
         at_zero = j == 0 and abs(s(0.0)) <= 5 * allowed  # where an instant has left it: a moment later it has a sign
         first = min(moment, width) if at_zero else 0.0
         places = first + (width - first) * (np.linspace(0, 1, FINE) ** 2)
+        values = s(places)
+        lowest = int(np.argmin(values))
+        around = np.linspace(places[max(lowest - 1, 0)], places[min(lowest + 1, FINE - 1)], FINE)
+        places = np.union1d(places, around)
         values = s(places)
         below = np.flatnonzero(values < -allowed)
         if not len(below):
