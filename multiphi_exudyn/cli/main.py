@@ -1,8 +1,10 @@
-"""Command line: ``multiphi-exudyn compare | animate | budget | needs | study | stability | scenes | studies``.
+"""Command line.
+
+    multiphi-exudyn compare | animate | budget | needs | study | stability | compile | scenes | studies
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
-Of stability: 0 if no case is wrong.
+Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from typing import NoReturn
 from multiphi_exudyn.cli.animate_command import run_animate
 from multiphi_exudyn.cli.budget_command import run_budget
 from multiphi_exudyn.cli.compare_command import run_compare
+from multiphi_exudyn.cli.compile_command import run_compile
 from multiphi_exudyn.cli.needs_command import run_needs
 from multiphi_exudyn.cli.stability_command import run_stability
 from multiphi_exudyn.cli.study_command import run_study_file
@@ -69,6 +72,8 @@ def _run(given: argparse.Namespace) -> bool:
         return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
     if given.command == "stability":
         return run_stability(given.case, given.quick, given.out)
+    if given.command == "compile":
+        return run_compile()
     return _listed(shipped_scenes() if given.command == "scenes" else shipped_studies())
 
 
@@ -83,7 +88,7 @@ class _OneLineParser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,scenes,studies}"
+        dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,compile,scenes,studies}"
     )
     compare = commands.add_parser("compare", help="run all models of a scene and write a report")
     _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
@@ -94,6 +99,9 @@ def _parser() -> argparse.ArgumentParser:
     needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")
     _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
     _stability_options(commands.add_parser("stability", help="run every model through a catalogue of extreme cases"))
+    commands.add_parser(
+        "compile", help="compile the loop ahead: a container, the workers of a cluster (NUMBA_CPU_NAME)"
+    )
     commands.add_parser("scenes", help="list the shipped scenes")
     commands.add_parser("studies", help="list the shipped studies")
     return parser

@@ -49,13 +49,16 @@ class ContactFunctions:
         self.model = model
         self.load = load
         self.transitions = 0
-        self.compiled: Any = None  # what the compiled loop keeps for later runs
+        self.arrays: Any = None  # what the loop keeps for later runs (level_arrays.py)
         self._rigid: list[bool] = np.isinf(model.base.stiffnesses).tolist()
         self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
         self._armed = (Phase.ARMED,) * len(self._rigid)
         self._all = tuple(range(len(self._rigid)))
         self.mapped = 0  # ways between levels that have been computed
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "arrays": None}
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed, under this load."""

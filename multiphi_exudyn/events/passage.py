@@ -107,14 +107,14 @@ class Passage(ContactFunctions):
         try:
             return self._nearest_of(level, rows, vector, sizes)
         except Infeasible as found:
-            raise self._squeezed([touching[k] for k in found.rows]) from found
+            raise self.squeezed([touching[k] for k in found.rows]) from found
 
     def _nearest_of(
         self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray, sizes: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         return nearest_admissible(rows, vector, self._free(level), sizes)
 
-    def _squeezed(self, contacts: Sequence[int]) -> NumericalFailure:
+    def squeezed(self, contacts: Sequence[int]) -> NumericalFailure:
         """The failure of a run in which stops that move leave no way out between these contacts."""
         names = ", ".join(self.model.contacts[i].name for i in sorted(contacts))
         complete = self.model.level_at(()).modes == self.model.base.modes.count

@@ -73,7 +73,7 @@ class EventRule(Passage):
             try:
                 moved, impulses = nearest_admissible(rows, np.append(velocity, 1.0), len(velocity))
             except Infeasible as found:
-                raise self._squeezed([touching[k] for k in found.rows]) from found
+                raise self.squeezed([touching[k] for k in found.rows]) from found
             admissible, stop_work = moved[:-1], float(impulses @ self.stop_speeds[list(touching)])
             open_state = self._entered(level, displacement, velocity)
             level = self._impact(open_state, set(touching), set(penetrating))[0].level

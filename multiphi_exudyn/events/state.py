@@ -174,7 +174,7 @@ class Event:
 def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndarray:
     """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4).
 
-    Some events are kept in arrays (compiled/record.py).
+    Some events are kept in arrays (time/record.py).
     """
     kept = getattr(events, "table", None)
     if kept is not None:

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,12 +21,11 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.segment import Segment
 from multiphi_exudyn.time.trajectory import Start, Statistics, Trajectory
 
-__all__ = ["CompiledMotion", "Motion"]
+__all__ = ["Motion"]
 
 EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
 CHATTER_WINDOW = 200  # events, for every contact
 ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
-COMPILED_PERIODS = 1e9  # of the highest mode to the end: more takes for ever, and only the NumPy loop says so
 
 
 @dataclass
@@ -207,42 +205,3 @@ class Motion:
                 f"chatter: {window} events in {elapsed:g} s, more than {allowed} in a period of the highest "
                 f"kept mode ({highest:g} Hz) or all within {ACCUMULATED:g} of the time so far"
             )
-
-
-@dataclass
-class CompiledMotion(Motion):
-    """A run that the compiled loop carries; the NumPy loop takes the segments which that one leaves."""
-
-    loop: Any = None
-    record: Any = None
-
-    def __post_init__(self) -> None:
-        self.record = self.loop.record()
-        super().__post_init__()
-
-    def go_on_from(self, state: State, time: float) -> None:
-        """Forget what has been collected, and go on from a state and a time [s]."""
-        super().go_on_from(state, time)
-        self.record = self.loop.record()
-
-    def _continue(self, end: float) -> None:
-        if self.model.highest_frequency * (end - self.time) <= COMPILED_PERIODS:
-            given = self.state, self.time, end, self.record, self.window, self._allowed, ACCUMULATED
-            self.state, self.time, samples, chatter = self.loop.advance(*given)
-            self._evaluations += samples
-            if chatter:
-                self._check_chatter()
-        if self.time < end:
-            self._one_segment(end)
-
-    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
-        return self.record.segments, self.record.events
-
-    def _keep(self, segment: Segment) -> None:
-        self.record.add(segment)
-
-    def _keep_event(self, event: Event) -> None:
-        self.record.add_event(event)
-
-    def _recent(self) -> Sequence[tuple[float, float]]:
-        return self.record.recent(self.window) if self.record.count > self.window else ()

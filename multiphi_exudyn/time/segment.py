@@ -138,7 +138,7 @@ class Batch:
 
 
 def batches(segments: Sequence[Segment]) -> list[Batch]:
-    """Segments by level and exponentials; some are kept in arrays (compiled/record.py)."""
+    """Segments by level and exponentials; some are kept in arrays (time/record.py)."""
     kept = getattr(segments, "batches", None)
     return batched(dict(enumerate(segments))) if kept is None else kept()
 

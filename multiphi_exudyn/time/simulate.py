@@ -11,22 +11,25 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.rule import EventRule
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.driven.arrays import DrivenArrays
 from multiphi_exudyn.time.driven.excitation import Excitation
 from multiphi_exudyn.time.driven.motion import DrivenMotion
 from multiphi_exudyn.time.driven.refinement import to_tolerance
 from multiphi_exudyn.time.driven.rule import DrivenRule
-from multiphi_exudyn.time.motion import CompiledMotion, Motion
+from multiphi_exudyn.time.loop_motion import DrivenLoopMotion, LoopMotion
+from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.reliability import warnings_of
 from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
@@ -49,8 +52,8 @@ def simulate(
     """Motion of ``model`` from 0 to t_end [s].
 
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
-    compiled: whether the compiled loop runs, None: where numba is installed; the answer is the same to round-off.
-    Force laws, viscous contacts and loads that vary in time are not for the compiled loop.
+    compiled: False for the loop of NumPy; True, or None, for the compiled one, plain Python where numba is not
+    installed and None is given; the answer is the same to round-off.
     The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
     model, and of every later run of the same model.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
@@ -117,42 +120,25 @@ def started(
     finer: smooth courses of loads are taken to their tolerance / finer.
     """
     excitation = Excitation.of(model, loads, end, finer)
-    if not excitation.channels:
-        start = _start(model, displacement, velocity, excitation, end)
-        return motion_of(model, _rule(model, excitation.static), start, compiled)
-    if compiled:
-        raise MultiPhiValueError(
-            "compiled: got True with loads that vary in time, or that pull at damped rigid-body motion, "
-            "need None or False"
-        )
-    rule = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
-    return DrivenMotion(model, rule, _start(model, displacement, velocity, excitation, end))
+    start = _start(model, displacement, velocity, excitation, end)
+    if compiled and not available():
+        raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
+    if excitation.channels:
+        driven = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
+        return motion_of(model, driven, start, compiled)
+    return motion_of(model, _rule(model, excitation.static), start, compiled)
 
 
 def motion_of(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
-    """The run, in the loop that is wanted and can be had."""
-    if compiled is not False and rule.compiled is None:
-        rule.compiled = _compiled_loop(rule, compiled)
-    if compiled is False or rule.compiled is None:
+    """The run under a rule, in the loop that is wanted."""
+    if isinstance(rule, DrivenRule):
+        if compiled is False:
+            return DrivenMotion(model, rule, start)
+        return DrivenLoopMotion(model, rule, start, arrays=DrivenArrays(rule))
+    if compiled is False:
         return Motion(model, rule, start)
-    return CompiledMotion(model, rule, start, loop=rule.compiled)
-
-
-def _compiled_loop(rule: EventRule, needed: bool | None) -> Any:
-    """The compiled loop, None without numba or for contacts that it does not know; an error where it is needed."""
-    if rule.model.chains or any(contact.damping for contact in rule.model.contacts):
-        if needed:
-            raise MultiPhiError("compiled: got True with force laws or viscous contacts, need None or False")
-        return None
-    try:
-        from multiphi_exudyn.time.compiled.loop import CompiledLoop
-    except ImportError as error:
-        if needed:
-            raise MultiPhiError(
-                "compiled: got True without numba, need it: pip install multiphi-exudyn[fast]"
-            ) from error
-        return None
-    return CompiledLoop(rule)
+    rule.arrays = rule.arrays or LevelArrays(rule)
+    return LoopMotion(model, rule, start, arrays=rule.arrays)
 
 
 def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:

@@ -278,7 +278,8 @@ class Trajectory:
 
     @functools.cached_property
     def _starts(self) -> np.ndarray:
-        return np.array([segment.start for segment in self.segments])
+        kept = getattr(self.segments, "starts", None)  # of the loop (record.py)
+        return np.array([segment.start for segment in self.segments]) if kept is None else np.asarray(kept)
 
     def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
         if side not in ("left", "right"):

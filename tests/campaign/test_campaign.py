@@ -45,7 +45,7 @@ def test_an_impulse_that_is_round_off_closes_no_contact():
 
 
 def test_a_contact_that_an_impact_lets_go_slowly_is_let_go():
-    """Two rigid stops at 1e-5 rad, one held and one struck: as if held both, they pushed with 1e4 times the momentum."""
+    """Two rigid stops at 1e-5 rad, one held, one struck: held both, they pushed with 1e4 times the momentum."""
     assert judged("redundant", 412)[0] == [("ok", "")]
 
 

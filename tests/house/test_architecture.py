@@ -17,13 +17,18 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
+COMPILERS = ("multiphi_exudyn/mathematics/compilation.py", "multiphi_exudyn/mathematics/machine_code.py")
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": ("multiphi_exudyn/study",),
-    "numba": ("multiphi_exudyn/time/compiled",),
+    "numba": COMPILERS,
+    "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
 }
-WITH_NUMBA = "multiphi_exudyn.time.compiled"  # may be imported inside a function, as numba may
+WITH_NUMBA = (  # may be imported inside a function, as numba may
+    "multiphi_exudyn.mathematics.compilation",
+    "multiphi_exudyn.mathematics.machine_code",
+)
 
 
 def sources() -> list[Path]:

@@ -325,11 +325,6 @@ class TestEquivalences:
         t = np.linspace(0, 4, 41)
         assert_allclose(second.displacement(t), whole.displacement(t + 4.0), atol=1e-11)
 
-    def test_the_compiled_loop_is_refused(self):
-        model = mp.MultiPhiModel(chain(2), [], modes="all")
-        with pytest.raises(mp.MultiPhiValueError, match="compiled"):
-            mp.simulate(model, 1.0, loads=[mp.HarmonicLoad("m0", 1.0, 1.0)], compiled=True)
-
 
 @pytest.mark.parametrize("resistance", [1e-9, 1e-6, 1e-4, 1.0])
 def test_little_damping_of_a_rigid_body_under_a_constant_load_costs_no_accuracy(resistance):

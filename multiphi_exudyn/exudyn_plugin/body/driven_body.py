@@ -32,6 +32,7 @@ from multiphi_exudyn.time.driven.motion import DrivenMotion
 from multiphi_exudyn.time.driven.rule import DrivenRule
 from multiphi_exudyn.time.driven.state import DrivenState
 from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.simulate import motion_of
 
 __all__ = ["DrivenBody"]
 
@@ -165,7 +166,7 @@ class DrivenBody(MultiPhiBody):
 
     def _own_motion(self, end: float) -> tuple[Motion, State]:
         self._driven.set_out(self.time, end)
-        return DrivenMotion(self.model, self._driven, self._motion.start), self._driven.state(self._state)
+        return motion_of(self.model, self._driven, self._motion.start, None), self._driven.state(self._state)
 
     def _read_by(self, state: State, time: float) -> tuple[EventRule, State]:
         self._driven.set_out(time, time)

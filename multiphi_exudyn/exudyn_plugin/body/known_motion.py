@@ -16,7 +16,8 @@ from multiphi_exudyn.events.state import Event, Phase, State, event_table
 from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.time.driven.level import DrivenLevel
-from multiphi_exudyn.time.motion import CompiledMotion, Motion
+from multiphi_exudyn.time.loop_motion import LoopMotion
+from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.segment import Batch, batches
 
 __all__ = ["KnownMotion", "Moments", "Stretch"]
@@ -110,11 +111,8 @@ class KnownMotion:
 
 def _phases(motion: Motion) -> np.ndarray:
     """Phases (n, c) at the start of every segment, in numbers."""
-    if isinstance(motion, CompiledMotion):
-        record = motion.record
-        for place, segment in record.made.items():  # of the NumPy loop
-            record.standings[place] = _numbers([segment.phases])
-        return np.asarray(record.standings[: record.count])
+    if isinstance(motion, LoopMotion):
+        return motion.record.standings()
     phases = [segment.phases for segment in motion.segments]
     return _numbers(phases).reshape(len(phases), len(motion.model.contacts))
 

@@ -1,0 +1,20 @@
+"""``multiphi-exudyn compile``: pay the first compilation ahead, for a container or for the workers of a cluster."""
+
+from __future__ import annotations
+
+import sys
+
+from multiphi_exudyn.mathematics.compiled import available, compile_entries
+
+__all__ = ["run_compile"]
+
+
+def run_compile() -> bool:
+    """Compile what a run would compile, and say where it is kept; True if it is kept."""
+    path = compile_entries() if available() else None
+    if path is None:
+        why = "no folder is writable; NUMBA_CACHE_DIR names one" if available() else "numba is not installed"
+        print(f"nothing compiled is kept: {why}", file=sys.stderr)
+        return False
+    print(f"compiled, and kept in {path}")
+    return True

@@ -1,0 +1,155 @@
+"""Arrays: what the loop works on, in three flat buffers: ints (int64), numbers (float64), waves (complex128).
+
+Offsets are ints. n = r + q coordinates xi = (eta, w) of a level of r modes and q channels, p exponentials, c elements.
+
+record    where                   what stands in it
+--------  ----------------------  -------------------------------------------------------------------------------------
+run       ints[0 ...]             sizes, where tables and scratch memory begin, states, counts, what is needed, causes
+          numbers[0 ...]          times, energies lost, what a failure is told with
+element   ints[ints[KINDS] + i]   COMPLIANT, RIGID or VISCOUS; chain, stiffness, direction (m,) in tables of their own
+level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
+                                  motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
+                                  (c, n + 1); energies as forms in xi, xi'; its response (flat_response.py); its exits
+exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
+                                  that the element would have in the level entered alone, -1 while nobody needed it
+signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
+map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included
+state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
+piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
+segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
+          SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
+event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event)
+          EVENT_NUMBERS           time, five losses, impulse
+
+A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
+an element is, and what friction will make of one (more states, more exits, channels that maps set), is data alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["Buffers"]
+
+# ---------------------------------------------------------------------- run record, ints
+
+ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
+KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
+LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
+PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
+    13,
+    14,
+    15,
+    47,
+    48,
+    49,
+)  # records of pieces, how many, the present one, its record; terms
+NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
+CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
+TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
+CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the decision under way: ints, numbers
+WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, where their ring begins
+STOP_AT_EVENT = 31
+SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
+COORDINATE_NUMBERS, COORDINATE_COUNT, COORDINATE_ROOM = 36, 37, 38
+PHASE_INTS, PHASE_COUNT, PHASE_ROOM = 39, 40, 41
+EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM, EVENTS_TAKEN = 42, 43, 44, 45, 46
+
+# scratch memory: where it begins
+FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
+FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS = 53, 54, 55, 56
+FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(
+    105, 112
+)  # response to channels
+DRIVE, DRIVE_WAVES = (
+    59,
+    60,
+)  # w, w', w'' (3, q), of which terms they are the sums (3, q); terms of the piece now
+SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
+SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
+ACCELERATION = 70
+ROWS, LEAST, LEAST_SIZES, IMPULSES, FURTHER, LEAST_NUMBERS, LEAST_INTS, CHANGE = 73, 74, 75, 76, 77, 78, 79, 80
+ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED = range(81, 91)  # sets
+HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
+JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
+
+# states, as records in the run record
+CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
+RUN_INTS = 184
+
+# ---------------------------------------------------------------------- run record, numbers
+
+TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
+TOLD = 8  # three numbers of a failure
+LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
+RUN_NUMBERS = 36
+BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, LOSSES = 0, 1, 2, 3, 4, 5
+
+# ---------------------------------------------------------------------- other records, ints
+
+COMPLIANT, RIGID, VISCOUS = 0, 1, 2
+OPEN, CLOSE = 0, 1  # states of a contact
+ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
+
+NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
+FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY = range(10, 19)
+LEVEL_INTS = 24
+
+ELEMENT, ASKED, STAYS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
+EXIT_INTS = 7
+ROW, WAVE, RATED = 0, 1, 2
+SIGNAL_INTS = 3
+
+MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET = 0, 1, 2, 3
+MAP_INTS = 4
+MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
+
+LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
+STATE_INTS = 8
+
+PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
+CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
+SHARED = -1
+SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
+
+# ---------------------------------------------------------------------- answers
+
+OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM = 1, 2, 3, 4, 5
+NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE = 1, 2, 3, 4, 5, 6, 7
+
+
+class Buffers:
+    """The three buffers, which grow by doubling; whatever is put in them stays where it is."""
+
+    def __init__(self) -> None:
+        self.ints, self.numbers, self.waves = np.zeros(1024, np.int64), np.zeros(4096), np.zeros(1024, complex)
+        self._used = {"ints": 0, "numbers": 0, "waves": 0}
+
+    @property
+    def all(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """ints, numbers, waves."""
+        return self.ints, self.numbers, self.waves
+
+    @property
+    def size(self) -> int:
+        """Bytes in use."""
+        return sum(count * getattr(self, name).itemsize for name, count in self._used.items())
+
+    def take(self, name: str, count: int) -> int:
+        """Where so many zeros begin in the buffer ``name``."""
+        start, buffer = self._used[name], getattr(self, name)
+        self._used[name] = start + count
+        if start + count > len(buffer):
+            longer = np.zeros(max(2 * len(buffer), start + count), buffer.dtype)
+            longer[:start] = buffer[:start]
+            setattr(self, name, longer)
+        return start
+
+    def put(self, name: str, values: object) -> int:
+        """Where these values begin in the buffer ``name``."""
+        given = np.asarray(values).ravel()
+        start = self.take(name, len(given))
+        getattr(self, name)[start : start + len(given)] = given
+        return start

@@ -1,0 +1,349 @@
+"""Flow in flat arrays: the motion from a state, as long as one piece of every channel lasts.
+
+    xi(t) = Re V (c phi(t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
+
+xi = (eta, w); phi the p exponentials of the free response, x (n,) its response to the channels' pieces and these
+themselves, T the horizon, a power of two. What is made of a state stands in the scratch memory of the flow: its basis,
+the coefficients c of its exponentials (one for each x), of which terms they are the sums, and the x.
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.events.arrays import (
+    CHANNELS,
+    DRIVE,
+    DRIVE_NEXT,
+    DRIVE_WAVES,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    FLOW_FORCED,
+    FLOW_FREE,
+    FLOW_RECORD,
+    FLOW_STATE,
+    FLOW_TERMS,
+    FLOW_WAVES,
+    FORCE,
+    FORCED,
+    FORCED_ROOM,
+    FORCED_WANTED,
+    FORCED_WORK,
+    FORCES,
+    HORIZON,
+    LEVEL,
+    MODES,
+    MOTION,
+    PIECE,
+    PIECE_NOW,
+    PIECE_TERMS,
+    PIECES,
+    PLACE,
+    RATED,
+    RESPONSE,
+    ROW,
+    SCALED_TERM,
+    SPEED,
+    TERM_INTS,
+    TERMS_NOW,
+    WAVE,
+    WORK_WAVES,
+)
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.flat_basis import (
+    POWERS,
+    RATES,
+    SCALES,
+    SIZE,
+    describe_basis,
+    differentiate,
+    exponential_size,
+    exponentials,
+)
+from multiphi_exudyn.mathematics.flat_response import (
+    FREE,
+    FROM_DISPLACEMENT,
+    FROM_FORCE,
+    FROM_VELOCITY,
+    REACHED,
+    SHAPES,
+    coefficients_of,
+    forced_response,
+)
+
+__all__ = ["expand", "keep_drive", "load_piece", "set_drive", "signal_sizes", "signal_waves", "state_at"]
+
+
+@compiled
+def load_piece(ints: Ints, waves: Waves) -> None:
+    """The terms of the present piece, as they are at its start, become those that hold now."""
+    piece, moved, q = ints[ints[PIECES] + ints[PIECE]], ints[DRIVE_WAVES], ints[CHANNELS]
+    ints[PIECE_NOW] = piece
+    for term in range(ints[piece + PIECE_TERMS]):
+        count, given = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
+        for k in range(count * q):
+            waves[moved + k] = waves[given + 1 + k]
+        moved += count * q
+
+
+@compiled
+def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float) -> None:
+    """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
+
+    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the
+    power of two above what is left: bases are shared among pieces of about the same length.
+    """
+    q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
+    numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])
+    ints[TERMS_NOW] = result
+    for k in range(6 * q):
+        numbers[drive + k] = 0.0
+    for term in range(ints[piece + PIECE_TERMS]):
+        count, rate = ints[piece + TERM_INTS + 2 * term], waves[ints[piece + TERM_INTS + 2 * term + 1]]
+        size, angle = exponential_size(rate.real * delay), rate.imag * delay
+        factor = complex(size * math.cos(angle), size * math.sin(angle))
+        for k in range(count * q):
+            waves[result + k] = waves[moved + k] * factor
+        for k in range(q):
+            for lowest in range(count - 1):
+                for d in range(count - 2, lowest - 1, -1):
+                    waves[result + d * q + k] += delay * waves[result + (d + 1) * q + k]
+            first = rate * waves[result + k]
+            second = rate * first
+            if count > 1:
+                first += waves[result + q + k]
+                second += 2.0 * rate * waves[result + q + k]
+            if count > 2:
+                second += 2.0 * waves[result + 2 * q + k]
+            numbers[drive + k] += waves[result + k].real
+            numbers[drive + q + k] += first.real
+            numbers[drive + 2 * q + k] += second.real
+            numbers[drive + 3 * q + k] += abs(waves[result + k])
+            numbers[drive + 4 * q + k] += abs(first)
+            numbers[drive + 5 * q + k] += abs(second)
+        moved += count * q
+        result += count * q
+
+
+@compiled
+def keep_drive(ints: Ints, waves: Waves) -> None:
+    """The terms of the instant become those that hold now."""
+    q, piece, count = ints[CHANNELS], ints[PIECE_NOW], 0
+    for term in range(ints[piece + PIECE_TERMS]):
+        count += ints[piece + TERM_INTS + 2 * term] * q
+    for k in range(count):
+        waves[ints[DRIVE_WAVES] + k] = waves[ints[DRIVE_NEXT] + k]
+
+
+@compiled
+def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """Fill in the flow from a state."""
+    level, c, x, v = ints[state + LEVEL], ints[FLOW_WAVES], ints[state + PLACE], ints[state + SPEED]
+    response, force = ints[level + RESPONSE], ints[level + FORCE]
+    p = ints[ints[response + FREE] + SIZE]
+    ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_BASIS] = p, p, ints[response + FREE]
+    if ints[CHANNELS] > 0:
+        r = ints[level + MODES]
+        force_flow(ints, numbers, waves, state)
+        coefficients_of(ints, numbers, waves, response, ints[FLOW_STATE], ints[FLOW_STATE] + r, force, c)
+        size_driven_terms(ints, numbers, waves, level)
+        return
+    coefficients_of(ints, numbers, waves, response, x, v, force, c)
+    for j in range(p):
+        numbers[ints[FLOW_TERMS] + j] = abs(waves[c + j])
+
+
+@compiled
+def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """The response to the channels' terms, with these, as x_k of the flow, and its basis.
+
+    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r), and of which sizes (2, r)
+    they are the sums. Where there is no room for as many powers as a response takes, FORCED_WANTED says for how many.
+    """
+    level, q, horizon = ints[state + LEVEL], ints[CHANNELS], numbers[HORIZON]
+    r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
+    own, record, most = ints[FLOW_STATE], ints[FLOW_RECORD], ints[FORCED_ROOM]
+    basis = ints[FLOW_BASIS]
+    for i in range(r):
+        numbers[own + i] = numbers[ints[state + PLACE] + i]
+        numbers[own + r + i] = numbers[ints[state + SPEED] + i]
+        numbers[own + 2 * r + i] = 0.0
+        numbers[own + 3 * r + i] = 0.0
+    count, powers = free, 0
+    for term in range(ints[given + PIECE_TERMS]):
+        degree, carrier = ints[given + TERM_INTS + 2 * term] - 1, ints[given + TERM_INTS + 2 * term + 1]
+        force_modes(ints, numbers, waves, level, carrier, moved, degree)
+        rows = forced_response(
+            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon, most,
+            ints[FORCED_WORK], ints[FORCED],
+        )  # fmt: skip
+        if rows > most:
+            ints[FORCED_WANTED] = max(ints[FORCED_WANTED], rows)
+            rows = most
+        powers = max(powers, max(rows, degree + 1) - 1)
+        add_forced(ints, numbers, waves, level, carrier, degree, rows, count)
+        count += max(rows, degree + 1)
+        moved += (degree + 1) * q
+    for j in range(free):
+        ints[ints[record + POWERS] + j] = ints[ints[basis + POWERS] + j]
+        waves[ints[record + RATES] + j] = waves[ints[basis + RATES] + j]
+    for i in range(2 * r):
+        numbers[own + 2 * r + i] = abs(numbers[own + 2 * r + i]) + abs(numbers[own + i])
+    ints[record + SIZE] = count
+    numbers[ints[record + SCALES]] = horizon if powers > 0 else numbers[ints[basis + SCALES]]
+    describe_basis(ints, numbers, waves, record)
+    ints[FLOW_COUNT], ints[FLOW_BASIS] = count, record
+
+
+@compiled
+def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int) -> None:
+    """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
+    r, q, horizon, rate = ints[level + MODES], ints[CHANNELS], numbers[HORIZON], waves[carrier]
+    n, scale, scaled = r + q, 1.0, ints[SCALED_TERM]
+    for d in range(degree + 1):
+        for k in range(q):
+            waves[scaled + d * q + k] = waves[moved + d * q + k] * scale
+        scale *= horizon
+    for d in range(degree + 1):
+        for i in range(r):
+            row, total = ints[level + MOTION] + i * (2 * n + 1), 0j
+            for k in range(q):
+                value = waves[scaled + d * q + k]
+                slope = rate * value
+                if d < degree:
+                    slope += (d + 1) / horizon * waves[scaled + (d + 1) * q + k]
+                total += numbers[row + r + k] * value + numbers[row + n + r + k] * slope
+            waves[ints[FORCES] + d * r + i] = total
+
+
+@compiled
+def add_forced(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    level: int,
+    carrier: int,
+    degree: int,
+    rows: int,
+    count: int,
+) -> None:
+    """List the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
+    r, q, record, own = ints[level + MODES], ints[CHANNELS], ints[FLOW_RECORD], ints[FLOW_STATE]
+    n, rate = r + q, waves[carrier]
+    for k in range(max(rows, degree + 1)):
+        j = count + k
+        x = ints[FLOW_FORCED] + (j - ints[FLOW_FREE]) * n
+        for i in range(r):
+            waves[x + i] = waves[ints[FORCED] + k * r + i] if k < rows else 0j
+        for i in range(q):
+            waves[x + r + i] = waves[ints[SCALED_TERM] + k * q + i] if k <= degree else 0j
+        ints[ints[record + POWERS] + j] = k
+        waves[ints[record + RATES] + j] = rate
+        waves[ints[FLOW_WAVES] + j] = 1.0 + 0j
+        numbers[ints[FLOW_TERMS] + j] = 1.0
+    for i in range(r):
+        value = waves[ints[FORCED] + i]
+        slope = rate * value
+        if rows > 1:
+            slope += 1.0 / numbers[HORIZON] * waves[ints[FORCED] + r + i]
+        numbers[own + i] -= value.real
+        numbers[own + r + i] -= slope.real
+        numbers[own + 2 * r + i] += value.real
+        numbers[own + 3 * r + i] += slope.real
+
+
+@compiled
+def size_driven_terms(ints: Ints, numbers: Numbers, waves: Waves, level: int) -> None:
+    """Of which terms the coefficients of the free response are the sums; both in the unit of the flow's basis."""
+    response, own, force = ints[level + RESPONSE], ints[FLOW_STATE], ints[level + FORCE]
+    r, basis = ints[level + MODES], ints[response + FREE]
+    ratio = numbers[ints[ints[FLOW_RECORD] + SCALES]] / numbers[ints[basis + SCALES]]
+    for j in range(ints[FLOW_FREE]):
+        size, unit = 0.0, 1.0
+        for i in range(ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]):
+            size += abs(waves[ints[response + FROM_DISPLACEMENT] + j * r + i]) * numbers[own + 2 * r + i]
+            size += abs(waves[ints[response + FROM_VELOCITY] + j * r + i]) * numbers[own + 3 * r + i]
+            if force >= 0:
+                size += abs(waves[ints[response + FROM_FORCE] + j * r + i]) * abs(numbers[force + i])
+        for _ in range(ints[ints[basis + POWERS] + j]):
+            unit *= ratio
+        numbers[ints[FLOW_TERMS] + j] = size * unit
+        waves[ints[FLOW_WAVES] + j] *= unit
+
+
+@compiled
+def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
+    """Coefficients (p,) of a signal on the flow from a state, without its constant."""
+    n, row, c = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_WAVES]
+    free, count, rate = ints[FLOW_FREE], ints[FLOW_COUNT], ints[WORK_WAVES] + ints[FLOW_COUNT]
+    for j in range(free):
+        waves[result + j] = waves[ints[signal + WAVE] + j] * waves[c + j]
+        waves[rate + j] = waves[ints[signal + WAVE] + free + j] * waves[c + j]
+    for j in range(free, count):
+        forced = ints[FLOW_FORCED] + (j - free) * n
+        value = 0j
+        slope = 0j
+        for i in range(n):
+            value += numbers[row + i] * waves[forced + i]
+            slope += numbers[row + n + i] * waves[forced + i]
+        waves[result + j] = value
+        waves[rate + j] = slope
+    if ints[signal + RATED] == 1:
+        differentiate(ints, numbers, waves, ints[FLOW_BASIS], rate, rate)
+        for j in range(count):
+            waves[result + j] += waves[rate + j]
+
+
+@compiled
+def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
+    """Of which terms (p,) the coefficients of a signal are the sums.
+
+    |row.V| |c| + |row'.V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
+    """
+    n, row, basis = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_BASIS]
+    free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
+    for j in range(count):
+        value = 0.0
+        slope = 0.0
+        if j < free:
+            value, slope = abs(waves[ints[signal + WAVE] + j]), abs(waves[ints[signal + WAVE] + free + j])
+        else:
+            forced = ints[FLOW_FORCED] + (j - free) * n
+            whole = 0j
+            changed = 0j
+            for i in range(n):
+                whole += numbers[row + i] * waves[forced + i]
+                changed += numbers[row + n + i] * waves[forced + i]
+            value, slope = abs(whole), abs(changed)
+        terms = numbers[ints[FLOW_TERMS] + j]
+        numbers[result + j] = value * terms
+        if ints[signal + RATED] == 1:
+            numbers[result + j] += slope * terms * abs(waves[ints[basis + RATES] + j])
+            if ints[ints[basis + POWERS] + j] > 0:
+                numbers[result + j - 1] += ints[ints[basis + POWERS] + j] / unit * slope * terms
+
+
+@compiled
+def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x: int, v: int) -> None:
+    """xi, xi' (n,) of the flow a time t after its state."""
+    r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
+    n, free, count, c = r + ints[CHANNELS], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
+    phi, rate = ints[WORK_WAVES], ints[WORK_WAVES] + ints[FLOW_COUNT]
+    exponentials(ints, numbers, waves, basis, t, t, phi)
+    differentiate(ints, numbers, waves, basis, c, rate)
+    for i in range(n):
+        numbers[x + i] = 0.0
+        numbers[v + i] = 0.0
+    for j in range(count):
+        value, slope = waves[c + j] * waves[phi + j], waves[rate + j] * waves[phi + j]
+        first, end, row = 0, n, ints[FLOW_FORCED] + (j - free) * n
+        if j < free:
+            first, end = ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]
+            row = ints[response + SHAPES] + j * r
+        else:  # every power has an x of its own
+            slope = waves[ints[basis + RATES] + j] * value
+            if ints[ints[basis + POWERS] + j] > 0:
+                slope += ints[ints[basis + POWERS] + j] / numbers[ints[basis + SCALES]] * waves[phi + j - 1]
+        for i in range(first, end):
+            numbers[x + i] += (waves[row + i] * value).real
+            numbers[v + i] += (waves[row + i] * slope).real

@@ -1,0 +1,103 @@
+"""Flat buffers filled from the objects whose meaning the flat functions share, to compare the two."""
+
+import functools
+
+import numpy as np
+
+from multiphi_exudyn.mathematics import compiled, flat_basis, flat_response, zero_crossing
+from multiphi_exudyn.mathematics.first_descent import Descent
+
+fast = functools.cache(compiled.entry)  # a function compiled, once in a process
+
+
+class Buffers:
+    """Three growing buffers; every ``put`` says where its values begin."""
+
+    def __init__(self):
+        self.ints, self.numbers, self.waves = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, complex)
+
+    @property
+    def all(self):
+        return self.ints, self.numbers, self.waves
+
+    def put_ints(self, values):
+        self.ints, at = np.concatenate([self.ints, np.asarray(values, np.int64).ravel()]), len(self.ints)
+        return at
+
+    def put_numbers(self, values):
+        self.numbers, at = np.concatenate([self.numbers, np.asarray(values, float).ravel()]), len(self.numbers)
+        return at
+
+    def put_waves(self, values):
+        self.waves, at = np.concatenate([self.waves, np.asarray(values, complex).ravel()]), len(self.waves)
+        return at
+
+    def put_basis(self, basis):
+        powers, rates = self.put_ints(basis.powers), self.put_waves(basis.rates)
+        scales = self.put_numbers([basis.unit, 0.0, 0.0])
+        record = self.put_ints([len(basis.rates), powers, rates, scales, -1, -1])
+        flat_basis.describe_basis(*self.all, record)
+        return record
+
+    def put_response(self, response, squares, damping):
+        """``modal_response(squares, damping)``."""
+        r, p = response.shapes.shape
+        maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
+        alone = (squares == 0) & ~np.any(damping, axis=1) | response.diagonal
+        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
+        basis, reached = self.put_basis(response.basis), self.put_ints(np.zeros(2 * p))
+        places = [self.put_waves(values) for values in maps]
+        places += [self.put_numbers(squares), self.put_numbers(np.diagonal(damping) / 2)]
+        places += [self.put_ints(alone), self.put_ints(poles)]
+        record = self.put_ints([r, basis, reached, *places])
+        flat_response.reached_modes(self.ints, self.waves, record)
+        return record
+
+
+class Search:
+    """``DescentFinder`` on flat buffers, for the signals of one basis; run: ``fast``, or as they are."""
+
+    def __init__(self, basis, signals, run=lambda function: function):
+        self._run = run
+        self.count, self.p = signals.coefficients.shape
+        self.buffers = Buffers()
+        noise = np.zeros(self.count) if signals.noise is None else signals.noise
+        self.basis = self.buffers.put_basis(basis)
+        self.signals = self.buffers.put_waves(signals.coefficients)
+        self.constants, self.noise = self.buffers.put_numbers(signals.constants), self.buffers.put_numbers(noise)
+        self.result = self.buffers.put_numbers(np.zeros(zero_crossing.RESULT))
+        self.scratch = self.buffers.put_numbers(np.full(zero_crossing.scratch_numbers(self.p, self.count), np.nan))
+        self.scratch_wave = self.buffers.put_waves(np.full(zero_crossing.scratch_waves(self.p, self.count), np.nan))
+        self.flags = self.buffers.put_ints(np.full(self.count, -1))
+
+    def first(self, horizon, start=0.0):
+        """The signal that falls first, or what is in its stead, and when."""
+        with np.errstate(all="ignore"):
+            found = self._run(zero_crossing.first_descent)(
+                *self.buffers.all, self.basis, self.signals, self.constants, self.noise, self.count, start, horizon,
+                self.scratch, self.scratch_wave, self.result,
+            )  # fmt: skip
+        return found, float(self.buffers.numbers[self.result])
+
+    @property
+    def samples(self):
+        return self.buffers.numbers[self.result + 1]
+
+    def simultaneous(self, found: Descent):
+        total = self._run(zero_crossing.simultaneous)(
+            *self.buffers.all, self.basis, self.signals, self.constants, self.count, found.signal, found.time,
+            self.scratch_wave, self.flags,
+        )  # fmt: skip
+        flags = self.buffers.ints[self.flags : self.flags + self.count]
+        assert total == np.sum(flags)
+        return np.flatnonzero(flags).tolist()
+
+    def signs(self, sizes, since=0):
+        return [self._sign(s, self.buffers.put_numbers(sizes[s]), since) for s in range(self.count)]
+
+    def _sign(self, s, sizes, since):
+        constant = float(self.buffers.numbers[self.constants + s])
+        return self._run(zero_crossing.first_sign)(
+            *self.buffers.all, self.basis, self.signals + s * self.p, constant, sizes, since, self.scratch,
+            self.scratch_wave,
+        )  # fmt: skip
