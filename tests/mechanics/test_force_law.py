@@ -10,7 +10,6 @@ from small_structures import chain
 from true_law import with_forces
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.mechanics.force_law import LawSpring
 from reference_models.rig import rig_beam
 
@@ -339,10 +338,8 @@ class TestMotion:
         assert sum(end - start for start, end in run.contact_intervals("stop")) > 0.5
         assert abs(run.ledger.residual) < 1e-9
 
-    def test_refuses_the_compiled_loop_and_moving_springs(self, refused):
+    def test_refuses_moving_springs(self, refused):
         m = model(law(hardening, segments=4))
-        with pytest.raises(MultiPhiError, match="compiled: got True with force laws"):
-            mp.simulate(m, 1.0, compiled=True)
         moving = mp.StopMotion("law+1", mp.Smooth(lambda t: 0.1 * t, 1e-6))
         refused(TypeError, "stop motion of 'law+1'", mp.simulate, m, 1.0, loads=[moving])
 

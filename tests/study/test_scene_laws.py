@@ -114,7 +114,6 @@ RIG = {"rig": "as-published", "support_stiffness": "rigid"}
 RIGID = {"kind": "reduced", "name": "r12", "modes": 6, "contact": "rigid"}
 COMPONENT = {"kind": "craig-bampton", "name": "cb", "modes": 2, "step": 1e-4}
 STEPWISE = {"kind": "solve-ivp", "name": "ivp", "method": "RK45", "rtol": 1e-4}
-COMPILED = {"kind": "reduced", "name": "fast", "loop": "compiled"}
 RIG_START = {"load_at": "hole3", "force": -1.0}
 BROKEN = {
     "unknown kind": ([CUBIC | {"kind": "quintic"}], {}, "force_laws[0]: got"),
@@ -134,10 +133,6 @@ BROKEN = {
     ),
     "on a component": ([CUBIC], {"models": [COMPONENT]}, "models[0].kind: got 'craig-bampton', need another kind"),
     "of a stepwise model": ([CUBIC], {"models": [STEPWISE]}, "models[0].kind: got 'solve-ivp', need another kind"),
-    "a compiled loop": ([CUBIC], {"models": [COMPILED]}, "models[0].loop: got 'compiled', need 'numpy'"),
-    "a compiled loop of viscous contacts": (
-        [], {"models": [COMPILED], "contacts": [VISCOUS]}, "models[0].loop: got 'compiled', need 'numpy'"
-    ),
     "two points of a full beam": (
         [CUBIC | {"at": {"tip": 1.0, "middle": -1.0}}], {"models": MODELS[3:]}, "models[0].kind: got 'full', need"
     ),

@@ -114,7 +114,6 @@ class TestForms:
 COMPONENT = {"kind": "craig-bampton", "name": "cb", "modes": 2, "step": 1e-4}
 STEPWISE = {"kind": "solve-ivp", "name": "ivp", "method": "RK45", "rtol": 1e-4}
 BASIS = {"kind": "global-basis", "name": "basis"}
-COMPILED = {"kind": "reduced", "name": "fast", "loop": "compiled"}
 ROUND = {"kind": "full", "name": "round", "elements": 4, "step": 1e-4, "contact": "circle"}
 NO_CSV = {"kind": "sampled", "at": "tip", "csv": "no.csv"}
 BROKEN = {
@@ -142,7 +141,6 @@ BROKEN = {
     "weight on a global basis": (
         [LOADS["gravity"]], {"models": [BASIS]}, "models[0].kind: got 'global-basis', need another kind"
     ),
-    "a compiled loop": ([HARMONIC], {"models": [COMPILED]}, "models[0].loop: got 'compiled', need 'numpy'"),
     "a round stop that moves": (
         [LOADS["stop-motion"]], {"models": [ROUND]}, "models[0].contact: got 'circle', need 'coordinate'"
     ),

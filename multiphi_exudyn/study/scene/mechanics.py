@@ -21,7 +21,7 @@ from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, StopMotion
+from multiphi_exudyn.mechanics.loads import BaseMotion, Gravity, StopMotion
 from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
@@ -244,15 +244,12 @@ def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
         for part, name in moved:
             if name not in names:
                 refuse(scene, f"loads[{i}].{part}", name, f"one of the contacts: {', '.join(names) or 'none'}")
-    varying = not all(isinstance(load, (ConstantLoad, Gravity)) for load in loads)
     for i, model in enumerate(scene.file.models):
         if loads and isinstance(model, (CraigBamptonModel, StepwiseModel)):
             refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has no loads")
         along = [load for load in loads if isinstance(load, (Gravity, BaseMotion))]
         if along and isinstance(model, GlobalBasisModel):
             refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has neither weight nor moving base")
-        if varying and getattr(model, "loop", "numpy") == "compiled":
-            refuse(scene, f"models[{i}].loop", "compiled", "'numpy': loads that vary in time are not compiled")
         moving = any(isinstance(load, StopMotion) or getattr(load, "fixed_stops", ()) for load in loads)
         if moving and isinstance(model, FullModel) and model.contact == "circle":
             refuse(scene, f"models[{i}].contact", "circle", "'coordinate': a round support does not move")
@@ -288,8 +285,6 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
             refuse(
                 scene, field_name.replace("kind", "contact"), "circle", "'coordinate': a round support has no damping"
             )
-        if getattr(model, "loop", "numpy") == "compiled" and getattr(model, "contact", "") != "rigid":
-            refuse(scene, field_name.replace("kind", "loop"), "compiled", "'numpy': viscous contacts are not compiled")
     factors = list(contact.direction.values()) if isinstance(contact.direction, Mapping) else [1.0]
     if len(factors) > 1 and isinstance(model, CraigBamptonModel):
         needed = f"another kind: its contacts act on single points, {contact.name} on {len(factors)}"

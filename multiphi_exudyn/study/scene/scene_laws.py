@@ -48,8 +48,6 @@ def check_laws(scene: Scene, contacts: Sequence[UnilateralContact], laws: Sequen
 def _check_law_of(scene: Scene, entry: str, model: ModelSpec, law: ForceLaw) -> None:
     if isinstance(model, (CraigBamptonModel, StepwiseModel)):
         refuse(scene, f"{entry}.kind", model.kind, f"another kind: this one has no force laws, and there is {law.name}")
-    if getattr(model, "loop", "numpy") == "compiled":
-        refuse(scene, f"{entry}.loop", "compiled", "'numpy': force laws are not compiled")
     points = 1 if isinstance(law.at, str) else len(law.at)
     if points > 1 and isinstance(model, FullModel):
         needed = f"another kind: its force laws act on single points, {law.name} on {points}"
