@@ -54,7 +54,6 @@ class ContactFunctions:
         self._viscous = [i for i, contact in enumerate(model.contacts) if contact.damping]
         self._armed = (Phase.ARMED,) * len(self._rigid)
         self._all = tuple(range(len(self._rigid)))
-        self.mapped = 0  # ways between levels that have been computed
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -96,7 +95,6 @@ class ContactFunctions:
         ways = self._of(source.level.indices).ways
         if target.level.indices not in ways:
             ways[target.level.indices] = self._map(source, target)
-            self.mapped += 1
         return ways[target.level.indices]
 
     def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
