@@ -70,10 +70,10 @@ def cost(elements: int, stops: int = STOPS, t_end: float = T_END) -> Cost:
     start = LIFT / (model.structure.row(tip) @ bent) * bent
     model.level(())
     ready = time.process_time()
-    trajectory = mp.simulate(model, t_end, displacement=start, compiled=False)
+    trajectory = mp.simulate(model, t_end, displacement=start)
     times = [time.process_time()]
     for _ in range(REPEATS):
-        mp.simulate(model, t_end, displacement=start, compiled=False)
+        mp.simulate(model, t_end, displacement=start)
         times.append(time.process_time())
     again = min(after - before for before, after in itertools.pairwise(times))
     return Cost(model.structure.n, ready - started, times[0] - ready, again, trajectory)

@@ -20,7 +20,7 @@ import skfem
 from meshed_cantilever import HEIGHT, LENGTH, inertia, strain_energy
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.simulate import started
+from multiphi_exudyn.time.simulate import Run
 
 STOPS = 100
 GAP, STIFFNESS, LIFT = 1e-4, 3e4, 2e-3  # m, N/m of one stop, m of the tip at the start
@@ -108,12 +108,12 @@ class Bed:
 
     def _timed(self, model: mp.MultiPhiModel, t_end: float) -> Timed:
         times = [time.process_time()]
-        motion = started(model, t_end, self.start, None, (), compiled=False)
+        motion = Run(model, t_end, self.start).begun()
         times.append(time.process_time())
         motion.advance(t_end)
         times.append(time.process_time())
         assert not motion.message, motion.message
-        return Timed(*np.diff(times).tolist(), events=len(motion.events))
+        return Timed(*np.diff(times).tolist(), events=len(motion.trajectory(t_end).events))
 
     @property
     def cost(self) -> Cost:

@@ -15,7 +15,7 @@ dynamic analyses, AIAA Journal 6 (1968) 1313.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -95,6 +95,5 @@ def independent_points(structure: LinearStructure, names: Iterable[str]) -> tupl
 
 def _constraint_mode(level: Level, point: int) -> np.ndarray:
     """Psi_i (m,) in base coordinates: the level at rest with one contact displaced by 1 m."""
-    contacts = [replace(contact, gap=-float(i == point)) for i, contact in enumerate(level.base.contacts)]
-    displaced = replace(level, base=replace(level.base, contacts=tuple(contacts)))
-    return displaced.asymptotic(np.zeros(level.base.modes.count)).configuration
+    gaps = -np.array([float(i == point) for i in level.indices])
+    return level.static_response(np.zeros(level.base.modes.count), gaps)[1]

@@ -2,10 +2,10 @@
 
     z = (eta, eta'),   z' = [0, I; -diag(omega^2), -D] z + (0, drive)                                       (38.3)
 
-What the levels are, how a state passes from one to the next (38.6) and which level follows is that of the reduced
-model; what differs is the integration: an error tolerance instead of closed forms, and events that are seen only
-where a signal's sign differs at the two ends of a step. Compliant contacts only. An event is not found again at the
-instant of the restart: it has a direction, and there its sign is known while its value is round-off.
+What the levels are and how a state passes from one to the next (38.6) is that of the reduced model; what differs is the
+integration, an error tolerance instead of closed forms, with events that are seen only where a signal's sign differs at
+the two ends of a step, and the code of the rule (spring_rule.py). Contacts with springs only. An event is not found
+again at the instant of the restart: it has a direction, and there its sign is known while its value is round-off.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.state import Phase, Row, State
-from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import Phase, State
 from multiphi_exudyn.levels.model import MultiPhiModel
+from reference_models.spring_rule import Signal, SpringRule
 
 __all__ = ["StepwiseHistories", "StepwiseRun", "solve_stepwise"]
 
@@ -117,22 +117,22 @@ def solve_stepwise(
     for contact in model.contacts:
         if contact.rigid:
             raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one")
+        if contact.damping:
+            raise MultiPhiValueError(f"contact {contact.name!r} damping: got {contact.damping:g}, need 0")
     base = model.base
     y = base.coordinates(displacement)
-    rule = EventRule(model, np.zeros(base.modes.count))
-    penetrating = np.flatnonzero(base.directions.T @ y + base.gaps < 0)
-    state = rule.start(y, np.zeros_like(y), tuple(map(int, penetrating)), ())[0]
+    rule = SpringRule(model)
     size = np.linalg.norm(y), np.linalg.norm(base.modes.omega * y)
     integration = _Integration(rule, method, rtol, (float(size[0]), float(size[1])))
     with np.errstate(over="ignore", invalid="ignore"):  # a run that blows up
-        return integration.run(state, t_end)
+        return integration.run(rule.start(y), t_end)
 
 
 @dataclass(frozen=True)
 class _Integration:
     """rule: of the contacts. method, rtol: of solve_ivp. size: of the start's displacement and velocity."""
 
-    rule: EventRule
+    rule: SpringRule
     method: str
     rtol: float
     size: tuple[float, float]
@@ -157,7 +157,7 @@ class _Integration:
         if not state.kinetic + state.potential <= most:
             return state, f"at t = {time:.9g} s: energy gained, the integration is unstable at this tolerance"
         try:
-            return self.rule.decide(state, self._together(state, asking, time))[0], ""
+            return self.rule.decide(state, self._together(state, asking, time)), ""
         except NumericalFailure as failure:
             return state, f"at t = {time:.9g} s: {failure}"
 
@@ -196,8 +196,8 @@ class _Integration:
         """With those that reach zero at the same instant, as far as roots are resolved: solve_ivp leaves them out."""
         found = set(asking)
         for contact, phase in enumerate(state.phases):
-            own = self.rule.function(state.level, contact)
-            value, rate = own(state.displacement, state.velocity), float(own.position @ state.velocity)
+            own, z = self.rule.signal(state.level, contact), np.concatenate([state.displacement, state.velocity])
+            value, rate = own.at(z), own.rate.at(z)
             if phase is Phase.ARMED and rate < 0 and abs(value) <= -rate * INSTANT * (1 + time):
                 found.add(contact)
         return found
@@ -213,7 +213,7 @@ def _right_hand_side(level: LoadedLevel) -> tuple[Function, np.ndarray]:
     return lambda _, z: matrix.dot(z) + constant, matrix
 
 
-def _watched(rule: EventRule, state: State, time: float) -> list[tuple[int, Function]]:
+def _watched(rule: SpringRule, state: State, time: float) -> list[tuple[int, Function]]:
     """(contact, event) of all that may ask to change: s falls through zero, s being as in the event rule.
 
     A contact whose s is negative asks also where s turns down or, refused before, where s in the level it would
@@ -221,30 +221,29 @@ def _watched(rule: EventRule, state: State, time: float) -> list[tuple[int, Func
     """
     watched = []
     for contact, phase in enumerate(state.phases):
-        own = rule.function(state.level, contact)
+        own = rule.signal(state.level, contact)
         watched.append((contact, _falling(own, time, positive=phase is Phase.ARMED)))
         if phase is Phase.RECOVERING:
-            rate = Row(np.zeros_like(own.position), own.position, 0.0)
-            watched.append((contact, _falling(rate, time, while_negative=own)))
+            watched.append((contact, _falling(own.rate, time, while_negative=own)))
         elif phase is Phase.REFUSED:
-            entered = rule.entered_function(state.level, contact)
+            entered = rule.entered_signal(state.level, contact)
             watched.append((contact, _falling(-entered, time, while_negative=own)))
     return watched
 
 
-def _falling(row: Row, time: float, *, positive: bool = True, while_negative: Row | None = None) -> Function:
-    """Terminal event: ``row`` falls through zero, looked for only while another row is negative.
+def _falling(signal: Signal, time: float, *, positive: bool = True, while_negative: Signal | None = None) -> Function:
+    """Terminal event: ``signal`` falls through zero, looked for only while another one is negative.
 
     positive: its sign at the restart, where the value itself is round-off.
     """
-    vector, constant, first = np.concatenate([row.position, row.rate]), row.constant, 1.0 if positive else -1.0
+    vector, constant, first = signal.row, signal.constant, 1.0 if positive else -1.0
     if while_negative is None:
 
         def event(t: float, z: np.ndarray) -> float:
             return vector.dot(z) + constant if t > time else first
 
     else:
-        other, shift = np.concatenate([while_negative.position, while_negative.rate]), while_negative.constant
+        other, shift = while_negative.row, while_negative.constant
 
         def event(t: float, z: np.ndarray) -> float:
             return vector.dot(z) + constant if t > time and other.dot(z) + shift < 0 else first

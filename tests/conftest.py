@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.study.running import timing
 from reference_models.exudyn_quiet import quiet
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
@@ -19,6 +20,14 @@ settings.load_profile("deterministic")
 def pytest_configure(config: pytest.Config) -> None:
     """Many tests run badly truncated models on purpose; those of the warnings ask for them."""
     config.addinivalue_line("filterwarnings", "ignore::multiphi_exudyn.errors.MultiPhiWarning")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_timing() -> Iterator[None]:
+    """Runs of milliseconds are not repeated until their time is steady: nobody looks at it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timing, "STEADY_S", 0.0)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -98,8 +98,9 @@ def of_a_wave(wave: complex) -> float:
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """An empty place for what is compiled."""
+    """An empty place for what is compiled, and no entries but those that the test makes."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(front, "_entries", [])
     return tmp_path / "cache"
 
 
@@ -147,6 +148,7 @@ def program(*edits: tuple[str, str]) -> Entry:
         assert old in source
         source = source.replace(old, new)
     names = {"__name__": "program"}
+    front._entries.clear()
     exec(source, names)
     return names["run"]
 
@@ -183,6 +185,15 @@ def test_an_entry_sees_another_array_and_none_can_be_moved_under_it():
     assert run(numbers, 0) == 9.0
     with pytest.raises(ValueError, match="cannot resize"):
         numbers.resize(100_000, refcheck=False)
+
+
+def test_an_entry_bound_to_its_buffers_takes_the_rest_and_sees_what_they_then_hold():
+    ints, numbers, waves = buffers()
+    bound = Entry(total).bound(ints, numbers, waves)
+    numbers *= 2.0
+    assert bound(4, 1.5) == pytest.approx(total(*buffers()[:1], 2 * buffers()[1], buffers()[2], 4, 1.5), rel=1e-15)
+    with pytest.raises(MultiPhiTypeError, match="need a contiguous"):
+        Entry(total).bound(ints, numbers[::2], waves)
 
 
 def test_an_entry_keeps_no_array_alive():
@@ -249,6 +260,14 @@ def test_an_edit_of_a_function_a_constant_or_a_signature_is_seen(made, edit, aga
     assert made == again
     assert program(edit)(ONES) == value
     assert made == again
+
+
+def test_the_first_call_compiles_what_every_entry_needs(made):
+    run, other = program(), front.entry(square)
+    assert run(ONES) == 6.0
+    assert sorted(made) == ["inner", "outer", "scaled", "square"]
+    assert other(np.array([3.0]), 0) == 9.0
+    assert len(made) == 4
 
 
 def test_two_programs_share_what_both_reach(made):
@@ -358,6 +377,8 @@ def test_without_numba_an_entry_is_the_plain_function(monkeypatch):
 
 IN_A_PROCESS = """
 import sys, numpy as np
+from multiphi_exudyn.mathematics import compiled
+compiled._entries.clear()
 sys.path.insert(0, {folder!r})
 from program import run
 print(run(np.ones(4)), "numba" in sys.modules)
@@ -400,6 +421,16 @@ def test_the_command_line_compiles_ahead_and_says_where(monkeypatch, capsys):
     monkeypatch.setattr(front, "_entries", [program()])
     assert cli.main(["compile"]) == 0
     assert str(compiled_cache.cache_file()) in capsys.readouterr().out
+
+
+def test_the_command_line_compiles_what_runs_samples_ledgers_and_coupled_bodies_need():
+    code = """
+from multiphi_exudyn.cli import main
+from multiphi_exudyn.mathematics import compiled
+print(*sorted(one.function.__name__ for one in compiled._entries))
+"""
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert names == ["advance", "integrate_works", "measure", "sample_rows", "sample_states", "step_is_clear"]
 
 
 def test_the_command_line_fails_where_nothing_is_kept(monkeypatch, capsys, tmp_path):

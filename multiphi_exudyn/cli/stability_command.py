@@ -23,7 +23,7 @@ def run_stability(name: str | None, quick: bool, out: Path | None) -> bool:
     folder = results_folder(out or Path(f"multiphi-stability{'-quick' if quick else ''}"))
     results = []
     with tqdm(total=len(cases), disable=None, unit="case") as bar:
-        bar.set_description("compiled loop")
+        bar.set_description("compiling")
         warm_up()
         for case in cases:
             bar.set_description(case.name)

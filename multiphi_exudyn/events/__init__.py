@@ -1,9 +1,25 @@
 """Events: when a contact closes or opens, which level follows, and with what state (eq. 38.6).
 
-A transition takes a state from one level into another. Signals of the state say whether a contact may stay as it is
-(admissibility). The rule decides from them, and is the same in every driver of the model.
+A transition takes a state from one level into another. Signals of the state say whether an element may stay as it is
+(exits). The law decides from them, and is the same in every driver of the model. It works on flat arrays, for
+the loop of a run: arrays says what stands where, and level_arrays puts it there. Where it is stated:
 
-The same on flat arrays, for the loop of a run: arrays says what stands where.
+    (38.3)  eta'' of a state              state_arrays.accelerate
+    (38.6)  a state in another level      maps.move; its matrices transition.Transition
+    1       armed, and asking             phases.phase_of, waiting.watch, waiting.who_asks, decision.decide_jump
+    2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
+    2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, independence.join
+    3       a rigid contact opens         switching.is_firm, switching.open_and_enter
+    4       a compliant contact changes   switching.try_wishes, switching.switch
+    5       recovering                    phases.phase_of, waiting.watch
+    6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again
+    7       a viscous contact             switching.is_relaxing
+    8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
+    9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
 
-Order: transition, state, admissibility, passage, rule, arrays, flat_state, flow, impact, flat_rule, level_arrays.
+The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
+
+Order: excitation, pieces, channels, loaded_level, transition, state, exits, loaded_levels, arrays, state_arrays,
+signals, maps, energies, drive, flow, impact, phases, independence, changes, resting, striking, switching, decision,
+waiting, start, channel_arrays, level_parts, level_arrays.
 """

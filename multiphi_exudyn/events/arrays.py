@@ -1,6 +1,7 @@
 """Arrays: what the loop works on, in three flat buffers: ints (int64), numbers (float64), waves (complex128).
 
-Offsets are ints. n = r + q coordinates xi = (eta, w) of a level of r modes and q channels, p exponentials, c elements.
+Offsets are ints. n = r + q coordinates xi = (eta, w) of a level of r modes and q channels, the prescribed ones first,
+then places that links hold; p exponentials, c elements.
 
 record    where                   what stands in it
 --------  ----------------------  -------------------------------------------------------------------------------------
@@ -9,11 +10,14 @@ run       ints[0 ...]             sizes, where tables and scratch memory begin, 
 element   ints[ints[KINDS] + i]   COMPLIANT, RIGID or VISCOUS; chain, stiffness, direction (m,) in tables of their own
 level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
-                                  (c, n + 1); energies as forms in xi, xi'; its response (flat_response.py); its exits
+                                  (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
+                                  the power of damping xi'.D xi', and of what varies (q, 4 n + 1), as in work.py;
+                                  its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it
 signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
-map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included
+map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
+                                  are set, of which terms T and c are sums, (n_m, n_l + 1), else -1
 state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
@@ -34,6 +38,7 @@ __all__ = ["Buffers"]
 # ---------------------------------------------------------------------- run record, ints
 
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
+PRESCRIBED = 46  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
 PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
@@ -48,8 +53,9 @@ NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which lev
 CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
 TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
 CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the decision under way: ints, numbers
+FIRST_CHANGE = 41  # of the decision: those before it are impacts of the start
 WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, where their ring begins
-STOP_AT_EVENT = 31
+STOP_AT_EVENT, STARTING = 31, 38  # whether the run has still to begin: FRESH, from GIVEN, or GOING_ON, from CURRENT
 SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
 COORDINATE_NUMBERS, COORDINATE_COUNT = 36, 37
 PHASE_INTS, PHASE_COUNT = 39, 40
@@ -57,10 +63,11 @@ EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM = 42, 43, 44, 45
 
 # scratch memory: where it begins
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
-FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS = 53, 54, 55, 56
+FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS, FLOW_FROM = 53, 54, 55, 56, 57  # FLOW_FROM: its state
 FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(
     105, 112
 )  # response to channels
+SET_SIZES = 58  # of the terms of xi, xi' (2, n) after a map
 DRIVE, DRIVE_WAVES = (
     59,
     60,
@@ -75,31 +82,37 @@ JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(
 
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
-RUN_INTS = 184
+GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
+RUN_INTS = 200
 
 # ---------------------------------------------------------------------- run record, numbers
 
 TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
+INDEPENDENCE = 7  # of directions of length one: what is left beside others, below which one follows from them
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
-RUN_NUMBERS = 36
+LOST_AT_START = 36
+RUN_NUMBERS = 42
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, LOSSES = 0, 1, 2, 3, 4, 5
 
 # ---------------------------------------------------------------------- other records, ints
 
 COMPLIANT, RIGID, VISCOUS = 0, 1, 2
+FRESH, GOING_ON = 1, 2
 OPEN, CLOSE = 0, 1  # states of a contact
 ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
 
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
-FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY = range(10, 19)
+FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
+DISSIPATION, POWER = 20, 21  # forms of the power of damping and of what varies, zero while nobody needed them
 LEVEL_INTS = 24
 
-ELEMENT, ASKED, STAYS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
+ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 EXIT_INTS = 7
 ROW, WAVE, RATED = 0, 1, 2
 
-MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET = 0, 1, 2, 3
+MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
+MAP_SIZES = 4  # of a map from the base: |y| that a level's rest has, and for w = 1 its channels, (q + 1,)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 
 LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
@@ -133,7 +146,8 @@ class Buffers:
     @property
     def size(self) -> int:
         """Bytes in use."""
-        return sum(count * getattr(self, name).itemsize for name, count in self._used.items())
+        used = self._used
+        return 8 * (used["ints"] + used["numbers"]) + 16 * used["waves"]
 
     def take(self, name: str, count: int) -> int:
         """Where so many zeros begin in the buffer ``name``."""

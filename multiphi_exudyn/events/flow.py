@@ -9,17 +9,13 @@ the coefficients c of its exponentials (one for each x), of which terms they are
 
 from __future__ import annotations
 
-import math
-
 from multiphi_exudyn.events.arrays import (
     CHANNELS,
-    DRIVE,
-    DRIVE_NEXT,
-    DRIVE_WAVES,
     FLOW_BASIS,
     FLOW_COUNT,
     FLOW_FORCED,
     FLOW_FREE,
+    FLOW_FROM,
     FLOW_RECORD,
     FLOW_STATE,
     FLOW_TERMS,
@@ -34,11 +30,10 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     MODES,
     MOTION,
-    PIECE,
     PIECE_NOW,
     PIECE_TERMS,
-    PIECES,
     PLACE,
+    PRESCRIBED,
     RATED,
     RESPONSE,
     ROW,
@@ -49,18 +44,17 @@ from multiphi_exudyn.events.arrays import (
     WAVE,
     WORK_WAVES,
 )
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.flat_basis import (
+from multiphi_exudyn.mathematics.basis_arrays import (
     POWERS,
     RATES,
     SCALES,
     SIZE,
     describe_basis,
     differentiate,
-    exponential_size,
     exponentials,
 )
-from multiphi_exudyn.mathematics.flat_response import (
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.response_arrays import (
     FREE,
     FROM_DISPLACEMENT,
     FROM_FORCE,
@@ -71,68 +65,7 @@ from multiphi_exudyn.mathematics.flat_response import (
     forced_response,
 )
 
-__all__ = ["expand", "keep_drive", "load_piece", "set_drive", "signal_sizes", "signal_waves", "state_at"]
-
-
-@compiled
-def load_piece(ints: Ints, waves: Waves) -> None:
-    """The terms of the present piece, as they are at its start, become those that hold now."""
-    piece, moved, q = ints[ints[PIECES] + ints[PIECE]], ints[DRIVE_WAVES], ints[CHANNELS]
-    ints[PIECE_NOW] = piece
-    for term in range(ints[piece + PIECE_TERMS]):
-        count, given = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
-        for k in range(count * q):
-            waves[moved + k] = waves[given + 1 + k]
-        moved += count * q
-
-
-@compiled
-def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float) -> None:
-    """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
-
-    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the
-    power of two above what is left: bases are shared among pieces of about the same length.
-    """
-    q, drive, moved, piece = ints[CHANNELS], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
-    numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])
-    ints[TERMS_NOW] = result
-    for k in range(6 * q):
-        numbers[drive + k] = 0.0
-    for term in range(ints[piece + PIECE_TERMS]):
-        count, rate = ints[piece + TERM_INTS + 2 * term], waves[ints[piece + TERM_INTS + 2 * term + 1]]
-        size, angle = exponential_size(rate.real * delay), rate.imag * delay
-        factor = complex(size * math.cos(angle), size * math.sin(angle))
-        for k in range(count * q):
-            waves[result + k] = waves[moved + k] * factor
-        for k in range(q):
-            for lowest in range(count - 1):
-                for d in range(count - 2, lowest - 1, -1):
-                    waves[result + d * q + k] += delay * waves[result + (d + 1) * q + k]
-            first = rate * waves[result + k]
-            second = rate * first
-            if count > 1:
-                first += waves[result + q + k]
-                second += 2.0 * rate * waves[result + q + k]
-            if count > 2:
-                second += 2.0 * waves[result + 2 * q + k]
-            numbers[drive + k] += waves[result + k].real
-            numbers[drive + q + k] += first.real
-            numbers[drive + 2 * q + k] += second.real
-            numbers[drive + 3 * q + k] += abs(waves[result + k])
-            numbers[drive + 4 * q + k] += abs(first)
-            numbers[drive + 5 * q + k] += abs(second)
-        moved += count * q
-        result += count * q
-
-
-@compiled
-def keep_drive(ints: Ints, waves: Waves) -> None:
-    """The terms of the instant become those that hold now."""
-    q, piece, count = ints[CHANNELS], ints[PIECE_NOW], 0
-    for term in range(ints[piece + PIECE_TERMS]):
-        count += ints[piece + TERM_INTS + 2 * term] * q
-    for k in range(count):
-        waves[ints[DRIVE_WAVES] + k] = waves[ints[DRIVE_NEXT] + k]
+__all__ = ["expand", "signal_sizes", "signal_waves", "state_at"]
 
 
 @compiled
@@ -141,8 +74,9 @@ def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     level, c, x, v = ints[state + LEVEL], ints[FLOW_WAVES], ints[state + PLACE], ints[state + SPEED]
     response, force = ints[level + RESPONSE], ints[level + FORCE]
     p = ints[ints[response + FREE] + SIZE]
+    ints[FLOW_FROM] = state
     ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_BASIS] = p, p, ints[response + FREE]
-    if ints[CHANNELS] > 0:
+    if ints[PRESCRIBED] > 0:
         r = ints[level + MODES]
         force_flow(ints, numbers, waves, state)
         coefficients_of(ints, numbers, waves, response, ints[FLOW_STATE], ints[FLOW_STATE] + r, force, c)
@@ -160,7 +94,7 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r), and of which sizes (2, r)
     they are the sums. Where there is no room for as many powers as a response takes, FORCED_WANTED says for how many.
     """
-    level, q, horizon = ints[state + LEVEL], ints[CHANNELS], numbers[HORIZON]
+    level, q, horizon = ints[state + LEVEL], ints[PRESCRIBED], numbers[HORIZON]
     r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
     own, record, most = ints[FLOW_STATE], ints[FLOW_RECORD], ints[FORCED_ROOM]
     basis = ints[FLOW_BASIS]
@@ -198,8 +132,8 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 @compiled
 def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int) -> None:
     """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
-    r, q, horizon, rate = ints[level + MODES], ints[CHANNELS], numbers[HORIZON], waves[carrier]
-    n, scale, scaled = r + q, 1.0, ints[SCALED_TERM]
+    r, q, horizon, rate = ints[level + MODES], ints[PRESCRIBED], numbers[HORIZON], waves[carrier]
+    n, scale, scaled = r + ints[CHANNELS], 1.0, ints[SCALED_TERM]
     for d in range(degree + 1):
         for k in range(q):
             waves[scaled + d * q + k] = waves[moved + d * q + k] * scale
@@ -228,7 +162,7 @@ def add_forced(
     count: int,
 ) -> None:
     """List the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
-    r, q, record, own = ints[level + MODES], ints[CHANNELS], ints[FLOW_RECORD], ints[FLOW_STATE]
+    r, q, record, own = ints[level + MODES], ints[PRESCRIBED], ints[FLOW_RECORD], ints[FLOW_STATE]
     n, rate = r + q, waves[carrier]
     for k in range(max(rows, degree + 1)):
         j = count + k
@@ -275,15 +209,16 @@ def size_driven_terms(ints: Ints, numbers: Numbers, waves: Waves, level: int) ->
 def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
     """Coefficients (p,) of a signal on the flow from a state, without its constant."""
     n, row, c = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_WAVES]
+    moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, rate = ints[FLOW_FREE], ints[FLOW_COUNT], ints[WORK_WAVES] + ints[FLOW_COUNT]
     for j in range(free):
         waves[result + j] = waves[ints[signal + WAVE] + j] * waves[c + j]
         waves[rate + j] = waves[ints[signal + WAVE] + free + j] * waves[c + j]
     for j in range(free, count):
-        forced = ints[FLOW_FORCED] + (j - free) * n
+        forced = ints[FLOW_FORCED] + (j - free) * moving
         value = 0j
         slope = 0j
-        for i in range(n):
+        for i in range(moving):
             value += numbers[row + i] * waves[forced + i]
             slope += numbers[row + n + i] * waves[forced + i]
         waves[result + j] = value
@@ -301,6 +236,7 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
     |row.V| |c| + |row'.V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
     """
     n, row, basis = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_BASIS]
+    moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
     for j in range(count):
         value = 0.0
@@ -308,10 +244,10 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
         if j < free:
             value, slope = abs(waves[ints[signal + WAVE] + j]), abs(waves[ints[signal + WAVE] + free + j])
         else:
-            forced = ints[FLOW_FORCED] + (j - free) * n
+            forced = ints[FLOW_FORCED] + (j - free) * moving
             whole = 0j
             changed = 0j
-            for i in range(n):
+            for i in range(moving):
                 whole += numbers[row + i] * waves[forced + i]
                 changed += numbers[row + n + i] * waves[forced + i]
             value, slope = abs(whole), abs(changed)
@@ -325,14 +261,14 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
 
 @compiled
 def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x: int, v: int) -> None:
-    """xi, xi' (n,) of the flow a time t after its state."""
+    """xi, xi' of the flow a time t after its state; held channels stay what they are."""
     r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
-    n, free, count, c = r + ints[CHANNELS], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
+    n, free, count, c = r + ints[PRESCRIBED], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
     phi, rate = ints[WORK_WAVES], ints[WORK_WAVES] + ints[FLOW_COUNT]
     exponentials(ints, numbers, waves, basis, t, t, phi)
     differentiate(ints, numbers, waves, basis, c, rate)
-    for i in range(n):
-        numbers[x + i] = 0.0
+    for i in range(r + ints[CHANNELS]):
+        numbers[x + i] = 0.0 if i < n else numbers[ints[ints[FLOW_FROM] + PLACE] + i]
         numbers[v + i] = 0.0
     for j in range(count):
         value, slope = waves[c + j] * waves[phi + j], waves[rate + j] * waves[phi + j]

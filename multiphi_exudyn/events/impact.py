@@ -2,6 +2,10 @@
 
     v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l                         (Moreau, restitution 0)
 
+Where others hang on the structure an impulse A^T p gives it B A^T p, B = F F^T the mobility that they leave it:
+
+    v+ = v- + F z,   z = argmin |z|,  A F z >= -A v-
+
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 """
 
@@ -16,17 +20,15 @@ from multiphi_exudyn.events.arrays import (
     CAUSED_BY,
     CHANGE,
     CHANNELS,
-    COORDINATES,
-    DIRECTIONS,
     ELEMENTS,
     FAILED,
     GAPS,
-    JOIN_NUMBERS,
     LEAST,
     LEAST_INTS,
     LEAST_NUMBERS,
     LEAST_SIZES,
     LEVEL,
+    MOBILITY,
     MODES,
     OK,
     PLACE,
@@ -38,15 +40,16 @@ from multiphi_exudyn.events.arrays import (
     STOP_WORK,
     UNSETTLED,
 )
-from multiphi_exudyn.events.flat_state import copy_state, kinetic, measure
+from multiphi_exudyn.events.energies import kinetic
+from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.flat_least_distance import EXCLUDED, UNDECIDED, flat_least_distance, norm
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.least_distance_arrays import EXCLUDED, UNDECIDED, norm, shortest_vector
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["RESTING", "collide", "fill_rows", "independent", "nearest", "resting_size", "speed_size", "unseen_speed"]
+__all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "resting_size", "speed_size", "unseen_speed"]
 
 RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
+IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
 
 
 @compiled
@@ -77,7 +80,9 @@ def nearest(
             terms += abs(numbers[row + i]) * abs(numbers[vector + i])
         numbers[ints[LEAST] + k] = -value
         numbers[ints[LEAST_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
-    answer = flat_least_distance(
+    if ints[level + MOBILITY] >= 0:
+        limit_rows(ints, numbers, level, count)
+    answer = shortest_vector(
         ints, numbers, ints[ROWS], n, ints[LEAST], ints[LEAST_SIZES], count, r, ints[CHANGE], multipliers,
         ints[LEAST_NUMBERS], ints[LEAST_INTS],
     )  # fmt: skip
@@ -91,7 +96,40 @@ def nearest(
     if answer == UNDECIDED:
         ints[CAUSE] = UNSETTLED
         return FAILED
+    if ints[level + MOBILITY] >= 0:
+        limit_change(ints, numbers, level)
     return OK
+
+
+@compiled
+def limit_rows(ints: Ints, numbers: Numbers, level: int, count: int) -> None:
+    """Rows (count, r) become rows F; of a contact that cannot move for what hangs on the structure nothing is asked."""
+    r, moved = ints[level + MODES], ints[CHANGE]
+    n = r + ints[CHANNELS]
+    for k in range(count):
+        row, before, left = ints[ROWS] + k * n, norm(numbers, ints[ROWS] + k * n, r), 0.0
+        for j in range(r):
+            numbers[moved + j] = 0.0
+            for i in range(r):
+                numbers[moved + j] += numbers[row + i] * numbers[ints[level + MOBILITY] + i * r + j]
+        left = norm(numbers, moved, r)
+        held = left * left <= IMMOVABLE * before * before
+        for j in range(r):
+            numbers[row + j] = 0.0 if held else numbers[moved + j]
+        if held:
+            numbers[ints[LEAST] + k] = 0.0
+
+
+@compiled
+def limit_change(ints: Ints, numbers: Numbers, level: int) -> None:
+    """The change z (r,) becomes F z."""
+    r, given = ints[level + MODES], ints[LEAST_NUMBERS]
+    for i in range(r):
+        numbers[given + i] = numbers[ints[CHANGE] + i]
+    for i in range(r):
+        numbers[ints[CHANGE] + i] = 0.0
+        for j in range(r):
+            numbers[ints[CHANGE] + i] += numbers[ints[level + MOBILITY] + i * r + j] * numbers[given + j]
 
 
 @compiled
@@ -106,7 +144,7 @@ def collide(
     impulses: int,
     losses: int,
 ) -> int:
-    """The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
+    """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
 
     held: the last so many contacts keep no speed away from their stop either. impulses: (count + held,) [N s].
     What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
@@ -172,31 +210,3 @@ def resting_size(numbers: Numbers, one: int, other: int, row: int, n: int) -> fl
     for i in range(n):
         total += abs(numbers[row + i]) * max(numbers[one + i], numbers[other + i])
     return total
-
-
-@compiled
-def independent(ints: Ints, numbers: Numbers, flags: int) -> int:
-    """1 where of the contacts with a flag (c,) none follows from the others, so that they can be closed together."""
-    m, found, smallest = ints[COORDINATES], 0, math.inf
-    q = ints[JOIN_NUMBERS]
-    for k in range(ints[ELEMENTS]):
-        if ints[flags + k] == 0:
-            continue
-        if found == m:
-            return 0
-        own = q + found * m
-        for i in range(m):
-            numbers[own + i] = numbers[ints[DIRECTIONS] + k * m + i]
-        for _ in range(2):
-            for b in range(found):
-                product = 0.0
-                for i in range(m):
-                    product += numbers[q + b * m + i] * numbers[own + i]
-                for i in range(m):
-                    numbers[own + i] -= product * numbers[q + b * m + i]
-        length = norm(numbers, own, m)
-        smallest = min(smallest, length)
-        for i in range(m):
-            numbers[own + i] /= length if length > 0.0 else 1.0
-        found += 1
-    return 1 if smallest > INDEPENDENT else 0

@@ -8,6 +8,11 @@ T is r x r and computed once for a pair of levels. A transition from an admissib
 only take energy out (for one physical M, K); what it took is truncation, kinetic and strain. Where truncation has left
 a gap that is not zero, the strain part can be negative; the ledger shows it.
 
+In the coordinates xi = (eta, w) channels stay what they are, but for places that links hold. Where a link begins to
+hold, q = h.x + gap - w becomes the stretch of the state before: w_m = A xi_l + a. Then
+
+    eta_m = Psi_m^T M (x_l - x_inf,m - R_m w_m)
+
 A rigid contact that closes is an impact first (Moreau, restitution 0), in the basis of a level where it is open:
 
     v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l
@@ -20,112 +25,98 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.levels.level import Asymptotic, Level
-from multiphi_exudyn.mathematics.least_distance import FOLLOWING, least_distance
-from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.level import Level
 
-__all__ = ["LoadedLevel", "Transition", "modal_projection", "nearest_admissible"]
+__all__ = ["Transition", "modal_projection"]
 
 UNMIXED = 1e-13  # product of two modes of unit length, below which they have no part in each other
 
 
 @dataclass(frozen=True)
-class LoadedLevel:
-    """A level under the static loads of one run: where its motion is centred, and its energies.
-
-    level, asymptotic: as there. gap_constants: gaps (c,) of all contacts at eta = 0.
-    """
-
-    level: Level
-    asymptotic: Asymptotic
-    gap_constants: np.ndarray
-
-    @classmethod
-    def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
-        """``level`` under a static load (m,) in base coordinates."""
-        rest = level.asymptotic(load)
-        magnitudes, initial = level.base.magnitudes
-        gaps = level.base.directions.T @ rest.configuration + level.base.gaps
-        terms = initial + np.abs(rest.configuration) @ magnitudes
-        held = ~np.any(level.gap_rows, axis=1)  # by the closed contacts, of which its gap is the sum
-        return cls(level, rest, drop_round_off(gaps, np.where(held, FOLLOWING / ZERO, 1.0) * terms))
-
-    @functools.cached_property
-    def entries(self) -> dict[Any, Any]:
-        """What is kept of the ways into this level, by what distinguishes them (truncation.py)."""
-        return {}
-
-    @functools.cached_property
-    def driven(self) -> bool:
-        """Whether a load drives zero-frequency modes."""
-        return bool(np.any(self.asymptotic.drive))
-
-    def strain(self, displacement: np.ndarray) -> np.ndarray:
-        """Strain energy [J] of the structure and of its closed compliant contacts, for (r,) or every column of (r, k).
-
-        1/2 sum omega^2 eta^2 + eta . (Phi^T f - drive) + strain(x_inf); of force laws as in ``Base.strain``
-        """
-        bent = self.asymptotic.load - self.asymptotic.drive
-        stretched = 0.5 * self.level.squares @ displacement**2
-        return np.asarray(stretched + bent @ displacement + self.asymptotic.strain)
-
-    def potential(self, displacement: np.ndarray) -> float:
-        """Strain energy less the potential f.x of the static load [J]."""
-        potential = 0.5 * float(self.level.squares.dot(displacement * displacement)) + self.asymptotic.potential
-        return potential - float(self.asymptotic.drive @ displacement) if self.driven else potential
-
-    def kinetic(self, velocity: np.ndarray) -> np.ndarray:
-        """Kinetic energy [J] of (r,) or of every column of (r, k)."""
-        return np.asarray(0.5 * (velocity * velocity).sum(axis=0))
-
-    def acceleration(self, displacement: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """eta'' (r,) from eta, eta' (38.3)."""
-        own = self.level
-        return self.asymptotic.drive - own.squares * displacement - own.damping @ velocity
-
-    def gap(self, contact: int, displacement: np.ndarray) -> float:
-        """Gap of a contact [m]."""
-        return float(self.level.gap_rows[contact] @ displacement + self.gap_constants[contact])
-
-    def configuration(self, displacement: np.ndarray) -> np.ndarray:
-        """y = Psi eta + y_inf in base coordinates, (m,) or (m, k)."""
-        return np.asarray((self.level.vectors @ displacement).T + self.asymptotic.configuration).T
-
-
-@dataclass(frozen=True)
 class Transition:
-    """The map of eq. (38.6) from level ``source`` to level ``target``."""
+    """The map of eq. (38.6) from level ``source`` to level ``target``, in the coordinates xi."""
 
     source: LoadedLevel
     target: LoadedLevel
 
     @functools.cached_property
     def matrix(self) -> np.ndarray:
-        """T (r_m, r_l)."""
-        return modal_projection(self.target.level, self.source.level)
+        """T = [[Psi_m^T Psi_l, Psi_m^T (R_l - R_m)], [0, 1]], where no place is set."""
+        whole, (rows, _) = self._map(self.source.channels.shapes, self._shapes), self._set
+        whole[: self._modes] -= self.target.modal.vectors.T @ self._shapes @ rows
+        whole[self._modes :] += rows
+        return whole
 
-    @property
+    @functools.cached_property
     def velocity_matrix(self) -> np.ndarray:
-        """The same for velocities."""
-        return self.matrix
+        """T' = [[Psi_m^T Psi_l, Psi_m^T (Y_l - Y_m)], [0, 1]]."""
+        return self._map(self.source.channels.carried, self.target.channels.carried)
 
     @functools.cached_property
     def offset(self) -> np.ndarray:
-        """c (r_m,)."""
-        jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
-        return self.target.level.vectors.T @ jump
+        """c (r_m + q,)."""
+        jump, (_, constants) = self.source.asymptotic.configuration - self.target.asymptotic.configuration, self._set
+        return np.concatenate([self.target.modal.vectors.T @ (jump - self._shapes @ constants), constants])
 
-    def displacement(self, eta: np.ndarray) -> np.ndarray:
-        """eta_m from eta_l."""
-        return self.matrix @ eta + self.offset
+    @property
+    def terms(self) -> np.ndarray | None:
+        """Of which terms T and c are the sums, where links have held places: what a mode has of a slow motion cancels.
 
-    def velocity(self, eta_t: np.ndarray) -> np.ndarray:
-        """eta'_m from eta'_l."""
-        return self.velocity_matrix @ eta_t
+        That is what a stiff link keeps of its stretch, and what the first accelerations of a slip are made of.
+        """
+        if self.source.excitation.channels == self.source.excitation.prescribed:
+            return None
+        rows, constants = np.abs(self._set[0]), np.abs(self._set[1])
+        source, r = self.source, self.source.modal.modes
+        ends = np.abs(source.asymptotic.configuration) + np.abs(self.target.asymptotic.configuration)
+        moved = np.column_stack([np.abs(source.level.vectors), ends])
+        moved[:, r:-1] += np.abs(self._shapes)
+        set_by = np.column_stack([rows, constants])
+        kept = np.eye(len(rows), len(set_by[0]), r)
+        return np.vstack([np.abs(self.target.modal.vectors.T) @ (moved + np.abs(self._shapes) @ set_by), set_by + kept])
+
+    @property
+    def _shapes(self) -> np.ndarray:
+        """R_m (m, q)."""
+        return self.target.channels.shapes
+
+    @property
+    def _modes(self) -> int:
+        return self.target.modal.modes
+
+    @functools.cached_property
+    def _set(self) -> tuple[np.ndarray, np.ndarray]:
+        """What is added to w: (q, r_l + q) times xi_l, and (q,): the excess of q over the stretch it is to have."""
+        source, excitation = self.source, self.source.excitation
+        rows, constants = np.zeros((excitation.channels, len(source.level.squares))), np.zeros(excitation.channels)
+        elements = source.level.base.contacts
+        places = [i for i, element in enumerate(elements) if element.held]
+        for k, i in enumerate(places, start=excitation.prescribed):
+            before = elements[i].states[source.states[i]]
+            if elements[i].states[self.target.states[i]].holds and not before.holds:
+                rows[k] = source.level.gap_rows[i]
+                constants[k] = source.gap_constants[i] - before.stretch
+        return rows, constants
+
+    def _map(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+        """[[Psi_m^T Psi_l, Psi_m^T (source - target)], [0, 1]]; source, target: (m, q)."""
+        own, before, q = self.target.modal, self.source.modal, source.shape[1]
+        mapped = np.eye(own.modes + q, before.modes + q, before.modes - own.modes)
+        mapped[: own.modes, : before.modes] = modal_projection(own, before)
+        mapped[: own.modes, before.modes :] = own.vectors.T @ (source - target)
+        return mapped
+
+    def displacement(self, xi: np.ndarray) -> np.ndarray:
+        """xi_m from xi_l."""
+        return self.matrix @ xi + self.offset
+
+    def velocity(self, xi_t: np.ndarray) -> np.ndarray:
+        """xi'_m from xi'_l."""
+        return self.velocity_matrix @ xi_t
 
 
 def modal_projection(target: Level, source: Level) -> np.ndarray:
@@ -136,20 +127,3 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     """
     products = target.vectors.T @ source.vectors
     return np.where(np.abs(products) <= UNMIXED, 0.0, products)
-
-
-def nearest_admissible(
-    rows: np.ndarray, vector: np.ndarray, free: int | None = None, sizes: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """(v+, p): the vector nearest to ``vector`` (r,) with rows v+ >= 0, and its multipliers p (k,) >= 0.
-
-    Both of Moreau's laws: velocities at an impact, accelerations of contacts that touch at rest. Only the first
-    ``free`` components change, all of them for None; the others are those of stops that move. sizes: (k,) of the terms
-    of rows v beside those of v itself, for what is round-off. Post-conditions and errors are those of least_distance.
-    """
-    free = len(vector) if free is None else free
-    terms = np.abs(rows) @ np.abs(vector) + (0.0 if sizes is None else sizes)
-    change, multipliers = least_distance(rows[:, :free], -(rows @ vector), terms)
-    after = vector.copy()
-    after[:free] += change
-    return after, multipliers

@@ -43,7 +43,8 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     squares, vectors = _turned(base, squares, vectors, damping)
     zero = squares == 0
     _check(base, squares, vectors, closed_directions, accuracy)
-    gap_rows = drop_round_off(base.directions.T @ vectors, base.magnitudes[0].T @ np.abs(vectors))
+    sizes = np.outer(np.linalg.norm(base.directions, axis=0), np.linalg.norm(vectors, axis=0))
+    gap_rows = drop_round_off(base.directions.T @ vectors, sizes)  # of a mode all components have round-off
     gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(

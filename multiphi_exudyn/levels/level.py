@@ -22,7 +22,6 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.static_response import static_response
-from multiphi_exudyn.mathematics.first_descent import DescentFinder
 from multiphi_exudyn.mathematics.free_response import ModalResponse, modal_response
 from multiphi_exudyn.mathematics.modes import NEAR
 from multiphi_exudyn.mathematics.round_off import ZERO
@@ -171,15 +170,6 @@ class Level:
     def response(self) -> ModalResponse:
         """Closed form of the level's motion."""
         return modal_response(self.squares, self.damping)
-
-    @functools.cached_property
-    def finder(self) -> DescentFinder:
-        """Certified event location on the level's exponentials."""
-        return DescentFinder(self.response.basis)
-
-    def forget_samples(self) -> None:
-        """Let go of the samples for event location, most of what a level takes; they are made again when needed."""
-        vars(self).pop("finder", None)
 
     def apart(self, modes: int) -> int | None:
         """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""

@@ -61,6 +61,11 @@ class ModalBase:
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
+    def modal_load(self, load: np.ndarray) -> np.ndarray:
+        """Phi^T f (m,) of a load (n,), zero where it is round-off: a weight bends no body that falls freely."""
+        shapes = self.modes.shapes.T
+        return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
+
     @functools.cached_property
     def gaps(self) -> np.ndarray:
         """Initial gaps (c,) [m]."""

@@ -17,8 +17,8 @@ from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.static_equilibrium import equilibrium, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.first_descent import TABLE_NUMBERS, TABLES
 from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -26,8 +26,7 @@ __all__ = ["MultiPhiModel"]
 
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
-RULES = 8  # static loads for which a model keeps what simulations have made of its levels
-SIGNAL_TABLES = 16  # kept of a level: sets of phases of its contacts; few come back
+LOADS = 8  # static loads for which a model keeps what simulations have made of its levels
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class MultiPhiModel:
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
     validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
     hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
-    rules: what simulations keep for later ones, by static load, at most ``RULES``.
+    loaded: levels under static loads, kept by load for later simulations, at most ``LOADS``.
 
     Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
     asked for, to the bit. Where a number of modes, or a cut-off, would part modes of one frequency, a level keeps all
@@ -57,8 +56,8 @@ class MultiPhiModel:
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-    rules: BoundedCache[bytes, Any] = field(
-        init=False, default_factory=lambda: BoundedCache(RULES), repr=False, compare=False
+    loaded: BoundedCache[bytes, Any] = field(
+        init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
     )
     _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
 
@@ -119,11 +118,39 @@ class MultiPhiModel:
                 sides.setdefault((contact.law, contact.side), []).append(i)
         return tuple(map(tuple, sides.values()))
 
+    @functools.cached_property
+    def general(self) -> bool:
+        """Whether there are elements that are no contacts: with other states than open and closed."""
+        return any(not isinstance(contact, (UnilateralContact, LawSpring)) for contact in self.contacts)
+
+    def need_contacts(self, what: str) -> None:
+        """Refuse other elements where they are not provided for."""
+        others = [c.name for c in self.contacts if not isinstance(c, (UnilateralContact, LawSpring))]
+        if others:
+            raise MultiPhiValueError(
+                f"{what}: got the elements {', '.join(others)}, need contacts and force laws alone"
+            )
+
+    @functools.cached_property
+    def held(self) -> tuple[int, ...]:
+        """Positions of the elements whose link has a held place, one channel each."""
+        return tuple(i for i, contact in enumerate(self.contacts) if contact.held)
+
+    def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
+        """Positions of the links that hold where the elements are in these states: they name the modes."""
+        given = zip(self.contacts, states, strict=True)
+        return tuple(i for i, (contact, state) in enumerate(given) if contact.states[state].holds)
+
+    def push(self, states: Sequence[int]) -> np.ndarray:
+        """Load (m,) of the constant forces of elements in these states."""
+        given = zip(self.contacts, states, strict=True)
+        return np.asarray(self.base.directions @ [contact.states[state].push for contact, state in given])
+
     @property
     def levels_possible(self) -> int:
         """Number of levels: 2 for every contact times the segments of every law."""
-        plain = len(self.contacts) - sum(map(len, self.chains))
-        return 2**plain * math.prod(law.levels for law in self.force_laws)
+        single = (len(c.states) for c in self.contacts if not isinstance(c, LawSpring))
+        return math.prod(single) * math.prod(law.levels for law in self.force_laws)
 
     @property
     def directions(self) -> int:
@@ -199,7 +226,7 @@ class MultiPhiModel:
     def _most_kept(self, r: int) -> int:
         """Number of levels with r modes that ``CACHE_BYTES`` hold."""
         m, c = self._shared_base().modes.count, len(self.contacts)
-        of_a_mode = m + 20 * r + 2 * c + TABLES * TABLE_NUMBERS + 2 * SIGNAL_TABLES * c
+        of_a_mode = m + 30 * r + 2 * c
         return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
 
     @functools.cached_property
@@ -208,9 +235,8 @@ class MultiPhiModel:
 
     def _forget(self, indices: tuple[int, ...], level: Level) -> None:
         """What is made of a level goes with it; a trajectory may still hold the level itself."""
-        level.forget_samples()
-        for _, rule in self.rules.items():
-            rule.forget(indices)
+        for _, loaded in self.loaded.items():
+            loaded.forget(indices)
 
     def index(self, name: str) -> int:
         """Position of a contact."""
@@ -220,11 +246,28 @@ class MultiPhiModel:
         known = ", ".join(contact.name for contact in self.contacts) or "none"
         raise MultiPhiValueError(f"contact: got {name!r}, need one of: {known}")
 
-    def level(self, closed: Iterable[str] = ()) -> Level:
-        """The level with these contacts closed, built on first use."""
+    def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
+        """The level with these contacts closed, or with elements in these states, built on first use.
+
+        {name: state}: the others are in their first state, contacts open. States that differ by constant forces alone
+        have one level.
+        """
+        if isinstance(closed, Mapping):
+            return self.level_at(self.links_held(self._states(closed)))
         if isinstance(closed, str) or not isinstance(closed, Iterable):
-            raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names")
+            raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names, or {{name: state}}")
         return self.level_at(tuple(sorted({self.index(name) for name in closed})))
+
+    def _states(self, given: Mapping[str, str]) -> tuple[int, ...]:
+        """Numbers of the states of all elements."""
+        states = [0] * len(self.contacts)
+        for name, state in given.items():
+            i = self.index(name)
+            known = [own.name for own in self.contacts[i].states]
+            if state not in known:
+                raise MultiPhiValueError(f"state of {name!r}: got {state!r}, need one of: {', '.join(known)}")
+            states[i] = known.index(state)
+        return tuple(states)
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
         """The level of closed contacts given by ascending positions."""
@@ -262,6 +305,7 @@ class MultiPhiModel:
         equilibrium that is reached when the forces are applied slowly (static_equilibrium.py). Needs a structure
         without rigid-body modes. Raises NumericalFailure where force laws let the structure snap through on the way.
         """
+        self.need_contacts("static equilibrium")
         base = self.base
         if base.modes.rigid:
             raise MultiPhiValueError(
@@ -320,7 +364,7 @@ def _contacts(given: Any) -> tuple[Contact, ...]:
         raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
     items = tuple(given)
     for item in items:
-        if not isinstance(item, (UnilateralContact, ForceLaw, LawSpring)):
+        if not isinstance(item, (Element, ForceLaw)):
             raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
     return expanded(items)
 

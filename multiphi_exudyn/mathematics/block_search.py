@@ -6,8 +6,8 @@ in doubt is divided signal by signal (suspect.py).
 
 from __future__ import annotations
 
+from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.flat_basis import POWERS, SCALES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, INTERVALS, LIFTED, round_off
 from multiphi_exudyn.mathematics.suspect import (
     DESCENT,

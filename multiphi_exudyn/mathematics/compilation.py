@@ -1,8 +1,8 @@
 """Functions on flat buffers compiled by numba, each by itself.
 
 numba links and optimises a function again in every one that calls it: 60 functions of 20 lines that call one another
-take minutes. Each by itself, calling the others by their symbols, they take 0.3 s each, nearly all of it numba's
-reading of Python; and as none needs another one to be compiled before, processes can share them out.
+take minutes. Each by itself, calling the others by their symbols, they take 0.1 s each, most of it numba's reading of
+Python; and as none needs another one to be compiled before, processes can share them out.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numba
 from numba.core.registry import cpu_target
 from tqdm import tqdm
 
-from multiphi_exudyn.mathematics.flat_function import (
+from multiphi_exudyn.mathematics.buffer_function import (
     Ints,
     Numbers,
     Waves,
@@ -46,7 +46,7 @@ KINDS = {
     NoneType: numba.types.void,
 }
 NEVER_CALLED = 1  # numba wants an address for a function that it will not run
-START, EACH_FUNCTION, EACH_LINE = 1.5, 0.05, 0.011  # s, on one core of 2020
+START, EACH_FUNCTION, EACH_LINE = 2.0, 0.025, 0.005  # s, on one core of 2020 that has nothing else to do
 WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
 MOST_PROCESSES = 4  # of some 250 MB each
 ANSWER = "from multiphi_exudyn.mathematics.compilation import answer; answer()"

@@ -8,12 +8,13 @@ compiled is kept on disk, and loaded from there without numba. Where numba is mi
 from __future__ import annotations
 
 import ctypes
+import functools
 import importlib.util
 import sys
 import threading
 import warnings
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from types import FunctionType, NoneType
 from typing import Any
@@ -21,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
-from multiphi_exudyn.mathematics.compiled_cache import cache_file, keep, kept, writable_folder
-from multiphi_exudyn.mathematics.flat_function import (
+from multiphi_exudyn.mathematics.buffer_function import (
     Ints,
     Numbers,
     Waves,
@@ -32,6 +32,7 @@ from multiphi_exudyn.mathematics.flat_function import (
     signature,
     symbol,
 )
+from multiphi_exudyn.mathematics.compiled_cache import cache_file, keep, kept, writable_folder
 
 __all__ = ["Entry", "Ints", "Numbers", "Waves", "available", "compile_entries", "compiled", "entry"]
 
@@ -76,6 +77,19 @@ class Entry:
         except ctypes.ArgumentError as error:
             raise MultiPhiTypeError(f"{self.function.__qualname__}: {error}") from error
 
+    def bound(self, *buffers: np.ndarray) -> Callable[..., Any]:
+        """The function with its first arguments fixed, at half the cost of a call; the caller keeps the buffers."""
+        native: Any = self.native()
+        if native is self.function:
+            return functools.partial(native, *buffers)
+        arguments, result = signature(self.function)
+        kinds = [ctypes.c_void_p if kind in TYPES else SCALARS[kind] for kind in arguments]
+        address = ctypes.cast(native, ctypes.c_void_p).value or 0
+        given = [kind.from_param(buffer) for kind, buffer in zip(native.argtypes, buffers, strict=False)]
+        function: Any = ctypes.CFUNCTYPE(SCALARS[result], *kinds)(address)
+        function.entry = self  # which keeps the machine code
+        return functools.partial(function, *given)
+
     def native(self) -> Callable[..., Any]:
         """The function as ctypes calls it, made at the first call; the plain one without numba."""
         with _one_at_a_time:
@@ -102,16 +116,34 @@ class Entry:
 
 
 def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
-    """The object files of functions, from the disk as far as they are kept there."""
+    """The object files of functions, from the disk or made anew."""
+    digests = _digests(functions)
+    objects = kept(digests)
+    if len(objects) < len(digests):
+        complete = _completed(functions)
+        objects = {name: complete[name] for name in digests}
+    return list(objects.values())
+
+
+def _completed(functions: Sequence[FunctionType]) -> dict[str, bytes]:
+    """The object files of all that functions and entries need; those that were not kept are compiled, and kept.
+
+    A run needs most of them, and many are shared out among processes better than a few.
+    """
+    needed = dict.fromkeys([*functions, *(each for one in _entries for each in reached(one.function))])
+    digests = _digests(needed)
+    known = kept(digests)
+    missing = [function for function in needed if symbol(function) not in known]
+    made = dict(zip(map(symbol, missing), _compile(missing), strict=True))
+    keep({name: (digests[name], code) for name, code in made.items()})
+    return known | made
+
+
+def _digests(functions: Collection[FunctionType]) -> dict[str, str]:
+    """Digests of functions by their symbols."""
     digests = {symbol(function): digest(function) for function in functions}
     assert len(digests) == len(functions), "two functions of one name"
-    objects = kept(digests)
-    missing = [function for function in functions if symbol(function) not in objects]
-    if missing:
-        made = dict(zip(map(symbol, missing), _compile(missing), strict=True))
-        keep({name: (digests[name], code) for name, code in made.items()})
-        objects |= made
-    return list(objects.values())
+    return digests
 
 
 def _compile(functions: Sequence[FunctionType]) -> list[bytes]:

@@ -55,11 +55,6 @@ class Exponentials:
             result[..., chained - 1] += self.powers[chained] / self.unit * coefficients[..., chained]
         return result
 
-    @functools.cached_property
-    def bounding(self) -> Exponentials:
-        """Growing exponentials of the rates' sizes: what the derivatives at t = 0 of terms without their signs are."""
-        return Exponentials(np.abs(self.rates), self.powers, self.unit)
-
     def integrals(self, duration: float) -> np.ndarray:
         """Integral of every phi_j over [0, duration], (p,)."""
         return exponential_integrals(self.rates, self.powers, duration, self.unit)

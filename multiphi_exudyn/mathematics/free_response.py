@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.exponentials import Exponentials, exponential_integrals
+from multiphi_exudyn.mathematics.exponentials import Exponentials
 
 __all__ = ["ModalResponse", "modal_response"]
 
@@ -75,20 +75,6 @@ class ModalResponse:
         """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), where every power is zero."""
         both = np.vstack([self.shapes, self.shapes * self.basis.rates])
         return np.stack([both.real, -both.imag], axis=2).reshape(both.shape[0], 2 * both.shape[1])
-
-    def dissipated(self, coefficients: np.ndarray, damping: np.ndarray, duration: float) -> float:
-        """Work of damping, the integral of eta'^T D eta' over [0, duration], for the motion with these c (p,).
-
-        Re u Re v = Re (u v + u conj(v)) / 2 turns it into integrals of single exponentials.
-        """
-        velocity = self.shapes * self.basis.derivative(coefficients)
-        rates, powers, unit = self.basis.rates, self.basis.powers, self.basis.unit
-        degrees = powers[:, None] + powers[None, :]
-        same = velocity.T @ damping @ velocity
-        crossed = velocity.T @ damping @ velocity.conj()
-        total = same * exponential_integrals(rates[:, None] + rates[None, :], degrees, duration, unit)
-        total += crossed * exponential_integrals(rates[:, None] + rates[None, :].conj(), degrees, duration, unit)
-        return 0.5 * float(np.sum(total.real))
 
 
 def modal_response(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:

@@ -104,12 +104,15 @@ def _entered(
 
 
 def _split(units: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(shares of ``units`` in a row, what is left of it beside them); nothing is left of one that follows from them."""
+    """(shares of ``units`` in a row, what is left of it beside them); nothing is left of one that follows from them.
+
+    It does where they are as many as unknowns, whatever the round-off that nearly parallel ones leave.
+    """
     if not len(units):
         return np.zeros(0), row
     taken = np.linalg.lstsq(units.T, row, rcond=None)[0]
     left = row - taken @ units
-    return taken, left if np.linalg.norm(left) > INDEPENDENT else np.zeros_like(row)
+    return taken, left if len(units) < len(row) and np.linalg.norm(left) > INDEPENDENT else np.zeros_like(row)
 
 
 def _meeting(units: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

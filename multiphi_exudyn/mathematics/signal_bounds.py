@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.flat_basis import (
+from multiphi_exudyn.mathematics.basis_arrays import (
     POWERS,
     RATES,
     SCALES,
@@ -18,6 +17,7 @@ from multiphi_exudyn.mathematics.flat_basis import (
     exponential_size,
     magnitude,
 )
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""A suspect: the one signal whose interval is in doubt, divided until it is decided, on flat buffers (root_search.py).
+"""A suspect: the one signal whose interval is in doubt, divided until it is decided, on flat buffers.
 
     g(t) = constant + Re sum_j a_j phi_j(t),   max|g^(k)| <= bound_k, k = 0 ... 6
 
@@ -13,8 +13,8 @@ Its coefficients and those of its derivatives, (5, p), are the ``rows`` in the w
 
 from __future__ import annotations
 
+from multiphi_exudyn.mathematics.basis_arrays import SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.flat_basis import SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, LIFTED, round_off
 

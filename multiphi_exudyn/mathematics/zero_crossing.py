@@ -1,9 +1,9 @@
-"""First descent of signals through zero in flat buffers, certified: first_descent.py and root_search.py, for the loop.
+"""First descent of signals through zero, certified: no crossing is stepped over; on flat buffers.
 
     g(t) = constant + Re sum_j a_j phi_j(t),   wanted: the first t in (start, horizon] with g falling below 0
 
-s signals on one basis (flat_basis.py): a (s, p) in the waves, constants (s,) and noise (s,) in the numbers. Between two
-samples a distance h apart g differs from its cubic Hermite interpolant by at most h^4/384 max|g^(4)|, and
+s signals on one basis (basis_arrays.py): a (s, p) in the waves, constants (s,) and noise (s,) in the numbers. Between
+two samples a distance h apart g differs from its cubic Hermite interpolant by at most h^4/384 max|g^(4)|, and
 max|g^(k)| <= sum_j |a_j^(k)| (t/T)^d_j exp(Re lambda_j t). A cubic lies above the smallest of its Bernstein
 coefficients:
 
@@ -21,9 +21,7 @@ from __future__ import annotations
 
 import math
 
-from multiphi_exudyn.mathematics.block_search import LOCAL, NONE, descent_in_block
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.flat_basis import (
+from multiphi_exudyn.mathematics.basis_arrays import (
     ETERNAL,
     POWERS,
     PURE,
@@ -34,6 +32,8 @@ from multiphi_exudyn.mathematics.flat_basis import (
     exponentials,
     magnitude,
 )
+from multiphi_exudyn.mathematics.block_search import LOCAL, NONE, descent_in_block
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mathematics.signal_bounds import (
     BOUNDING,

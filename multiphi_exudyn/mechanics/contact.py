@@ -18,10 +18,11 @@ h = -e_c; two bodies facing each other have one coefficient each.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.element import ElementState, contact_states
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["UnilateralContact"]
@@ -45,15 +46,16 @@ class UnilateralContact:
     gap: float
     stiffness: float = math.inf
     damping: float = 0.0
+    held: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"contact name: got {self.name!r}, need a non-empty string")
-        for field in ("gap", "stiffness", "damping"):
-            value = getattr(self, field)
+        for name in ("gap", "stiffness", "damping"):
+            value = getattr(self, name)
             if not is_real(value):
-                raise MultiPhiTypeError(f"contact {self.name!r} {field}: got {value!r}, need a number")
-            object.__setattr__(self, field, float(value))
+                raise MultiPhiTypeError(f"contact {self.name!r} {name}: got {value!r}, need a number")
+            object.__setattr__(self, name, float(value))
         if not math.isfinite(self.gap):
             raise MultiPhiValueError(f"contact {self.name!r} gap: got {self.gap!r}, need a finite distance")
         if not self.stiffness > 0:
@@ -69,3 +71,16 @@ class UnilateralContact:
     def rigid(self) -> bool:
         """True for an infinite stiffness."""
         return math.isinf(self.stiffness)
+
+    @property
+    def states(self) -> tuple[ElementState, ...]:
+        """Open and closed (element.py)."""
+        return contact_states(self.rigid, self.damping > 0)
+
+    def first_state(self, gap: float, rate: float) -> str:
+        """The state in which a run starts that begins with a gap [m], zero where it is round-off, and its rate [m/s].
+
+        A rigid contact starts open, and closes at once where it is pressed on; a viscous one never pulls.
+        """
+        pulls = self.damping > 0 and self.stiffness * gap + self.damping * rate > 0
+        return "open" if gap >= 0 or self.rigid or pulls else "closed"

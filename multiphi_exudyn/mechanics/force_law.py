@@ -27,7 +27,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.element import Element, ElementState, contact_states
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Contact", "ForceLaw", "Given", "LawSpring", "expanded"]
@@ -235,10 +235,20 @@ class LawSpring:
     side: int
     rigid: bool = field(default=False, init=False)
     damping: float = field(default=0.0, init=False)
+    held: bool = field(default=False, init=False, repr=False)
+
+    @property
+    def states(self) -> tuple[ElementState, ...]:
+        """Open and closed (element.py)."""
+        return contact_states(rigid=False, viscous=False)
+
+    def first_state(self, gap: float, rate: float) -> str:
+        """The state in which a run starts that begins with a gap [m]."""
+        return "open" if gap >= 0 else "closed"
 
 
-Contact: TypeAlias = UnilateralContact | LawSpring
-Given: TypeAlias = Any  # UnilateralContact or ForceLaw when it is given, Contact once it is expanded
+Contact: TypeAlias = Element  # a UnilateralContact, a LawSpring, or another one by its states
+Given: TypeAlias = Any  # an Element or a ForceLaw when it is given, a Contact once it is expanded
 
 
 def expanded(given: Sequence[Given]) -> tuple[Contact, ...]:

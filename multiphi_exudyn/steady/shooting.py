@@ -22,7 +22,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.simulate import quiet
+from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["ATTRACTS", "PeriodMap", "Shooting"]
@@ -47,7 +47,7 @@ class PeriodMap:
 
     def run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
         """From x, x' (n,) over some periods."""
-        return quiet(self.model, periods * self.period, x, v, self.loads)
+        return Run(self.model, periods * self.period, x, v, self.loads).trajectory()
 
     def states(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
         """q (2 m, k) of x, x' (n, k)."""

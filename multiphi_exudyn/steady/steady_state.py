@@ -294,6 +294,7 @@ def _course(load: PeriodicLoad) -> Harmonic:
 def _check(
     model: MultiPhiModel, load: PeriodicLoad, other_loads: Sequence[StaticLoad], periods: int, tolerance: float
 ) -> None:
+    model.need_contacts("steady state")
     if isinstance(model.modes, Tolerance) and model.decided is None:
         raise MultiPhiValueError(
             "model modes: got a Tolerance that has not decided yet, need a run of simulate first, a number or 'all'"

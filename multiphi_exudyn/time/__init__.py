@@ -1,9 +1,9 @@
 """Time: runs from event to event, and the trajectories they leave; there is no time step.
 
-A motion advances a state, segment by segment, in NumPy or in the loop on flat arrays, compiled or plain, under constant
-loads or driven by what varies in time. A trajectory keeps its segments; what its truncated modes
-could not hold, and what to distrust in it, is read off it.
+A motion advances a state, segment by segment, in the loop on flat arrays, compiled or plain, under loads that are
+constant or vary in time. A record keeps what the loop has done; a trajectory samples it and sums its works by the
+loop's own flow. What its truncated modes could not hold, and what to distrust in it, is read off it.
 
-Order: warning_groups, segment, record, trajectory, defects, truncation, loop, motion, driven, loop_motion,
-reliability, simulate.
+Order: warning_groups, flow, quadrature, segment, sampling, work, growing, record, trajectory, defects, truncation,
+chatter, loop_record, loop, going_on, motion, refinement, reliability, simulate.
 """

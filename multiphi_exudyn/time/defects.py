@@ -17,16 +17,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
-from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.time.segment import Batch, batches
+from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Defect", "DefectHistory", "defects"]
@@ -48,57 +47,47 @@ class Defect:
 def defects(trajectory: Trajectory) -> list[Defect]:
     """The defect of the start, of every transition to another level and of every impact, in order of time."""
     history = DefectHistory.of(trajectory)
-    starts, sizes = history.starts.tolist(), np.sqrt(history.squares).tolist()
-    return [Defect(starts[k], history.levels[k].level.closed, sizes[k]) for k in history.places]
+    segments, sizes = history.segments, np.sqrt(history.squares).tolist()
+    closed = [segments.levels[number].level.closed for number in segments.numbers[history.places].tolist()]
+    starts = segments.starts[history.places].tolist()
+    return [Defect(*given) for given in zip(starts, closed, sizes, strict=True)]
 
 
 @dataclass(frozen=True)
 class DefectHistory:
     """The defects of a run in arrays.
 
-    parts: the run's segments. table: its events, as ``event_table`` has them. starts: (s,) [s], levels: of every
-    segment. places: of the segments that begin with a defect. squares: (s,) its |.|^2 [m2 kg], else zero. samples:
-    level, eta and eta' (r, k) at times evenly spaced over [0, end].
+    segments: of the run. table: its events, as ``event_table`` has them. places: (k,) of the segments that begin with
+    a defect. squares: (k,) its |.|^2 [m2 kg]. samples: level, eta and eta' (r, k) at times evenly spaced over [0, end].
     """
 
     end: float
-    parts: list[Batch]
+    segments: Segments
     table: np.ndarray
-    starts: np.ndarray
-    levels: list[LoadedLevel]
-    places: list[int]
+    places: np.ndarray
     squares: np.ndarray
     samples: list[Sample]
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> DefectHistory:
         """Of a run with segments."""
-        parts, count = batches(trajectory.segments), len(trajectory.segments)
+        segments, end = listed(trajectory.segments), trajectory.t_end
         table = event_table(trajectory.events, trajectory.model.index)
-        starts, squares, levels = np.empty(count), np.zeros(count), [parts[0].level] * count
-        first, last = np.zeros((2, 2, count, max(len(part.shapes) for part in parts)))
-        for part in parts:
-            starts[part.places] = part.starts
-            for place in part.places.tolist():
-                levels[place] = part.level
-        times = np.linspace(0.0, trajectory.t_end, SAMPLES)
-        owners, samples = np.searchsorted(starts, times, side="right") - 1, list[Sample]()
-        for part in parts:
-            k, r, (rows, own) = len(part.places), len(part.shapes), _rows(part, owners)
-            every = np.arange(k)
-            after = np.concatenate([np.zeros(k), part.ends - part.starts, times[own] - part.starts[rows]])
-            states = part.states(np.concatenate([every, every, rows]), after)
-            first[:, part.places, :r], last[:, part.places, :r] = states[:, :k], states[:, k : 2 * k]
-            samples.append((part.level, states[0, 2 * k :].T, states[1, 2 * k :].T))
-        stopped = _stopped(table, starts)
-        squares[0] = _at_start(trajectory, levels[0], stopped.get(0, ()), first[:, 0])
-        ways = _ways(levels, stopped)
-        for (_, _, struck), found in ways.items():
-            entered = np.array(found)
-            way = _way(levels[found[0] - 1], levels[found[0]], struck)
-            squares[entered] = way.squares(last[:, entered - 1], first[:, entered])
-        places = sorted([0, *(place for found in ways.values() for place in found)])
-        return cls(trajectory.t_end, parts, table, starts, levels, places, squares, samples)
+        stopped = _stopped(table, segments.starts)
+        ways = _ways(segments.numbers, stopped)
+        entered = np.array([0, *sorted(itertools.chain(*ways.values()))])
+        left, times = entered[1:] - 1, np.linspace(trajectory.start.time, end, SAMPLES)
+        owners, k = segments.owners(times), len(entered)
+        after = np.zeros(k), segments.ends[left] - segments.starts[left], times - segments.starts[owners]
+        states = segments.states(np.concatenate([entered, left, owners]), np.concatenate(after))
+        first, last, sampled = states[:, :k], states[:, k : 2 * k - 1], states[:, 2 * k - 1 :]
+        squares = np.empty(k)
+        squares[0] = _at_start(trajectory, segments.levels[segments.numbers[0]], stopped.get(0, ()), first[:, 0])
+        for (before, after_it, struck), places in ways.items():
+            rows = np.searchsorted(entered, places)
+            way = _way(segments.levels[before], segments.levels[after_it], struck)
+            squares[rows] = way.squares(last[:, rows - 1], first[:, rows])
+        return cls(end, segments, table, entered, squares, _by_level(segments, owners, sampled))
 
     @property
     def largest_energy(self) -> float:
@@ -108,27 +97,37 @@ class DefectHistory:
 
     def indicator(self, end: float) -> float:
         """The truncation indicator of [0, end] (truncation.py)."""
-        lost = float(np.sum(self.squares[self.starts <= end]))
-        samples = self.samples if end == self.end else self._sampled(end)
-        amplitude = math.sqrt(sum(float(np.sum(level.configuration(eta) ** 2)) for level, eta, _ in samples) / SAMPLES)
+        lost = float(np.sum(self.squares[self.segments.starts[self.places] <= end]))
+        samples = self.samples if end == self.end else _samples(self.segments, end)
+        amplitude = math.sqrt(sum(_square(level, eta) for level, eta, _ in samples) / SAMPLES)
         if amplitude == 0:
             return math.inf if lost else 0.0
         return math.sqrt(lost) / amplitude
 
-    def _sampled(self, end: float) -> Iterator[Sample]:
-        times = np.linspace(0.0, end, SAMPLES)
-        owners = np.searchsorted(self.starts, times, side="right") - 1
-        for part in self.parts:
-            rows, own = _rows(part, owners)
-            eta, eta_t = part.states(rows, times[own] - part.starts[rows])
-            yield part.level, eta.T, eta_t.T
+
+def _samples(segments: Segments, end: float) -> list[Sample]:
+    """The motion at times evenly spaced up to ``end`` [s]."""
+    times = np.linspace(segments.starts[0], end, SAMPLES)
+    owners = segments.owners(times)
+    return _by_level(segments, owners, segments.states(owners, times - segments.starts[owners]))
 
 
-def _rows(part: Batch, owners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the segments (k,) by their places are in a batch: their rows in it (j,), and whether they are (k,)."""
-    rows = np.minimum(np.searchsorted(part.places, owners), len(part.places) - 1)
-    own = part.places[rows] == owners
-    return rows[own], own
+def _square(level: LoadedLevel, eta: np.ndarray) -> float:
+    """Sum of |y|^2 over the columns of eta (r, k), by a factor that the level keeps."""
+    if "place" not in level.entries:
+        level.entries["place"] = _factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
+    factor: np.ndarray = level.entries["place"]
+    return float(np.sum((factor[:, :-1] @ eta + factor[:, -1:]) ** 2))
+
+
+def _by_level(segments: Segments, owners: np.ndarray, states: np.ndarray) -> list[Sample]:
+    """States (2, k, n) of the segments ``owners`` (k,), level by level."""
+    numbers, samples = segments.numbers[owners], list[Sample]()
+    for number in dict.fromkeys(numbers.tolist()):
+        level = segments.levels[number]
+        eta, eta_t = states[:, numbers == number, : level.level.modes]
+        samples.append((level, eta.T, eta_t.T))
+    return samples
 
 
 @dataclass(frozen=True)
@@ -152,8 +151,8 @@ class _Way:
 
 
 def _way(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...]) -> _Way:
-    """The maps into a level, which keeps them: under one load a level has one neighbour with given closed contacts."""
-    key = before.level.indices, stopped
+    """The maps into a level, which keeps them: under one load a level has one neighbour with given states."""
+    key = before.states, stopped
     if key not in after.entries:
         base, source, target = after.level.base, before.level.vectors, after.level.vectors
         jump = before.asymptotic.configuration - after.asymptotic.configuration
@@ -173,7 +172,7 @@ def _factor(rows: np.ndarray) -> np.ndarray:
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:
     """|defect|^2 of the start, whose first state is (2, >= r)."""
-    base, held, r = level.level.base, _held(level), level.level.vectors.shape[1]
+    base, held, r = level.level.base, _held(level), level.level.modes
     given = trajectory.start
     d = _allowed(base, held, given.displacement - level.configuration(state[0, :r]))
     v = _allowed(base, held | set(stopped), given.velocity - level.level.vectors @ state[1, :r])
@@ -212,12 +211,18 @@ def _stopped(table: np.ndarray, starts: np.ndarray) -> dict[int, tuple[int, ...]
 
 
 def _ways(
-    levels: list[LoadedLevel], stopped: dict[int, tuple[int, ...]]
+    numbers: np.ndarray, stopped: dict[int, tuple[int, ...]]
 ) -> dict[tuple[int, int, tuple[int, ...]], list[int]]:
-    """Places of the segments that begin in another level or after an impact, by their levels and who was stopped."""
+    """Places of the segments that begin in another level or after an impact, by their levels and who was stopped.
+
+    numbers: (n,) of the levels of all segments.
+    """
     ways: dict[tuple[int, int, tuple[int, ...]], list[int]] = {}
-    known = list(map(id, levels))
-    for place, (before, after) in enumerate(itertools.pairwise(known), start=1):
-        if before != after or place in stopped:
-            ways.setdefault((before, after, stopped.get(place, ())), []).append(place)
+    begins = np.append(False, numbers[1:] != numbers[:-1])
+    begins[[place for place in stopped if place > 0]] = True
+    entered = np.flatnonzero(begins)
+    for place, before, after in zip(
+        entered.tolist(), numbers[entered - 1].tolist(), numbers[entered].tolist(), strict=True
+    ):
+        ways.setdefault((before, after, stopped.get(place, ())), []).append(place)
     return ways

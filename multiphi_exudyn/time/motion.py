@@ -1,58 +1,144 @@
-"""Motion: a run under way, from event to event.
+"""Motion: a run under way, which the loop on flat arrays (loop.py) carries from event to event.
 
-Within a level the motion is a sum of exponentials; the next event is the certified first root of a few of them
-(first_descent.py); the event rule (events/rule.py) gives the state that follows. A failure on the way ends the run
-early, with its cause.
+It has q >= 0 channels, pieces of which may follow while it goes on. A failure on the way ends it early, with its cause.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+import math
+import weakref
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
-from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.state import Change, Event, Loss, Phase, State
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.segment import Segment
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
+from multiphi_exudyn.events.state import Loss, State
+from multiphi_exudyn.events.state_arrays import measure
+from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.time.chatter import allowed, window
+from multiphi_exudyn.time.loop import advance
+from multiphi_exudyn.time.loop_record import ACCUMULATED
+from multiphi_exudyn.time.record import PHASES, Record
 from multiphi_exudyn.time.trajectory import Start, Statistics, Trajectory
 
-__all__ = ["Motion"]
+__all__ = ["NUMBERS", "Motion", "carry", "measured"]
 
-EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
-CHATTER_WINDOW = 200  # events, for every contact
-ACCUMULATED = 1e-6  # of the time so far: CHATTER_WINDOW events within it are chatter, also where no mode oscillates
+NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
+
+carry, measured = entry(advance), entry(measure)
 
 
 @dataclass
+class _Kept:
+    """What a run keeps while another one has the arrays.
+
+    ring: of the chatter check, with what it is about. piece, age: which of the channels, and since when [s] it lasts.
+    work [J]: of what varies in time since the last segment ended.
+    """
+
+    ring: np.ndarray
+    decisions: int = 0
+    last_decision: float = 0.0
+    piece: int = 0
+    age: float = 0.0
+    work: float = 0.0
+
+
 class Motion:
-    """A run under way: advances the state and collects segments and events."""
+    """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
 
-    model: MultiPhiModel
-    rule: EventRule
-    start: Start
-    time: float = 0.0
-    segments: list[Segment] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    message: str = ""
-    start_loss: Loss = field(default_factory=Loss)
+    compiled: False for the loop as plain Python. time [s]: how far it is. message: why it goes no further, or "".
+    start_loss: at a start without events.
+    """
 
-    def __post_init__(self) -> None:
-        self._evaluations, self._transitions = 0, self.rule.transitions
-        self._decided, self._last_decision = deque[tuple[float, float]](maxlen=self.window + 1), 0.0
-        with self._failing():
-            self._begin()
+    def __init__(self, arrays: LevelArrays, start: Start, compiled: bool | None = None) -> None:
+        self.arrays, self.start = arrays, start
+        self._loop: Callable[..., Any] = advance if compiled is False else carry
+        self._measured: Measure = measure if compiled is False else measured
+        self.model, self.levels = arrays.levels.model, arrays.levels
+        self.time, self.message, self.start_loss = start.time, "", Loss()
+        self.record = Record(self.model.contacts, self.arrays)
+        self._state: State | None = start.state
+        self._starting = True
+        self._window, self._allowed = window(self.model), allowed(self.model)
+        self._kept = _Kept(np.zeros(2 * (self._window + 1)), last_decision=start.time)
+        self._evaluations = self._transitions = 0
+        self._unavailable: Exception | None = None
+        self._carry(self.time)
+
+    @property
+    def state(self) -> State:
+        """Where it is; there is none after a failure at the start."""
+        assert self._state is not None, self.message
+        return self._state
 
     def go_on_from(self, state: State, time: float) -> None:
         """Forget what has been collected, and go on from a state and a time [s]."""
-        self.state, self.time, self.message, self.start_loss = state, time, "", Loss()
-        self.segments, self.events = [], []
-        self._decided.clear()
-        self._last_decision = time
+        self._state, self.time, self.message, self.start_loss = state, time, "", Loss()
+        self._starting = False
+        self.record, kept = Record(self.model.contacts, self.arrays), self._kept
+        self._kept = _Kept(np.zeros(len(kept.ring)), 0, time, kept.piece, kept.age, kept.work)
+        if self.arrays.owner and self.arrays.owner() is self:
+            self.arrays.owner = None
+
+    def go_on_with(self, state: State, time: float) -> None:
+        """``go_on_from`` a state under static loads alone."""
+        self.go_on_from(self.levels.with_channels(state), time)
+
+    @property
+    def static_state(self) -> State:
+        """The present state as one under static loads alone."""
+        return self.state.static
+
+    def advance(self, end: float, to_change: bool = False) -> None:
+        """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""
+        if not self.message and self.time < end:
+            self._carry(end, to_change)
+
+    def trajectory(self, end: float) -> Trajectory:
+        """What has been collected."""
+        segments, events = self.record.segments(), self.record.events()
+        return Trajectory(
+            model=self.model,
+            segments=segments,
+            events=events,
+            t_end=self.time if self.message else end,
+            status="failed" if self.message else "ok",
+            message=self.message,
+            start=self.start,
+            start_loss=self.start_loss,
+            final=self._state if segments else None,
+            final_work=self._kept.work,
+            load=self.levels.load,
+            stats=Statistics(
+                levels_built=self.model.levels_built,
+                levels_possible=self.model.levels_possible,
+                transitions=self._transitions,
+                events=len(events),
+                segments=len(segments),
+                function_evaluations=self._evaluations,
+            ),
+        )
+
+    # ------------------------------------------------------------------ the loop
+
+    def _carry(self, end: float, to_change: bool = False) -> None:
+        starting = self._starting
+        with self._failing():
+            self._take_over()
+            self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
+            with np.errstate(all="ignore"):  # as compiled: what is not finite is found, and told
+                answer = self._run(end)
+            self._leave()
+            if starting and answer != a.FAILED and self.arrays.ints[a.CHANGE_COUNT] == 0:
+                self.start_loss = Loss(*self.arrays.numbers[a.LOST : a.LOST + a.LOSSES].tolist())
+            if answer == a.FAILED:
+                raise self.failure()
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
@@ -63,145 +149,112 @@ class Motion:
             singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
             self.message = f"at t = {self.time:.9g} s: {singular}{failure}"
 
-    def _begin(self) -> None:
-        """First state, with the events of the start."""
-        self.state, self.start_loss, changes = self.rule.start(
-            self.start.displacement, self.start.velocity, self.start.penetrating, self.start.touching
-        )
-        if changes:
-            self._record(changes, self.start_loss)
-            self.start_loss = Loss()
+    def _run(self, end: float) -> int:
+        """The loop until it ends, with all that it needs."""
+        while True:
+            answer = int(self._loop(*self.arrays.buffers.all, end))
+            if answer == a.FULL:
+                self.record.take()
+            elif answer == a.NEED:
+                self._supply()
+            else:
+                return answer
 
-    def advance(self, end: float, to_change: bool = False) -> None:
-        """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""
-        known = len(self.events)
-        with self._failing():
-            while not self.message and self.time < end and not (to_change and len(self.events) > known):
-                self._continue(end)
+    def _supply(self) -> None:
+        """Pack what the loop needs, in arrays that begin anew where they have become too large."""
+        try:
+            self.arrays.supply()
+        except (MultiPhiError, np.linalg.LinAlgError) as error:
+            self._unavailable = error
+            self.arrays.ints[a.GIVEN_UP] = 1
+        if self.arrays.full:
+            self._leave()
+            self.arrays.forget()
+            self._enter()
+        elif self.arrays.outgrown:
+            self.record.take()
+            self.arrays.begin_record()
 
-    def trajectory(self, end: float) -> Trajectory:
-        """What has been collected."""
-        segments, events = self._collected()
-        return Trajectory(
-            model=self.model,
-            segments=segments,
-            events=events,
-            t_end=self.time if self.message else end,
-            status="failed" if self.message else "ok",
-            message=self.message,
-            start=self.start,
-            start_loss=self.start_loss,
-            final=self.state if segments else None,
-            final_work=self._work_since(),
-            load=self.rule.load,
-            stats=Statistics(
-                levels_built=self.model.levels_built,
-                levels_possible=self.model.levels_possible,
-                transitions=self.rule.transitions - self._transitions,
-                events=len(events),
-                segments=len(segments),
-                function_evaluations=self._evaluations,
-            ),
-        )
+    # ------------------------------------------------------------------ the state in the arrays
 
-    def _work_since(self) -> float:
-        """Work [J] of what varies in time since the last segment ended."""
-        return 0.0
+    def _take_over(self) -> None:
+        """Get the arrays from the run that has them."""
+        owner = self.arrays.owner() if self.arrays.owner else None
+        if owner is not self:
+            if owner is not None:
+                owner.give_up_arrays()
+            self._enter()
+            self.arrays.owner = weakref.ref(self)
 
-    def _continue(self, end: float) -> None:
-        """Some way towards ``end``."""
-        self._one_segment(end)
+    def give_up_arrays(self) -> None:
+        """Keep what stands in the arrays alone: another run takes them over."""
+        ints, numbers = self.arrays.ints, self.arrays.numbers
+        ring = numbers[ints[a.RING] :][: len(self._kept.ring)].copy()
+        places = (a.LAST_DECISION, a.AGE, a.WORK)
+        last, age, work = (float(numbers[place]) for place in places)
+        self._kept = _Kept(ring, int(ints[a.DECISIONS]), last, int(ints[a.PIECE]), age, work)
 
-    def _collected(self) -> tuple[Sequence[Segment], Sequence[Event]]:
-        return tuple(self.segments), tuple(self.events)
+    def _enter(self) -> None:
+        """The present state, or the start, into the arrays."""
+        arrays, kept, state = self.arrays, self._kept, self._state
+        arrays.channels.set(arrays.buffers, kept.piece, kept.age, self.time)
+        level = 0 if state is None else arrays.level(state.level.states)
+        arrays.begin_record()
+        ring = arrays.ring(len(kept.ring))
+        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = self._window, kept.decisions
+        for slot in (a.TRANSITIONS, a.GIVEN_UP):
+            arrays.ints[slot] = 0
+        numbers = arrays.numbers
+        numbers[ring : ring + len(kept.ring)] = kept.ring
+        numbers[a.TIME], numbers[a.LAST_DECISION], numbers[a.WORK] = self.time, kept.last_decision, kept.work
+        numbers[a.ALLOWED], numbers[int(arrays.ints[a.FOUND]) + 1] = self._allowed, 0.0
+        if state is None:
+            start = self.start
+            arrays.set_start(start.displacement, start.velocity, start.states, start.held)
+        else:
+            phases = [NUMBERS[phase] for phase in state.phases]
+            arrays.set_state(level, state.displacement, state.velocity, phases, self._measured)
+            arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
 
-    def _keep(self, segment: Segment) -> None:
-        self.segments.append(segment)
+    def _leave(self) -> None:
+        """The state that the loop has come to, and what it has recorded."""
+        ints, numbers = self.arrays.ints, self.arrays.numbers
+        self.record.take()
+        self.give_up_arrays()
+        self.time = float(numbers[a.TIME])
+        if not ints[a.STARTING]:
+            self._state, self._starting = self._state_reached(), False
+        samples = int(ints[a.FOUND]) + 1
+        self._evaluations += int(numbers[samples])
+        self._transitions += int(ints[a.TRANSITIONS])
+        ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
 
-    def _keep_event(self, event: Event) -> None:
-        self.events.append(event)
+    def _state_reached(self) -> State:
+        ints, numbers = self.arrays.ints, self.arrays.numbers
+        record = int(ints[a.CURRENT + a.LEVEL])
+        level = self.arrays.loaded[int(ints[record + a.NUMBER])]
+        n, phases = level.level.modes, ints[ints[a.CURRENT + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
+        x, v = (numbers[ints[a.CURRENT + part] :][:n].copy() for part in (a.PLACE, a.SPEED))
+        return State(level, x, v, tuple(PHASES[k] for k in phases.tolist()))
 
-    def _recent(self) -> Sequence[tuple[float, float]]:
-        """(since when [s], highest frequency [Hz] before it) of a ``window`` of decisions, none before there are more.
-
-        Pieces of a load are no decisions.
-        """
-        return list(self._decided)[1:] if len(self._decided) > self.window else ()
-
-    def _one_segment(self, end: float) -> None:
-        """One level's motion up to the next decision, or to ``end``; contacts are armed on the way."""
-        state, horizon = self.state, end - self.time
-        finder, coefficients = state.finder, state.coefficients()
-        evaluated = finder.evaluations
-        reached, asking, armed_at = 0.0, set[int](), 0.0
-        phases = state.phases
-        while not asking:
-            waiting, table = self.rule.watch(state, phases)
-            signals = table.signals(coefficients, state)
-            found = finder.first(signals, horizon, reached)
-            if found is None:
-                reached = horizon
-                break
-            reached = found.time
-            alone = len(phases) == 1  # one contact's signals exclude each other
-            fallen = [waiting[s] for s in ([found.signal] if alone else finder.simultaneous(signals, found))]
-            asking = {contact for contact, asks in fallen if asks}
-            if not asking:
-                armed, armed_at = waiting[found.signal][0], reached  # the next one at its own instant, maybe at once
-                phases = tuple(Phase.ARMED if i == armed else phase for i, phase in enumerate(phases))
-        self._evaluations += finder.evaluations - evaluated
-        started, self.time = self.time, end if reached == horizon else self.time + reached
-        self._keep(self._segment(started, coefficients, armed_at))
-        self.state = replace(state.after(coefficients, reached), phases=phases)
-        if asking:
-            self._decided.append((self._last_decision, state.level.level.highest_frequency))
-            self._last_decision = self.time
-            at_once = reached <= finder.instant and not self.model.whole  # all modes have an answer
-            self._decide(asking, {i for i in asking if at_once and phases[i] is Phase.REFUSED})
-            self._check_chatter()
-
-    def _segment(self, started: float, coefficients: np.ndarray, armed_at: float) -> Segment:
-        """The motion from the present state up to now."""
-        return Segment(started, self.time, self.state.level, coefficients, self.state.phases, armed_at)
-
-    def _decide(self, asking: set[int], again: Iterable[int] = ()) -> None:
-        """These contacts ask to change at this instant; ``again``: those that were refused at it before."""
-        self.state, loss, changes = self.rule.decide(self.state, asking, again)
-        self._record(changes, loss)
-
-    def _record(self, changes: list[Change], loss: Loss) -> None:
-        for change in changes:
-            names = self.model.contacts
-            shared = tuple((names[i].name, impulse) for i, impulse in change.shared)
-            self._keep_event(Event(self.time, names[change.contact].name, change.kind, loss, change.impulse, shared))
-            loss = Loss()
-
-    @property
-    def window(self) -> int:
-        """How many of the last events the chatter check is about, so many for every contact.
-
-        Stops side by side are all struck in a small part of a period, once each.
-        """
-        return CHATTER_WINDOW * self._plain
-
-    @property
-    def _allowed(self) -> float:
-        """How many of them a period of the highest kept mode may hold; a swing passes every spring of a law twice."""
-        return EVENTS_PER_PERIOD * self._plain + 2 * sum(map(len, self.model.chains))
-
-    @property
-    def _plain(self) -> int:
-        """Number of contacts that are no springs of a law, at least 1."""
-        return max(1, len(self.model.contacts) - sum(map(len, self.model.chains)))
-
-    def _check_chatter(self) -> None:
-        window, allowed, recent = self.window, self._allowed, self._recent()
-        if len(recent) < window:
-            return
-        starts, frequencies = zip(*recent, strict=True)
-        elapsed, highest = self.time - starts[0], max(frequencies)
-        if elapsed <= ACCUMULATED * self.time or 0 < highest * elapsed < window / allowed:
-            raise NumericalFailure(
-                f"chatter: {window} events in {elapsed:g} s, more than {allowed} in a period of the highest "
-                f"kept mode ({highest:g} Hz) or all within {ACCUMULATED:g} of the time so far"
-            )
+    def failure(self) -> Exception:
+        """What has stopped the loop."""
+        ints, told = self.arrays.ints, self.arrays.numbers[a.TOLD : a.TOLD + 3].tolist()
+        cause, flags = int(ints[a.CAUSE]), ints[ints[a.CAUSED_BY] :][: ints[a.ELEMENTS]]
+        names = ", ".join(self.model.contacts[i].name for i in np.flatnonzero(flags).tolist())
+        if cause == a.UNAVAILABLE and self._unavailable is not None:
+            return self._unavailable
+        complete = self.model.level_at(()).modes == self.model.base.modes.count
+        sentences = {
+            a.NOT_FINITE: "the motion is not finite",
+            a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
+            f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
+            "need fewer modes or a shorter run",
+            a.CHATTER: f"chatter: {self._window} events in {told[0]:g} s, more than {self._allowed} in a period of the "
+            f"highest kept mode ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
+            a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
+            a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
+            + ("" if complete else " in the kept modes, need more of them"),
+            a.UNSETTLED: "least distance: round-off decides which inequalities push",
+        }
+        return NumericalFailure(sentences[cause])

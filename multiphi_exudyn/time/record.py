@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Generic, TypeVar, overload
 
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase
-from multiphi_exudyn.events.transition import LoadedLevel
-from multiphi_exudyn.time.segment import Batch, Segment
+from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.time.flow import Flow
+from multiphi_exudyn.time.growing import Growing
+from multiphi_exudyn.time.sampling import sample_rows, sample_states
+from multiphi_exudyn.time.segment import Segment, Segments, owners
+from multiphi_exudyn.time.work import integrate_works, work_waves
 
 __all__ = ["PHASES", "Record"]
 
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK)  # in the order of their numbers
+
+states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
 
 T = TypeVar("T")
 
@@ -52,21 +61,28 @@ class Made(Sequence[T], Generic[T]):
         return repr(tuple(self))
 
 
-class Segments(Made[Segment]):
+class Recorded(Made[Segment], Segments):
     """The segments of a record."""
 
     def __init__(self, record: Record) -> None:
         super().__init__(record.segment, len(record.spans), {})
         self._record = record
+        self.starts, self.ends = record.spans[:, :2].T
+        self.numbers, self.levels, self.arrays = record.rows[:, 0], record.levels, record.arrays
 
-    def batches(self) -> list[Batch]:
-        """By level and exponentials, in arrays."""
-        return self._record.batches()
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.states(places, after)
 
-    @property
-    def starts(self) -> np.ndarray:
-        """Their starts (n,) [s]."""
-        return self._record.spans[: len(self), 0]
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.values(times, side, row)
+
+    @functools.cached_property
+    def works(self) -> tuple[float, float]:
+        """See ``Segments``."""
+        damping, varying = self._record.works().tolist()
+        return damping, varying + float(np.sum(self._record.spans[:, 4]))
 
 
 class Events(Made[Event]):
@@ -76,6 +92,12 @@ class Events(Made[Event]):
         super().__init__(record.event, len(record.places), {})
         self._record = record
 
+    @property
+    def loss(self) -> Loss:
+        """The energies [J] that left at all of them."""
+        impact, kinetic, strain, stop_work, damping = np.sum(self._record.amounts[:, 1:6], axis=0).tolist()
+        return Loss(impact, kinetic, strain, stop_work, damping)
+
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
         places, amounts = self._record.places, self._record.amounts
@@ -83,69 +105,94 @@ class Events(Made[Event]):
         return np.column_stack([time, self._record.kinds[places, 0], amounts[places, 6], truncation])
 
 
-class Record:
-    """Segments and events of a run, in arrays that grow.
+def _joined(name: str) -> property:
+    """An array of a record."""
+    return property(lambda record: record.parts[name].whole)
 
-    rows (n, 5): number of the level, piece, events before, where coordinates and phases stand (-1: all armed).
+
+def _part(ints: np.ndarray, slot: int, buffer: np.ndarray, count: int) -> np.ndarray:
+    """So many numbers that the loop has written, from where the slot says."""
+    start = int(ints[slot])
+    return buffer[start : start + count].copy()
+
+
+class Record:
+    """Segments and events of a run, in arrays that grow by parts.
+
+    levels: each once. rows (n, 5): number of the level in them, piece, events before, where coordinates and phases
+    stand (-1: all armed).
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
     coordinates: xi, xi' of every start.
     phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
-    amounts (m, 7): time [s], five losses [J], impulse [N s]. names: of the contacts.
+    amounts (m, 7): time [s], five losses [J], impulse [N s]. arrays: those of the loop.
     """
 
-    def __init__(self, names: list[str]) -> None:
-        self._names = names
-        self._levels: dict[int, LoadedLevel] = {}
-        self.rows, self.spans = np.empty((0, a.SEGMENT_WIDTH), np.int64), np.empty((0, a.SEGMENT_WIDTH_NUMBERS))
-        self.coordinates, self.phases = np.empty(0), np.empty(0, np.int64)
-        self.kinds, self.amounts = np.empty((0, a.EVENT_WIDTH), np.int64), np.empty((0, a.EVENT_WIDTH_NUMBERS))
-
-    def take(self, arrays: LevelArrays) -> None:
-        """Take over what the loop has written."""
-        ints, numbers = arrays.ints, arrays.numbers
-        n, m = int(ints[a.SEGMENT_COUNT]), int(ints[a.EVENT_COUNT])
-        rows = ints[ints[a.SEGMENT_INTS] :][: n * a.SEGMENT_WIDTH].reshape(n, a.SEGMENT_WIDTH).copy()
-        for number in set(rows[:, 0].tolist()) - set(self._levels):
-            self._levels[number] = arrays.loaded[number]
-        rows[:, 2] += len(self.kinds)
-        rows[:, 3] += len(self.coordinates)
-        rows[rows[:, 4] >= 0, 4] += len(self.phases)
-        parts = {
-            "rows": rows,
-            "spans": numbers[ints[a.SEGMENT_NUMBERS] :][: n * a.SEGMENT_WIDTH_NUMBERS].reshape(
-                n, a.SEGMENT_WIDTH_NUMBERS
-            ),
-            "coordinates": numbers[ints[a.COORDINATE_NUMBERS] :][: ints[a.COORDINATE_COUNT]],
-            "phases": ints[ints[a.PHASE_INTS] :][: ints[a.PHASE_COUNT]],
-            "kinds": ints[ints[a.EVENT_INTS] :][: m * a.EVENT_WIDTH].reshape(m, a.EVENT_WIDTH),
-            "amounts": numbers[ints[a.EVENT_NUMBERS] :][: m * a.EVENT_WIDTH_NUMBERS].reshape(m, a.EVENT_WIDTH_NUMBERS),
+    def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
+        self._names, self.arrays = [contact.name for contact in contacts], arrays
+        self._events = [[state.event for state in contact.states] for contact in contacts]
+        self.levels: list[LoadedLevel] = []
+        self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
+        empty, whole = np.empty(0), np.empty(0, np.int64)
+        self.parts = {
+            "rows": Growing(whole.reshape(0, a.SEGMENT_WIDTH)),
+            "spans": Growing(empty.reshape(0, a.SEGMENT_WIDTH_NUMBERS)),
+            "coordinates": Growing(empty),
+            "phases": Growing(whole),
+            "kinds": Growing(whole.reshape(0, a.EVENT_WIDTH)),
+            "amounts": Growing(empty.reshape(0, a.EVENT_WIDTH_NUMBERS)),
         }
-        for name, part in parts.items():
-            setattr(self, name, np.concatenate([getattr(self, name), part]))
-        vars(self).pop("places", None)
+
+    rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
+    phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
+
+    def take(self) -> None:
+        """Take over what the loop has written."""
+        ints, numbers = self.arrays.ints, self.arrays.numbers
+        n = int(ints[a.SEGMENT_COUNT])
+        rows = _part(ints, a.SEGMENT_INTS, ints, n * a.SEGMENT_WIDTH).reshape(n, a.SEGMENT_WIDTH)
+        packed = rows[:, 0].copy()
+        for number in dict.fromkeys(packed.tolist()):
+            rows[packed == number, 0] = self._number(self.arrays.loaded[number])
+        rows[:, 2] += self.parts["kinds"].count
+        rows[:, 3] += self.parts["coordinates"].count
+        rows[rows[:, 4] >= 0, 4] += self.parts["phases"].count
+        spans = _part(ints, a.SEGMENT_NUMBERS, numbers, n * a.SEGMENT_WIDTH_NUMBERS)
+        self._add("rows", rows)
+        self._add("spans", spans.reshape(n, a.SEGMENT_WIDTH_NUMBERS))
+        self._add("coordinates", _part(ints, a.COORDINATE_NUMBERS, numbers, int(ints[a.COORDINATE_COUNT])))
+        self._add("phases", _part(ints, a.PHASE_INTS, ints, int(ints[a.PHASE_COUNT])))
+        self.take_events()
+
+    def take_events(self) -> None:
+        """Take over the events of what the loop has written, and forget the rest."""
+        ints, numbers, m = self.arrays.ints, self.arrays.numbers, int(self.arrays.ints[a.EVENT_COUNT])
+        self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
+        amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
+        self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
             ints[slot] = 0
+
+    def _add(self, name: str, part: np.ndarray) -> None:
+        self.parts[name].add(part)
+        vars(self).pop("places", None)
+
+    def _number(self, level: LoadedLevel) -> int:
+        """The number of a level in this record; the arrays may have packed it twice."""
+        number = self._numbers.setdefault(level.states, len(self.levels))
+        if number == len(self.levels):
+            self.levels.append(level)
+        return number
 
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
         return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
 
-    def add_event(self, event: Event) -> None:
-        """An event of the start."""
-        loss, places = event.loss, [self._names.index(name) for name, _ in event.shared]
-        own = loss.impact, loss.truncation_kinetic, loss.truncation_strain, loss.stop_work, loss.damping
-        shared = [(event.time, *np.zeros(a.LOSSES), impulse) for _, impulse in event.shared]
-        kinds = [*((i, a.SHARED) for i in places), (self._names.index(event.contact), int(event.kind == "close"))]
-        self.kinds = np.concatenate([self.kinds, kinds])
-        self.amounts = np.concatenate([self.amounts, [*shared, (event.time, *own, event.impulse)]])
-        vars(self).pop("places", None)
-
     # ------------------------------------------------------------------ objects
 
-    def segments(self) -> Segments:
+    def segments(self) -> Recorded:
         """All segments so far."""
-        return Segments(self)
+        return Recorded(self)
 
     def events(self) -> Events:
         """All events so far."""
@@ -153,16 +200,88 @@ class Record:
 
     def level(self, i: int) -> LoadedLevel:
         """The level of the i-th segment."""
-        return self._levels[int(self.rows[i, 0])]
+        return self.levels[int(self.rows[i, 0])]
 
     def state(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """xi, xi' (n,) at the start of the i-th segment."""
         n, start = self.level(i).level.modes, self.rows[i, 3]
         return self.coordinates[start : start + n], self.coordinates[start + n : start + 2 * n]
 
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.
+
+        n: the most coordinates of a level; those that a level has not are zero.
+        """
+        visited = np.unique(self.rows[places, 0]).tolist()
+        width = max((self.levels[number].level.modes for number in visited), default=0)
+        result = np.zeros((2, len(places), width))
+        given = np.ascontiguousarray(places), np.ascontiguousarray(after), len(places), width, result.ravel()
+        for offsets in self._packed(visited):
+            while self._supply(states_of(*self._given(offsets), *given)):
+                pass
+        return result
+
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """row.(xi, xi', 1) (k,) at times (k,) [s]; row: (2 n + 1,) of a level with n coordinates."""
+        first, last = owners(self.spans[:, 0], np.array([np.min(times), np.max(times)]), side).tolist()
+        visited = np.unique(self.rows[first : last + 1, 0]).tolist()
+        width = max(self.levels[number].level.modes for number in visited)
+        functions, result = np.zeros((len(self.levels), 2 * width + 1)), np.empty(len(times))
+        for number in visited:
+            function, n = row(self.levels[number]), self.levels[number].level.modes
+            functions[number, :n], functions[number, width : width + n] = function[:n], function[n : 2 * n]
+            functions[number, -1] = function[-1]
+        given = functions.ravel(), width, np.ascontiguousarray(times), len(times), int(side == "left"), result
+        for offsets in self._packed(visited):
+            while self._supply(values_of(*self._given(offsets), len(self.rows), *given)):
+                pass
+        return result
+
+    def works(self) -> np.ndarray:
+        """Work [J] of damping and of what varies (2,) in all segments, without what jumps where they begin."""
+        works = np.zeros((len(self.rows), 2))
+        for offsets in self._packed(list(range(len(self.levels)))):
+            for level in offsets[offsets > 0].tolist():
+                self.arrays.add_powers(level)
+            scratch = self._scratch()
+            while self._supply(works_of(*self._given(offsets), len(works), scratch, works.ravel())):
+                scratch = self._scratch()
+        return np.asarray(works.sum(axis=0))
+
+    def _scratch(self) -> np.ndarray:
+        """Memory for the work of a segment."""
+        return np.empty(work_waves(*self.arrays.most, int(self.arrays.ints[a.CHANNELS])), complex)
+
+    def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
+        """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""
+        while visited:
+            if self.arrays.full:
+                self.arrays.forget()
+            offsets = np.zeros(len(self.levels), np.int64)
+            while visited and not self.arrays.full:
+                number = visited.pop()
+                offsets[number] = self.arrays.level(self.levels[number].states)
+            yield offsets
+
+    def _given(self, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What every entry of sampling.py and work.py is given first."""
+        return (
+            *self.arrays.lent(int(self.rows[-1, 1])),
+            self.rows.ravel(),
+            self.spans.ravel(),
+            self.coordinates,
+            offsets,
+        )
+
+    def _supply(self, answer: int) -> bool:
+        """Whether an entry needs something, which it then has when it is called again."""
+        if answer == a.NEED:
+            self.arrays.supply()
+        return answer == a.NEED
+
     def standing(self, i: int) -> tuple[Phase, ...]:
         """The phases at the start of the i-th segment."""
-        c, start = len(self._names), self.rows[i, 4]
+        c, start = len(exits_of(self.level(i))), self.rows[i, 4]
         return (Phase.ARMED,) * c if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + c])
 
     def standings(self) -> np.ndarray:
@@ -174,10 +293,12 @@ class Record:
 
     def segment(self, i: int) -> Segment:
         """The i-th segment."""
-        level, (start, end, armed_at) = self.level(i), self.spans[i, :3].tolist()
-        drive = level.asymptotic.drive if level.driven else None
-        coefficients = level.level.response.coefficients(*self.state(i), drive)
-        return Segment(start, end, level, coefficients, self.standing(i), armed_at)
+        level, (start, end, armed_at, horizon, work, age) = self.level(i), self.spans[i].tolist()
+        xi, xi_t = self.state(i)
+        held = xi[level.modal.modes + level.excitation.prescribed :]
+        drive = self.arrays.channels.drive(self.rows[i, 1]).after(age).beside(held)
+        flow = Flow.of(level, xi, xi_t, drive, horizon)
+        return Segment(start, end, level, flow, self.standing(i), armed_at, work)
 
     def event(self, i: int) -> Event:
         """The i-th event."""
@@ -187,20 +308,5 @@ class Record:
         impact, kinetic, strain, stop_work, damping = lost
         contact, entered = self.kinds[place].tolist()
         shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, 6])) for k in range(before, place))
-        loss, kind = Loss(impact, kinetic, strain, stop_work, damping), "close" if entered == a.CLOSE else "open"
-        return Event(time, self._names[contact], kind, loss, impulse, shared)
-
-    def batches(self) -> list[Batch]:
-        """The segments by level and exponentials."""
-        numbers = self.rows[:, 0]
-        return [self._batch(number, np.flatnonzero(numbers == number)) for number in sorted(set(numbers.tolist()))]
-
-    def _batch(self, number: int, places: np.ndarray) -> Batch:
-        level = self._levels[number]
-        response, n = level.level.response, level.level.modes
-        states = self.coordinates[self.rows[places, 3][:, None] + np.arange(2 * n)]
-        coefficients = states @ np.hstack([response.from_displacement, response.from_velocity]).T
-        if level.driven:
-            coefficients = coefficients + response.from_force @ level.asymptotic.drive
-        starts, ends = self.spans[places, 0], self.spans[places, 1]
-        return Batch(level, places, starts, ends, response.basis, response.shapes, coefficients)
+        loss = Loss(impact, kinetic, strain, stop_work, damping)
+        return Event(time, self._names[contact], self._events[contact][entered], loss, impulse, shared)

@@ -28,7 +28,7 @@ from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.damping import ModalDamping
 from multiphi_exudyn.time.defects import DefectHistory
-from multiphi_exudyn.time.driven.level import DrivenLevel
+from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
@@ -52,7 +52,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     found = list(damping_warnings(model))
     if not model.whole:
         history = DefectHistory.of(trajectory)
-        found.extend(static_warnings([part.level.level for part in history.parts]))
+        found.extend(static_warnings([level.level for level in history.segments.levels]))
         found.extend(_lost_energy(trajectory, history))
         found.extend(_truncation(trajectory, history, tolerance))
     found.extend(_clusters(trajectory))
@@ -155,7 +155,7 @@ def _clusters(trajectory: Trajectory) -> list[str]:
     """One sentence where levels of the run keep modes beyond those asked for."""
     if not trajectory.model.keeps_clusters:
         return []  # without a look at segments, which a run makes only when they are asked for
-    visited = dict.fromkeys(segment.level.level.indices for segment in trajectory.segments)
+    visited = (level.level.indices for level in listed(trajectory.segments).levels)
     levels = [trajectory.model.level_at(indices) for indices in visited]
     kept = [level for level in levels if level.kept_beyond]
     if not kept:
@@ -172,7 +172,7 @@ def _clusters(trajectory: Trajectory) -> list[str]:
 def _load_pieces(trajectory: Trajectory) -> list[str]:
     """Whether the loads have so many pieces that they set the time and memory of the run."""
     level = trajectory.final.level if trajectory.final is not None else None
-    if not isinstance(level, DrivenLevel) or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
+    if level is None or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
         return []
     pieces = level.excitation.pieces(trajectory.t_end)
     each = 1e3 * PIECE_SECONDS * level.excitation.effort(trajectory.t_end) / pieces

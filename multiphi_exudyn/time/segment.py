@@ -1,43 +1,50 @@
-"""Segment: the motion in one level between two events, as a sum of exponentials (eq. 38.4).
+"""Segment: the motion in one level between two events, as a sum of exponentials (eq. 38.4, flow.py).
 
-    eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
+    xi(t) = Re V (c phi(t - t_k))   on [t_k, t_k+1]
 
-Gaps, contact forces, energies and their integrals follow in closed form.
+Gaps, contact forces and energies follow in closed form, works by quadrature.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.time.flow import Flow
+from multiphi_exudyn.time.quadrature import panels, works
 
-__all__ = ["Batch", "Segment", "batched", "batches"]
+__all__ = ["Listed", "Segment", "Segments", "listed", "owners"]
 
 MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Motion in one level from ``start`` to ``end`` [s]: coefficients c (p,) of the level's exponentials.
+    """Motion in one level from ``start`` to ``end`` [s]; flow: its closed form, c (p,) its coefficients.
 
-    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed.
+    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed. entry_work: work [J]
+    of what jumped where it begins.
     """
 
     start: float
     end: float
     level: LoadedLevel
-    coefficients: np.ndarray
+    flow: Flow
     phases: tuple[Phase, ...]
     armed_at: float
+    entry_work: float = 0.0
 
     def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """eta or its first or second derivative, (r, k) at times (k,)."""
+        """xi or its first or second derivative, (r + q, k) at times (k,)."""
         rows = self.rows
         for _ in range(derivative):
             rows = self.basis.derivative(rows)
@@ -46,22 +53,12 @@ class Segment:
     @property
     def basis(self) -> Exponentials:
         """The exponentials phi (p,) of the motion."""
-        return self.level.level.response.basis
-
-    @property
-    def shapes(self) -> np.ndarray:
-        """V (r, p)."""
-        return self.level.level.response.shapes
-
-    @property
-    def amplitudes(self) -> np.ndarray:
-        """c (p,) of the exponentials ``basis``."""
-        return self.coefficients
+        return self.flow.basis
 
     @property
     def rows(self) -> np.ndarray:
-        """eta = Re rows phi(t - start), (r, p)."""
-        return self.shapes * self.amplitudes
+        """xi = Re rows phi(t - start), (r + q, p)."""
+        return self.flow.shapes * self.flow.coefficients
 
     def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
         """Gap (k,) [m] of a contact at times (k,)."""
@@ -77,29 +74,25 @@ class Segment:
         return np.asarray(moving + self.level.asymptotic.forces[k])
 
     def force_integral(self, contact: int, start: float, end: float) -> float:
-        """Integral of the force of a closed contact [N s], exact: a sum of exponentials plus a constant."""
-        own = self.level.level
-        k, response = own.indices.index(contact), own.response
-        c = response.basis.shifted(self.coefficients, start - self.start)
-        terms = (own.force_rows[k] @ response.shapes) * c
-        terms = terms + (own.force_rate_rows[k] @ response.shapes) * response.basis.derivative(c)
-        integral = float((terms @ response.basis.integrals(end - start)).real)
+        """Integral of the force of a closed contact [N s]; of a sum of free exponentials and a constant, closed."""
+        own, rows, free = self.level.level, self.rows, self.flow.free
+        k = own.indices.index(contact)
+        terms = own.force_rows[k] @ rows + own.force_rate_rows[k] @ self.basis.derivative(rows)
+        basis = Exponentials(self.basis.rates[:free], self.basis.powers[:free], self.basis.unit)
+        integral = float((basis.shifted(terms[:free], start - self.start) @ basis.integrals(end - start)).real)
+        for times, weights in panels(self.basis.rates[free:], start, end):
+            integral += float(((self.basis.at(times - self.start)[:, free:] @ terms[free:]).real) @ weights)
         return integral + float(self.level.asymptotic.forces[k]) * (end - start)
 
     def energy(self, t: np.ndarray) -> np.ndarray:
         """Kinetic + strain energy (k,) [J] at times (k,)."""
         return np.asarray(self.level.kinetic(self.modal(t, 1)) + self.level.strain(self.modal(t)))
 
-    def damping_work(self) -> float:
-        """Integral of eta'^T D eta' [J], in closed form pair by pair of exponentials."""
-        own = self.level.level
-        if not np.any(own.damping):
-            return 0.0
-        return own.response.dissipated(self.coefficients, own.damping, self.end - self.start)
-
-    def varying_work(self) -> float:
-        """Work [J] of loads and stops that vary in time."""
-        return 0.0
+    @functools.cached_property
+    def works(self) -> tuple[float, float]:
+        """Work [J] of damping, and of loads and stops that vary in time."""
+        damping, varying = works(self.level, self.modal, self.basis.rates, self.start, self.end)
+        return damping, self.entry_work + varying
 
     def unarmed_times(self, samples: int) -> np.ndarray:
         """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several.
@@ -112,47 +105,92 @@ class Segment:
         return np.linspace(self.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))
 
 
-@dataclass(frozen=True)
-class Batch:
-    """k segments with the same level and exponentials, in arrays.
+class Segments(Sequence[Segment], ABC):
+    """The segments of a run, in order, and in arrays what many of them are asked for together.
 
-    places: (k,) among all segments. starts, ends: (k,) [s]. basis, shapes: phi (p,) and V (r, p). coefficients: (k, p).
+    starts, ends: (n,) [s]. numbers: (n,) of their levels in ``levels``, each of which is there once.
     """
 
-    level: LoadedLevel
-    places: np.ndarray
     starts: np.ndarray
     ends: np.ndarray
-    basis: Exponentials
-    shapes: np.ndarray
-    coefficients: np.ndarray
+    numbers: np.ndarray
+    levels: Sequence[LoadedLevel]
 
-    def states(self, rows: np.ndarray | slice, after: np.ndarray) -> np.ndarray:
-        """eta and eta' (2, j, r) of the segments ``rows`` (j,), times ``after`` (j,) [s] their starts."""
-        c, phi = self.coefficients[rows], self.basis.at(after)
-        if self.basis.pure:
-            both = np.concatenate([c * phi, self.basis.derivative(c) * phi]) @ self.shapes.T
-            return both.real.reshape(2, len(phi), len(self.shapes))
-        moved = self.shapes * c[:, None, :]  # a power of time and the next lower one have shapes of their own
-        return np.array([np.einsum("jrp,jp->jr", x, phi).real for x in (moved, self.basis.derivative(moved))])
+    @abstractmethod
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.
+
+        n: the most coordinates of a level; those that a level has not are zero.
+        """
+
+    @abstractmethod
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """row.(xi, xi', 1) (k,) at times (k,) [s], at an event from the ``side`` "left" or "right".
+
+        row: (2 n + 1,) of a level with n coordinates.
+        """
+
+    @property
+    @abstractmethod
+    def works(self) -> tuple[float, float]:
+        """Work [J] of damping, and of loads and stops that vary in time."""
+
+    def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
+        """Places (k,) of the segments that hold at times (k,) [s]."""
+        return owners(self.starts, times, side)
 
 
-def batches(segments: Sequence[Segment]) -> list[Batch]:
-    """Segments by level and exponentials; some are kept in arrays (time/record.py)."""
-    kept = getattr(segments, "batches", None)
-    return batched(dict(enumerate(segments))) if kept is None else kept()
+class Listed(Segments):
+    """Segments that are objects."""
+
+    def __init__(self, segments: Sequence[Segment]) -> None:
+        self._segments = segments
+        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by closed contacts: one may have been built anew
+        for segment in segments:
+            known.setdefault(segment.level.level.indices, (len(known), segment.level))
+        self.levels = [level for _, level in known.values()]
+        self.numbers = np.array([known[segment.level.level.indices][0] for segment in segments], np.int64)
+        self.starts = np.array([segment.start for segment in segments])
+        self.ends = np.array([segment.end for segment in segments])
+
+    def __len__(self) -> int:
+        return len(self._segments)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._segments[index]
+
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """See ``Segments``."""
+        found = np.zeros((2, len(places), max(level.level.modes for level in self.levels)))
+        for place in np.unique(places).tolist():
+            own, segment = np.flatnonzero(places == place), self._segments[place]
+            for derivative in range(2):
+                xi = segment.modal(segment.start + after[own], derivative)
+                found[derivative, own, : len(xi)] = xi.T
+        return found
+
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """See ``Segments``."""
+        places, found = self.owners(times, side), np.empty(len(times))
+        x, v = self.states(places, times - self.starts[places])
+        for number in np.unique(self.numbers[places]).tolist():
+            level, own = self.levels[number], self.numbers[places] == number
+            n, function = level.level.modes, row(level)
+            found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
+        return found
+
+    @property
+    def works(self) -> tuple[float, float]:
+        """See ``Segments``."""
+        damping, varying = np.sum([s.works for s in self._segments], axis=0).tolist()
+        return damping, varying
 
 
-def batched(segments: Mapping[int, Segment]) -> list[Batch]:
-    """Segments, by their places, by level and exponentials."""
-    alike: dict[int, list[int]] = {}
-    for place, segment in segments.items():
-        alike.setdefault(id(segment.basis), []).append(place)
-    return [_batch(places, [segments[place] for place in places]) for places in alike.values()]
+def owners(starts: np.ndarray, times: np.ndarray, side: str) -> np.ndarray:
+    """Places (k,) of the segments with these starts (n,) that hold at times (k,) [s]."""
+    return np.maximum(np.searchsorted(starts, times, side="left" if side == "left" else "right") - 1, 0)
 
 
-def _batch(places: list[int], segments: list[Segment]) -> Batch:
-    first = segments[0]
-    starts, ends = np.array([(segment.start, segment.end) for segment in segments]).T
-    coefficients = np.array([segment.amplitudes for segment in segments])
-    return Batch(first.level, np.array(places), starts, ends, first.basis, first.shapes, coefficients)
+def listed(segments: Sequence[Segment]) -> Segments:
+    """Segments as what many of them are asked for together."""
+    return segments if isinstance(segments, Segments) else Listed(segments)

@@ -1,41 +1,36 @@
 """Simulation: exact modal motion from event to event (eqs. 38.3, 38.6). There is no time step.
 
-Within a level the motion is a sum of exponentials; the next event is the certified first root of a few of them
-(first_descent.py); the event rule (events/rule.py) gives the state that follows. What comes out is a Trajectory of
-analytic segments. A failure on the way ends the trajectory early, with a status and its cause.
+The loop (loop.py) carries the start from event to event. What comes out is a Trajectory of analytic segments. A failure
+on the way ends the trajectory early, with a status and its cause.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.events.rule import EventRule
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiled import available
+from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.driven.arrays import DrivenArrays
-from multiphi_exudyn.time.driven.excitation import Excitation
-from multiphi_exudyn.time.driven.motion import DrivenMotion
-from multiphi_exudyn.time.driven.refinement import to_tolerance
-from multiphi_exudyn.time.driven.rule import DrivenRule
-from multiphi_exudyn.time.loop_motion import DrivenLoopMotion, LoopMotion
+from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.refinement import to_tolerance
 from multiphi_exudyn.time.reliability import warnings_of
 from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["motion_of", "quiet", "simulate", "started"]
+__all__ = ["Run", "levels_of", "motion_of", "simulate"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -48,11 +43,16 @@ def simulate(
     velocity: np.ndarray | None = None,
     loads: Sequence[Load] = (),
     compiled: bool | None = None,
+    start: Trajectory | None = None,
 ) -> Trajectory:
-    """Motion of ``model`` from 0 to t_end [s].
+    """Motion of ``model`` from 0 to t_end [s], or from the end of the trajectory ``start``.
 
     displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
-    compiled: False for the loop of NumPy; True, or None, for the compiled one, plain Python where numba is not
+    start: a trajectory of the same model; its final state is handed on whole, what links hold and what contacts wait
+    for included, so that also a truncated model moves as it would have without the break. Time goes on: the answer
+    lasts from ``start.t_end`` to t_end, and that is the time of the loads. They are not part of the trajectory: give
+    them again, or others, which then begin to act with a jump.
+    compiled: False for the loop as plain Python; True, or None, for the compiled one, plain Python where numba is not
     installed and None is given; the answer is the same to round-off.
     The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
     model, and of every later run of the same model.
@@ -65,107 +65,99 @@ def simulate(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
-    trajectory = quiet(model, t_end, displacement, velocity, loads, compiled)
+    run = Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start)
+    if start is not None:
+        _check_going_on(run)
+    trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
     issue(trajectory.warnings)
     return trajectory
 
 
-def quiet(
-    model: MultiPhiModel,
-    t_end: float,
-    displacement: np.ndarray | None = None,
-    velocity: np.ndarray | None = None,
-    loads: Sequence[Load] = (),
-    compiled: bool | None = None,
-) -> Trajectory:
-    """``simulate`` without warnings: for runs that are one of many of an answer."""
-    end = _time("t_end", t_end)
-    if isinstance(model.modes, Tolerance):
-        if model.decided is not None:
-            return quiet(model.decided, end, displacement, velocity, loads, compiled)
-        trajectory = adapted(model, lambda chosen: quiet(chosen, end, displacement, velocity, loads, compiled))
+@dataclass(frozen=True)
+class Run:
+    """What ``simulate`` is asked for, there is more about it there; t_end [s]."""
+
+    model: MultiPhiModel
+    t_end: float
+    displacement: np.ndarray | None = None
+    velocity: np.ndarray | None = None
+    loads: Sequence[Load] = ()
+    compiled: bool | None = None
+    start: Trajectory | None = None
+
+    def trajectory(self) -> Trajectory:
+        """The answer without warnings: for runs that are one of many of an answer."""
+        if isinstance(self.model.modes, Tolerance):
+            return self._decided()
+
+        def run(finer: float) -> Trajectory:
+            motion = self.begun(finer)
+            motion.advance(self.t_end)
+            return motion.trajectory(self.t_end)
+
+        return replace(to_tolerance(run, self.loads), again=self._again)
+
+    def begun(self, finer: float = 1.0) -> Motion:
+        """A motion at its start; smooth courses of loads are taken to their tolerance / finer."""
+        excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
+        if self.compiled and not available():
+            raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
+        levels = levels_of(self.model, excitation, self.start.t_end if self.start else 0.0, self.t_end)
+        start = _start(self, excitation) if self.start is None else going_on(self.start, levels)
+        return motion_of(levels, start, self.compiled)
+
+    def _decided(self) -> Trajectory:
+        """The answer of a model whose number of modes the first run decides."""
+        if self.model.decided is not None:
+            return replace(self, model=self.model.decided).trajectory()
+        trajectory = adapted(self.model, lambda chosen: replace(self, model=chosen).trajectory())
         if trajectory.status == "ok":
-            model.decide(trajectory.model)
+            self.model.decide(trajectory.model)
         return trajectory
 
-    def run(finer: float) -> Trajectory:
-        motion = started(model, end, displacement, velocity, loads, compiled, finer)
-        motion.advance(end)
-        return motion.trajectory(end)
-
-    return replace(to_tolerance(run, loads), again=functools.partial(_again, model, end, loads, compiled))
-
-
-def _again(
-    model: MultiPhiModel, end: float, loads: Sequence[Load], compiled: bool | None, y: np.ndarray, v: np.ndarray
-) -> Trajectory:
-    """The run from y, y' (m,) in base coordinates."""
-    shapes = model.base.modes.shapes
-    return quiet(model, end, shapes @ y, shapes @ v, loads, compiled)
+    def _again(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
+        """The run from y, y' (m,) in base coordinates."""
+        if self.start is not None:
+            return replace(self, start=nudged(self.start, v)).trajectory()
+        shapes = self.model.base.modes.shapes
+        return replace(self, displacement=shapes @ y, velocity=shapes @ v).trajectory()
 
 
-def started(
-    model: MultiPhiModel,
-    end: float,
-    displacement: np.ndarray | None,
-    velocity: np.ndarray | None,
-    loads: Sequence[Load],
-    compiled: bool | None,
-    finer: float = 1.0,
-) -> Motion:
-    """A motion at its start, for a run to ``end`` [s]; arguments as in ``simulate``.
+def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
+    """The run in these levels."""
+    arrays = levels.arrays or LevelArrays(levels)
+    if levels.alone is levels:
+        levels.arrays = arrays
+    return Motion(arrays, start, compiled)
 
-    finer: smooth courses of loads are taken to their tolerance / finer.
+
+def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
+    """The levels under an excitation, for motions from a time [s] to an end.
+
+    Those under its static loads are kept by the model: the maps between them serve every run.
     """
-    excitation = Excitation.of(model, loads, end, finer)
-    start = _start(model, displacement, velocity, excitation, end)
-    if compiled and not available():
-        raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-    if excitation.channels:
-        driven = DrivenRule(EventRule(model, excitation.static), excitation, 0.0, end)
-        return motion_of(model, driven, start, compiled)
-    return motion_of(model, _rule(model, excitation.static), start, compiled)
+    load = excitation.static
+    alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: LoadedLevels.static(model, load))
+    return LoadedLevels(model, excitation, time, end, alone) if excitation.channels else alone
 
 
-def motion_of(model: MultiPhiModel, rule: EventRule, start: Start, compiled: bool | None) -> Motion:
-    """The run under a rule, in the loop that is wanted."""
-    if isinstance(rule, DrivenRule):
-        if compiled is False:
-            return DrivenMotion(model, rule, start)
-        return DrivenLoopMotion(model, rule, start, arrays=DrivenArrays(rule))
-    if compiled is False:
-        return Motion(model, rule, start)
-    rule.arrays = rule.arrays or LevelArrays(rule)
-    return LoopMotion(model, rule, start, arrays=rule.arrays)
-
-
-def _rule(model: MultiPhiModel, load: np.ndarray) -> EventRule:
-    """The model's event rule under this load, kept by the model: its maps between levels serve every run."""
-    key = load.tobytes()
-    rule: EventRule = model.rules.get_or_build(key, lambda: EventRule(model, load))
-    return rule
-
-
-def _start(
-    model: MultiPhiModel,
-    displacement: np.ndarray | None,
-    velocity: np.ndarray | None,
-    excitation: Excitation,
-    end: float,
-) -> Start:
+def _start(run: Run, excitation: Excitation) -> Start:
     """The start as the contacts see it."""
-    base = model.base
-    y, v = _base_vector("displacement", displacement, model), _base_vector("velocity", velocity, model)
-    moved = excitation.stops @ excitation.drive(0.0).values[0] if excitation.channels else 0.0
+    model, base = run.model, run.model.base
+    y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
+    still = np.zeros(len(model.contacts))
+    moved, speeds = map(excitation.moved, excitation.drive(0.0).values[:2]) if excitation.prescribed else (still, still)
     gaps = (y @ base.directions + base.gaps - moved).tolist()
     directions, initial = base.magnitudes
     ways = initial + excitation.stop_ways
-    unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, end)
+    unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, run.t_end)
     scales = (TOUCHING * (ways + np.abs(y) @ directions) + unseen).tolist()
     penetrating, touching = list[int](), list[int]()
     for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
+        if contact.held:
+            continue
         if contact.rigid and gap < -scale:
             raise MultiPhiValueError(
                 f"displacement: lies {-gap:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
@@ -173,9 +165,38 @@ def _start(
             )
         if contact.rigid and gap <= scale:
             touching.append(i)
-        elif gap < -scale and not _pulls(contact, gap, float(v @ base.directions[:, i])):
+        elif gap < -scale and contact.first_state(gap, float(v @ base.directions[:, i])) == "closed":
             penetrating.append(i)
-    return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved)
+    states = np.zeros(len(model.contacts), int)
+    if model.held:
+        states = _first_states(model, v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds))
+    states[penetrating + touching] = 1
+    held = np.array([gaps[i] for i in model.held])  # where it starts a link has no stretch
+    return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved, tuple(states.tolist()), held)
+
+
+def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Numbers (c,) of the states in which elements start, contacts open; rates (c,) of gaps, and of their terms."""
+    states = np.zeros(len(model.contacts), int)
+    for i in model.held:
+        element, rate = model.contacts[i], drop_round_off(rates[[i]], sizes[[i]])[0]
+        states[i] = [state.name for state in element.states].index(element.first_state(0.0, float(rate)))
+    return states
+
+
+def _check_going_on(run: Run) -> None:
+    """Refuse a trajectory from whose end this run cannot go on."""
+    start = run.start
+    if not isinstance(start, Trajectory):
+        raise MultiPhiTypeError(f"start: got {type(start).__name__}, need a Trajectory")
+    if run.displacement is not None or run.velocity is not None:
+        raise MultiPhiValueError("start: got a displacement or velocity as well, need one of them")
+    if start.model is not (run.model.decided or run.model):
+        raise MultiPhiValueError("start: got a trajectory of another model, need one of the same object")
+    if start.status != "ok":
+        raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
+    if not run.t_end > start.t_end:
+        raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
 
 
 def _lengths(
@@ -188,11 +209,6 @@ def _lengths(
     gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
     motion = np.linalg.norm(y) + np.linalg.norm(v * times) + np.linalg.norm(load * times**2)
     return np.asarray(sizes * (motion + np.max(gaps, initial=0.0)))
-
-
-def _pulls(contact: Contact, gap: float, rate: float) -> bool:
-    """Whether a contact inside its stop is viscous and would pull."""
-    return contact.damping > 0 and contact.stiffness * gap + contact.damping * rate > 0
 
 
 def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:

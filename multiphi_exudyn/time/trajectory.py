@@ -15,11 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.state import Event, Loss, Phase, State
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.segment import Segment
+from multiphi_exudyn.time.segment import Segment, Segments, listed
 
 __all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
 
@@ -32,6 +33,8 @@ class Start:
     """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 
     gaps: (c,) [m] of all contacts at y = 0, as stops that have moved leave them.
+    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
+    time [s], state: when the run begins, and of one that goes on from another what that has come to.
     """
 
     displacement: np.ndarray
@@ -39,6 +42,10 @@ class Start:
     penetrating: tuple[int, ...]
     touching: tuple[int, ...]
     gaps: np.ndarray
+    states: tuple[int, ...]
+    held: np.ndarray
+    time: float = 0.0
+    state: State | None = None
 
 
 @dataclass(frozen=True)
@@ -112,23 +119,45 @@ class Trajectory:
 
     def acceleration(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
         """x'' [m/s2, rad/s2]: (n,) or (n, k)."""
-        return self._full(t, side, 2)
+        shapes = self.model.base.modes.shapes
+        return np.asarray(
+            self._evaluate(
+                t, side, lambda segment, times: shapes @ (segment.level.level.vectors @ segment.modal(times, 2))
+            )
+        )
 
     def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,)."""
         row = self.model.base.modes.shapes.T @ self.model.structure.row(point)
-        return self._evaluate(t, side, lambda segment, times: self._of_row(segment, row, times))
+
+        def function(level: LoadedLevel) -> np.ndarray:
+            place = row @ level.level.vectors
+            return np.concatenate([place, np.zeros(len(place)), [row @ level.asymptotic.configuration]])
+
+        return self._values(t, side, function)
 
     def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Gap [m] of a contact: a float, or (k,)."""
         i = self.model.index(contact)
 
-        return self._evaluate(t, side, lambda segment, times: segment.gaps(i, times))
+        def function(level: LoadedLevel) -> np.ndarray:
+            gap = level.level.gap_rows[i]
+            return np.concatenate([gap, np.zeros(len(gap)), [level.gap_constants[i]]])
+
+        return self._values(t, side, function)
 
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
         i = self.model.index(contact)
-        return self._evaluate(t, side, lambda segment, times: segment.force(i, times))
+
+        def function(level: LoadedLevel) -> np.ndarray:
+            own = level.level
+            if i not in own.indices:
+                return np.zeros(2 * own.modes + 1)
+            k = own.indices.index(i)
+            return np.concatenate([own.force_rows[k], own.force_rate_rows[k], [level.asymptotic.forces[k]]])
+
+        return self._values(t, side, function)
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
         """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
@@ -150,13 +179,14 @@ class Trajectory:
         """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
         i = self.model.index(contact)
         intervals: list[tuple[float, float]] = []
-        for segment in self.segments:
-            if i not in segment.level.level.indices or segment.end <= segment.start:
-                continue
-            if intervals and intervals[-1][1] == segment.start:
-                intervals[-1] = (intervals[-1][0], segment.end)
+        own = self._segments
+        closed = np.array([i in level.level.indices for level in own.levels], bool)
+        places = np.flatnonzero(closed[own.numbers] & (own.ends > own.starts)) if len(own) else np.zeros(0, np.int64)
+        for start, end in zip(own.starts[places].tolist(), own.ends[places].tolist(), strict=True):
+            if intervals and intervals[-1][1] == start:
+                intervals[-1] = (intervals[-1][0], end)
             else:
-                intervals.append((segment.start, segment.end))
+                intervals.append((start, end))
         return intervals
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
@@ -168,21 +198,29 @@ class Trajectory:
         """Where the energy went; computed when it is asked for. A run that failed at its start has none."""
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
-        losses = sum((event.loss for event in self.events), self.start_loss)
-        y0, v0 = self.start.displacement, self.start.velocity
-        last = self.final
+        losses = self.start_loss + total_loss(self.events)
+        damped, varying = self._segments.works
+        y0, last = self.start.displacement, self.final
         assert last is not None, "a run with segments has a final state"
-        varying = sum((segment.varying_work() for segment in self.segments), self.final_work)
         reached = last.level.configuration(last.displacement)
         return Ledger(
-            initial=0.5 * float(v0 @ v0) + self.model.base.strain(y0, self.start.penetrating, self.start.gaps),
-            work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying,
+            initial=self._initial_energy,
+            work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying + self.final_work,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
-            damping=losses.damping + sum(segment.damping_work() for segment in self.segments),
+            damping=losses.damping + damped,
             final=last.kinetic + float(last.level.strain(last.displacement)),
         )
+
+    @property
+    def _initial_energy(self) -> float:
+        """Kinetic and strain energy [J] at the start."""
+        start = self.start
+        if start.state is not None:
+            return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
+        strain = self.model.base.strain(start.displacement, start.penetrating, start.gaps)
+        return 0.5 * float(start.velocity @ start.velocity) + strain
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
@@ -221,8 +259,8 @@ class Trajectory:
     @property
     def _instants(self) -> np.ndarray:
         """Times (k,) [s] at which runs are compared: evenly spaced, and the events."""
-        even = np.linspace(0.0, self.t_end, INSTANTS)
-        return np.union1d(even, [event.time for event in self.events])
+        even = np.linspace(self.start.time, self.t_end, INSTANTS)
+        return np.union1d(even, event_table(self.events, self.model.index)[:, 0])
 
     def _configurations(self, times: np.ndarray) -> np.ndarray:
         """y (m, k)."""
@@ -230,20 +268,21 @@ class Trajectory:
 
     # ------------------------------------------------------------------ evaluation
 
-    def _of_row(self, segment: Segment, row: np.ndarray, times: np.ndarray) -> np.ndarray:
-        own = segment.level
-        return (row @ own.level.vectors) @ segment.modal(times) + row @ own.asymptotic.configuration
-
     def _full(self, t: float | np.ndarray, side: str, derivative: int) -> np.ndarray:
-        shapes = self.model.base.modes.shapes
+        times = self._times(t)
+        places, segments = self._owners(times, side), self._segments
+        shapes, states = self.model.base.modes.shapes, segments.states(places, times - segments.starts[places])
+        numbers, result = segments.numbers[places], np.empty((len(shapes), len(times)))
+        for number in np.unique(numbers).tolist():
+            level, own = segments.levels[number], numbers == number
+            x = np.linalg.multi_dot([shapes, level.level.vectors, states[derivative, own, : level.level.modes].T])
+            result[:, own] = x if derivative else x + (shapes @ level.asymptotic.configuration)[:, None]
+        return result if np.ndim(t) else result[:, 0]
 
-        def values(segment: Segment, times: np.ndarray) -> np.ndarray:
-            y = segment.level.level.vectors @ segment.modal(times, derivative)
-            if derivative == 0:
-                y = y + segment.level.asymptotic.configuration[:, None]
-            return shapes @ y
-
-        return np.asarray(self._evaluate(t, side, values))
+    def _values(self, t: float | np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> float | np.ndarray:
+        """row.(xi, xi', 1) at times, as ``Segments.values`` has it."""
+        found = self._segments.values(self._times(t), _side(side), row)
+        return found if np.ndim(t) else float(found[0])
 
     def _evaluate(
         self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
@@ -270,22 +309,24 @@ class Trajectory:
             raise MultiPhiTypeError(f"t: got {type(t).__name__}, need a time or (k,) times in s") from error
         if times.ndim != 1 or len(times) == 0:
             raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
-        if not self.segments or not np.all((times >= 0) & (times <= self.t_end)):
+        if not self.segments or not np.all((times >= self.start.time) & (times <= self.t_end)):
             raise MultiPhiValueError(
-                f"t: got {np.min(times):g} to {np.max(times):g} s, need 0 <= t <= {self.t_end:g} s"
+                f"t: got {np.min(times):g} to {np.max(times):g} s, need {self.start.time:g} <= t <= {self.t_end:g} s"
             )
         return times
 
     @functools.cached_property
-    def _starts(self) -> np.ndarray:
-        kept = getattr(self.segments, "starts", None)  # of the loop (record.py)
-        return np.array([segment.start for segment in self.segments]) if kept is None else np.asarray(kept)
+    def _segments(self) -> Segments:
+        return listed(self.segments)
 
     def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
-        if side not in ("left", "right"):
-            raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
-        found = np.searchsorted(self._starts, times, side="right" if side == "right" else "left") - 1
-        return np.maximum(found, 0)
+        return self._segments.owners(times, _side(side))
+
+
+def _side(side: str) -> str:
+    if side not in ("left", "right"):
+        raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
+    return side
 
 
 def _parted(run: Trajectory, times: np.ndarray, expected: np.ndarray, limit: float) -> float:

@@ -22,7 +22,12 @@ DRIFTED = 1e-10  # of the largest value: what a sensitive motion has drifted bef
 INSTANTS = 60  # at which motions are compared
 DIGEST = 8  # of them are kept for a comparison of processors
 AT_EVENT = 1e-7  # of the run: closer to an event, velocities are not compared
-OTHER_TOUCH = (1e-12, 1e-10)  # brute force is tried with where it and the run differ
+OTHERWISE = (  # brute force is tried so where it and the run differ: another touch, shorter steps
+    {"touch": 1e-12},
+    {"touch": 1e-10},
+    {"finer": 2},
+    {"finer": 8},
+)
 IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated load misses more than motion
 BODY_STEPS = 400  # of the Exudyn body, each of which ends exactly
 BODY_NUDGE = 1e-9  # of the start and of the stiffness: what Newton's iterations leave of a state
@@ -66,7 +71,7 @@ def native(scene):
     time, length, _ = (2.0**power for power in scene.units)
     runs, columns, first = [], [], 0.0
     for last in (*(t * time for t in scene.split), t_end):
-        run = mp.simulate(model, last - first, x, v, [later(load, first) for load in loads], compiled=False)
+        run = mp.simulate(model, last - first, x, v, [later(load, first) for load in loads])
         runs.append(run)
         wanted = instants(scene) * time - first
         wanted = wanted[(wanted >= 0) & (wanted <= run.t_end) & (wanted < last - first)] if run.segments else []
@@ -140,15 +145,15 @@ def _compared(scene, motion):
     near = [np.min(np.abs(t - np.array([e[0] for e in answer.events])), initial=np.inf) for t in instants(scene)]
     found = _difference(scene, motion, expected, "failure: wrong", np.array(near) > AT_EVENT * scene.t_end)
     if found and found[0][0] == "failure: wrong":
-        return _with_other_touch(scene, motion, start, times, expected, found)
+        return _otherwise(scene, motion, start, times, expected, found)
     return found
 
 
-def _with_other_touch(scene, motion, start, times, expected, found):
-    """What is to be said, which is not ``found`` where brute force hangs on what it takes for touching."""
-    for touch in OTHER_TOUCH:
+def _otherwise(scene, motion, start, times, expected, found):
+    """What is to be said, which is not ``found`` where brute force hangs on how it is set."""
+    for setting in OTHERWISE:
         try:
-            other = motion_of(scene, brute_force.solved(scene.system, *start, times, touch))
+            other = motion_of(scene, brute_force.solved(scene.system, *start, times, **setting))
         except brute_force.NoAnswer:
             continue
         if np.max(_errors(scene, motion, other)) <= NEAR:

@@ -8,7 +8,6 @@ extended precision.
 import numpy as np
 
 from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.time.driven.segment import DrivenSegment
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
@@ -102,7 +101,7 @@ def energy(run, segments, scale, samples=5):
 
 
 def missed(run, segments, samples, metre=1.0):
-    """No contact leaves its state's admissible range unheard: s >= 0 (events/rule.py) on every segment.
+    """No contact leaves its state's admissible range unheard: s >= 0 (events/decision.py) on every segment.
 
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
     of the whole run: an impact that stops all motion leaves a state that is round-off of the one before.
@@ -232,9 +231,7 @@ def _complete(run):
 
 
 def _load(run, segment):
-    """Constant loads (m,); those that pull at damped rigid-body motion are a channel (driven/excitation.py)."""
-    if not isinstance(segment, DrivenSegment):
-        return run.load
+    """Constant loads (m,); those that pull at damped rigid-body motion are a channel (excitation.py)."""
     _, w = segment.level.split(segment.modal(np.array([segment.start])))
     return segment.level.excitation.load(w[:, 0])
 

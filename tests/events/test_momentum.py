@@ -26,9 +26,9 @@ def balance(run, velocity, load):
     return structure.mass @ (run.velocity(run.t_end) - velocity) + inner @ weights
 
 
-@pytest.mark.parametrize("compiled", [False, None], ids=["numpy", "compiled"])
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", range(6))
-def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed, compiled):
+def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed):
     random = np.random.default_rng(seed)
     n = int(random.integers(2, 5))
     root, row = random.normal(size=(2, n, n))
@@ -37,13 +37,8 @@ def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed, compiled):
     stops = [mp.UnilateralContact(f"c{i}", f"m{i}", 0.02 * i) for i in range(n - 1)]
     stops.append(mp.UnilateralContact("soft", f"m{n - 1}", 0.01, 400.0))
     load, velocity = -5 * np.ones(n), random.normal(size=n)
-    run = mp.simulate(
-        mp.MultiPhiModel(structure, stops, modes="all"),
-        3.0,
-        velocity=velocity,
-        loads=[mp.ConstantLoad(load, 1.0)],
-        compiled=compiled,
-    )
+    model = mp.MultiPhiModel(structure, stops, modes="all")
+    run = mp.simulate(model, 3.0, velocity=velocity, loads=[mp.ConstantLoad(load, 1.0)])
     assert run.status == "ok"
     assert len(run.events) > 5
     given = sum(structure.row(stop.direction) * run.contact_impulse(stop.name, 0.0, run.t_end) for stop in stops)
@@ -51,6 +46,7 @@ def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed, compiled):
     assert np.max(np.abs(given - needed)) < UNSEEN * np.max(np.abs(needed))
 
 
+@pytest.mark.usefixtures("both_ways")
 def test_a_contact_that_stays_closed_in_the_impact_of_another_takes_its_share():
     """Two masses, coupled by the mass matrix: the first rests on its stop when the second strikes."""
     structure = mp.LinearStructure([[2.0, 1.0], [1.0, 2.0]], np.eye(2), points={"a": 0, "b": 1})

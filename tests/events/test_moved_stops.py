@@ -34,6 +34,7 @@ def started_moved(seed, kind, moved, truncated):
     return mp.simulate(model, 0.5, displacement=x, velocity=random.normal(size=n), loads=loads)
 
 
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("moved", ["stop", "base"])
 @pytest.mark.parametrize(("kind", "truncated"), CASES)
 def test_the_ledger_closes_whatever_stop_has_moved_at_the_start(kind, moved, truncated):
@@ -63,6 +64,7 @@ def test_rigid_stops_that_one_mode_cannot_meet_end_in_no_endless_exchange(kind, 
     assert ended >= 6
 
 
+@pytest.mark.usefixtures("both_ways")
 def test_a_spring_pressed_by_its_moved_stop_holds_energy_at_the_start():
     structure = mp.LinearStructure([[1.0]], [[4.0]], points={"m0": 0})
     model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m0", 0.0, 10.0)], modes="all")

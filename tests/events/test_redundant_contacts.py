@@ -28,7 +28,7 @@ def bar(gap=GAP, order=None, places=PLACES):
 def loaded(at, model, velocity, t_end):
     """A run under the load at a place along the bar."""
     row = np.array([1 - at, at])
-    return simulate(model, t_end, velocity=velocity, loads=[ConstantLoad(row, -LOAD)], compiled=False)
+    return simulate(model, t_end, velocity=velocity, loads=[ConstantLoad(row, -LOAD)])
 
 
 def forces(run, t):
@@ -36,6 +36,7 @@ def forces(run, t):
     return np.array([float(run.contact_force(f"c{i}", t)) for i in range(len(run.model.contacts))])
 
 
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("at", [0.0, 0.1, 0.25, 0.4, 0.5, 0.77, 1.0])
 def test_at_rest_the_forces_push_and_balance_the_load_and_its_moment(at):
     run = loaded(at, bar(gap=0.0), [0.0, 0.0], 1.0)
@@ -47,6 +48,7 @@ def test_at_rest_the_forces_push_and_balance_the_load_and_its_moment(at):
     assert abs(run.ledger.residual) < ROUND_OFF
 
 
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_a_symmetric_fall_is_symmetric_though_one_set_of_forces_of_many_need_not_be(count):
     """Of more than two stops an independent set carries the bar: its forces have the sum and the moment of all."""
@@ -60,6 +62,7 @@ def test_a_symmetric_fall_is_symmetric_though_one_set_of_forces_of_many_need_not
     assert all(event.impulse >= 0 for event in run.events)
 
 
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (2, 4, 0, 3, 1)])
 @pytest.mark.parametrize("at", [0.3, 0.5])
 def test_struck_flat_it_stops_with_all_its_energy_lost_whatever_the_order_of_the_stops(at, order):

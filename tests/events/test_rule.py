@@ -5,7 +5,6 @@ The scenes of ``TestSmallestScenes`` are the smallest in which one sentence of t
 
 import dataclasses
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ from multiphi_exudyn import (
     planar_beam,
     simulate,
 )
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time import chatter
 from reference_models.rig import rig_beam, rig_contact
 
 DAMPINGS = ("none", "modal", "rayleigh", "given")
@@ -92,6 +91,7 @@ class TestWhateverTheScene:
             assert np.min(force) >= -1e-8 * max(1.0, np.max(np.abs(force)))
 
 
+@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize(("seed", "damping"), [(199, "given"), (1047, "given"), (1429, "modal"), (2747, "given")])
 def test_a_rigid_contact_does_not_wait_for_its_reaction_to_rise_to_zero(seed, damping):
     """Closed at the start, with a reaction that truncation has put below zero and that rises: it opens at once."""
@@ -101,15 +101,17 @@ def test_a_rigid_contact_does_not_wait_for_its_reaction_to_rise_to_zero(seed, da
     assert min(np.min(run.contact_force(contact.name, t)) for contact in m.contacts) >= -1e-9
 
 
-class TestSmallestScenes:
-    def test_a_refused_contact_asks_only_where_it_may_close(self):
-        """80 of 122 modes: the reaction of the level to enter is round-off of terms 1e9 times as large."""
-        m = MultiPhiModel(planar_beam(rig_beam(), elements=57), [rig_contact()], modes=80)
-        x = m.static_equilibrium({"node3": 1.0})
-        run = simulate(m, 0.09, displacement=0.02 * x / (m.structure.row("node3") @ x))
-        assert run.status == "ok"
-        assert all(segment.end > segment.start for segment in run.segments)
+def test_a_refused_contact_asks_only_where_it_may_close():
+    """80 of 122 modes: the reaction of the level to enter is round-off of terms 1e9 times as large."""
+    m = MultiPhiModel(planar_beam(rig_beam(), elements=57), [rig_contact()], modes=80)
+    x = m.static_equilibrium({"node3": 1.0})
+    run = simulate(m, 0.09, displacement=0.02 * x / (m.structure.row("node3") @ x))
+    assert run.status == "ok"
+    assert all(segment.end > segment.start for segment in run.segments)
 
+
+@pytest.mark.usefixtures("both_ways")
+class TestSmallestScenes:
     def test_an_impact_that_stops_the_only_mode_holds_it(self):
         """One mode: after the impact its velocity is round-off of the one before, not of itself."""
         m = oscillator(gap=-1.0, contact=math.inf)
@@ -188,7 +190,7 @@ class TestSmallestScenes:
         assert_allclose(run.energy(50.0), 0.5, rtol=1e-10)
 
     def test_more_events_than_the_modes_can_follow_are_a_failure_with_its_cause(self, monkeypatch):
-        monkeypatch.setattr(sys.modules[Motion.__module__], "EVENTS_PER_PERIOD", 1.5)
+        monkeypatch.setattr(chatter, "EVENTS_PER_PERIOD", 1.5)
         run = simulate(oscillator(gap=0.0, contact=8.0), 1000.0, displacement=[1.0])
         assert run.status == "failed"
         assert "chatter: 200 events in" in run.message
@@ -196,6 +198,7 @@ class TestSmallestScenes:
         assert_allclose(run.energy(run.t_end), 4.0, rtol=1e-10)
 
 
+@pytest.mark.usefixtures("both_ways")
 class TestNotANumber:
     def test_an_overridden_frequency_that_is_none_is_a_failed_run(self):
         m = MultiPhiModel(chain(2), [stop()], "all", {(): LevelOverride([math.nan])})
@@ -210,7 +213,7 @@ def test_a_closed_rigid_contact_never_pulls_whatever_others_did_at_its_instant()
     for number in (3559, 8999, 9045, 9361, 9920, 10099):
         case = built(recipe_of(number))
         given = case.displacement, case.velocity, case.loads
-        assert not complaints(simulate(case.model, case.t_end, *given, compiled=False))
+        assert not complaints(simulate(case.model, case.t_end, *given))
 
 
 @pytest.mark.parametrize(
@@ -229,11 +232,12 @@ def test_a_closed_rigid_contact_never_pulls_whatever_others_did_at_its_instant()
 def test_what_random_cases_found(number):
     """Seeds of a random campaign: energy out of round-off, or contacts that depend on each other."""
     case = built(recipe_of(number))
-    run = simulate(case.model, case.t_end, case.displacement, case.velocity, case.loads, compiled=False)
+    run = simulate(case.model, case.t_end, case.displacement, case.velocity, case.loads)
     assert run.status == "ok", run.message
     assert not complaints(run)
 
 
+@pytest.mark.usefixtures("both_ways")
 class TestRedundantContacts:
     """Of contacts that follow from each other a set that is independent carries all: the motion knows no difference."""
 

@@ -20,6 +20,8 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
+from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels import model as model_module
 from reference_models.body_alone import solve_body_alone
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
@@ -283,6 +285,39 @@ def test_forces_and_springs_on_the_coordinates_converge_to_another_integrator():
     assert events >= 4
     assert np.all(observed_orders(errors) >= 1.8)
     assert errors[-1] < 2e-5
+
+
+def test_later_bodies_of_a_model_answer_as_the_first_one_of_another_to_the_bit(monkeypatch):
+    """What a solver needs of a level is kept with the model, by the step and by what it is matched to."""
+    built, of = [], SteppedLevel.of
+
+    def counted(*given):
+        built.append(given[1:])
+        return of(*given)
+
+    monkeypatch.setattr(SteppedLevel, "of", counted)
+    contacts = [mp.UnilateralContact("stop", "m2", 2e-3, 1e5)]
+    kept = chain(contacts)
+    for step, matched in ((1e-3, 1e-3), (2e-3, None), (1e-3, None), (2e-3, 2e-3)) * 2:
+        given = {"velocity": [0.0, -1.0, 0.7], "matchedStepSize": matched, "add": pushed_and_held}
+        later, alone = run(kept, step, 0.2, **given), run(chain(contacts), step, 0.2, **given)
+        assert later.events == alone.events != []
+        assert np.array_equal(later.points["m2"], alone.points["m2"])
+    of_new_models = 8
+    assert len(built) == 2 * (of_new_models + 3)  # open and closed: matched to two steps, and plain
+
+
+def test_conditions_of_a_step_are_kept_by_all_that_they_depend_on():
+    """By the step, by the step that modes are matched to, and by what points carry of forces."""
+    contacts = [mp.UnilateralContact("stop", "m2", 2e-3, 1e5)]
+    kept, found = OwnLoads(chain(contacts), (), 3, 0.0, 1.0), []
+    for matched, step, carried in ((None, 1e-3, 0.0), (1e-3, 1e-3, 0.0), (None, 2e-3, 0.0), (None, 1e-3, 1.0)):
+        loads = kept, OwnLoads(chain(contacts), (), 3, 0.0, 1.0)
+        direct = np.full((1, 1), carried)
+        ours, anew = (each.conditions(each.stepped((0,), matched), step, direct) for each in loads)
+        assert np.array_equal(ours.ahead, anew.ahead)
+        assert not any(np.array_equal(ours.ahead, other) for other in found)
+        found.append(ours.ahead)
 
 
 def test_a_constant_force_on_a_matched_body_is_exact():

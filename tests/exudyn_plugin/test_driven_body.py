@@ -10,11 +10,12 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.exudyn_plugin.body.certified_driven_step import jump_times
+from multiphi_exudyn.exudyn_plugin.body.certified_step import jump_times
 from reference_models.exudyn_quiet import quiet
 from reference_models.solver_settings import fixed_steps
 
 T_END = 5.0
+ITERATED = 1e-9  # relative: what Newton's iterations leave of an answer that has no error of the step
 SOFT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
 RIGID = (mp.UnilateralContact("below", "m2", 0.1),)
 SHAKEN = mp.StopMotion("below", mp.Harmonic(0.1, 0.7, -math.pi / 2))
@@ -84,7 +85,7 @@ def test_beside_others_the_difference_to_the_native_run_falls_with_the_square_of
         errors.append(np.max(np.abs(found.points["m1"] - expected)) / np.max(np.abs(expected)))
         assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
     assert errors[1] < 5e-4
-    assert math.log2(errors[0] / errors[1]) > 1.7
+    assert errors[1] < ITERATED or math.log2(errors[0] / errors[1]) > 1.7
 
 
 @pytest.mark.parametrize("contacts", [SOFT, RIGID], ids=["compliant", "rigid"])

@@ -9,13 +9,13 @@ import pytest
 from small_structures import chain
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.time.simulate import motion_of
+from multiphi_exudyn.time.loop import advance
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -120,17 +120,14 @@ def test_a_function_of_the_user_changes_the_way_and_not_the_answer(kind):
     model = model_of(KINDS[kind])
     alone, asked = (System(model, before, matchedStepSize=STEP) for before in (None, observed))
     first, second = alone.solve(), asked.solve()
-    assert (alone.body.next_time, asked.body.next_time) == (pytest.approx(T_END), -math.inf)
+    assert (alone.body.next_time, asked.body.next_time) == (pytest.approx(T_END), math.inf)
     assert same_events(first.events, second.events)
     assert np.max(np.abs(first.points["m1"] - second.points["m1"])) < 1e-7
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
-    def in_numpy(model, rule, start, compiled):
-        return motion_of(model, rule, start, False)
-
-    monkeypatch.setattr("multiphi_exudyn.exudyn_plugin.body.body.motion_of", in_numpy)
+    monkeypatch.setattr("multiphi_exudyn.time.motion.carry", advance)
     model = model_of(KINDS[kind])
     native, found = mp.simulate(model, T_END, velocity=VELOCITY), System(model, matchedStepSize=STEP).solve()
     assert same_events(found.events, native.events)
@@ -169,8 +166,8 @@ def test_a_failure_on_the_way_is_told_when_exudyn_gets_there(monkeypatch):
     model = model_of(50.0)
     native = mp.simulate(model, T_END, velocity=VELOCITY)
     system = System(model, matchedStepSize=STEP)
-    monkeypatch.setattr("multiphi_exudyn.time.motion.CHATTER_WINDOW", 4)
-    monkeypatch.setattr("multiphi_exudyn.time.motion.EVENTS_PER_PERIOD", 0.01)
+    monkeypatch.setattr("multiphi_exudyn.time.chatter.CHATTER_WINDOW", 4)
+    monkeypatch.setattr("multiphi_exudyn.time.chatter.EVENTS_PER_PERIOD", 0.01)
     with pytest.raises(mp.MultiPhiError, match=r"body 'body': at t = .* chatter"):
         system.solve()
     reached = system.mbs.sys["dynamicSolver"].it.currentTime
@@ -278,7 +275,7 @@ def test_one_body_alone_and_one_that_is_held_in_one_system():
     mbs.Assemble()
     mbs.SolveDynamic(fixed_steps(T_END, 500, write_period=STEP), solverType=TRAPEZOIDAL)
     bodies, native = mbs.variables["multiPhi"], mp.simulate(model, T_END, velocity=VELOCITY)
-    assert (bodies["alone"].next_time, bodies["held"].next_time) == (pytest.approx(T_END), -math.inf)
+    assert (bodies["alone"].next_time, bodies["held"].next_time) == (pytest.approx(T_END), math.inf)
     assert np.max(distances(body_histories(mbs, alone), native)) < 1e-9
     assert np.max(distances(body_histories(mbs, held), native)) < 1e-6
     del container

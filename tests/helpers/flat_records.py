@@ -1,11 +1,42 @@
 """Flat buffers filled from the objects whose meaning the flat functions share, to compare the two."""
 
 import functools
+from typing import NamedTuple
+from unittest import mock
 
 import numpy as np
 
-from multiphi_exudyn.mathematics import compiled, flat_basis, flat_response, zero_crossing
-from multiphi_exudyn.mathematics.first_descent import Descent
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.mathematics import (
+    basis_arrays,
+    compiled,
+    least_distance_arrays,
+    response_arrays,
+    signal_bounds,
+    zero_crossing,
+)
+from multiphi_exudyn.mathematics.least_distance import Infeasible
+
+
+class Signals(NamedTuple):
+    """constants (s,) + Re coefficients (s, p) . phi(t), and how much of each is round-off (s,), None for none."""
+
+    coefficients: np.ndarray
+    constants: np.ndarray
+    noise: np.ndarray | None = None
+
+
+class Descent(NamedTuple):
+    """When a signal falls, and which."""
+
+    time: float
+    signal: int
+
+
+def as_they_are(function):
+    """A function run as plain Python."""
+    return function
+
 
 fast = functools.cache(compiled.entry)  # a function compiled, once in a process
 
@@ -36,7 +67,7 @@ class Buffers:
         powers, rates = self.put_ints(basis.powers), self.put_waves(basis.rates)
         scales = self.put_numbers([basis.unit, 0.0, 0.0])
         record = self.put_ints([len(basis.rates), powers, rates, scales, -1, -1])
-        flat_basis.describe_basis(*self.all, record)
+        basis_arrays.describe_basis(*self.all, record)
         return record
 
     def put_response(self, response, squares, damping):
@@ -50,15 +81,18 @@ class Buffers:
         places += [self.put_numbers(squares), self.put_numbers(np.diagonal(damping) / 2)]
         places += [self.put_ints(alone), self.put_ints(poles)]
         record = self.put_ints([r, basis, reached, *places])
-        flat_response.reached_modes(self.ints, self.waves, record)
+        response_arrays.reached_modes(self.ints, self.waves, record)
         return record
 
 
 class Search:
-    """``DescentFinder`` on flat buffers, for the signals of one basis; run: ``fast``, or as they are."""
+    """The certified search for the signals of one basis; run: ``fast``, or as they are.
 
-    def __init__(self, basis, signals, run=lambda function: function):
-        self._run = run
+    refine: factor on the density of the samples, of plain Python.
+    """
+
+    def __init__(self, basis, signals, run=fast, refine=1.0):
+        self._run, self._refine = run if refine == 1.0 else as_they_are, refine
         self.count, self.p = signals.coefficients.shape
         self.buffers = Buffers()
         noise = np.zeros(self.count) if signals.noise is None else signals.noise
@@ -72,7 +106,8 @@ class Search:
 
     def first(self, horizon, start=0.0):
         """The signal that falls first, or what is in its stead, and when."""
-        with np.errstate(all="ignore"):
+        resolution = signal_bounds.RESOLUTION / self._refine**4
+        with np.errstate(all="ignore"), mock.patch.object(signal_bounds, "RESOLUTION", resolution):
             found = self._run(zero_crossing.first_descent)(
                 *self.buffers.all, self.basis, self.signals, self.constants, self.noise, self.count, start, horizon,
                 self.scratch, self.scratch_wave, self.result,
@@ -83,7 +118,13 @@ class Search:
     def samples(self):
         return self.buffers.numbers[self.result + 1]
 
-    def simultaneous(self, found: Descent):
+    def descent(self, horizon, start=0.0):
+        """The first descent, None if there is none."""
+        found, time = self.first(horizon, start)
+        assert found >= zero_crossing.NONE
+        return None if found == zero_crossing.NONE else Descent(time, found)
+
+    def simultaneous(self, found):
         total = self._run(zero_crossing.simultaneous)(
             *self.buffers.all, self.basis, self.signals, self.constants, self.count, found.signal, found.time,
             self.scratch_wave, self.flags,
@@ -101,3 +142,20 @@ class Search:
             *self.buffers.all, self.basis, self.signals + s * self.p, constant, sizes, since, self.scratch,
             self.scratch_wave,
         )  # fmt: skip
+
+
+def flat_distance(rows, least, sizes, run=fast):
+    """``least_distance`` on flat buffers, with its failures."""
+    (k, r), buffers = rows.shape, Buffers()
+    given = [buffers.put_numbers(values) for values in (rows, least, sizes)]
+    x, p = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))
+    scratch = buffers.put_numbers(np.full(least_distance_arrays.least_distance_numbers(k, r), np.nan))
+    ints = buffers.put_ints(np.full(least_distance_arrays.least_distance_ints(k), -1))
+    answer = run(least_distance_arrays.shortest_vector)(
+        *buffers.all[:2], given[0], r, given[1], given[2], k, r, x, p, scratch, ints
+    )
+    if answer == least_distance_arrays.EXCLUDED:
+        raise Infeasible(buffers.ints[ints + 1 + 2 * k :][: buffers.ints[ints]].tolist())
+    if answer == least_distance_arrays.UNDECIDED:
+        raise NumericalFailure("least distance: round-off decides which inequalities push")
+    return buffers.numbers[x : x + r].copy(), buffers.numbers[p : p + k].copy()

@@ -111,10 +111,10 @@ BREACHES = {
     "a later room within one": ("study.scene.scenes", "from multiphi_exudyn.study.running import runs"),
     "what stands beside": ("time.simulate", "import reference_models.rig"),
     "for a type checker": ("levels.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
-    "inside a function": ("levels.level", "def f():\n    from multiphi_exudyn.events import rule"),
-    "by a string": ("levels.level", "importlib.import_module('multiphi_exudyn.events.rule').EventRule"),
-    "by a string alone": ("levels.level", "f = import_module('multiphi_exudyn.events.rule')"),
-    "by the built-in": ("levels.level", "__import__('multiphi_exudyn.events.rule')"),
+    "inside a function": ("levels.level", "def f():\n    from multiphi_exudyn.events import exits"),
+    "by a string": ("levels.level", "importlib.import_module('multiphi_exudyn.events.exits').after"),
+    "by a string alone": ("levels.level", "f = import_module('multiphi_exudyn.events.exits')"),
+    "by the built-in": ("levels.level", "__import__('multiphi_exudyn.events.exits')"),
 }
 
 

@@ -158,6 +158,16 @@ def test_meshed_bed(capsys, monkeypatch):
     assert "levels known: the finest mesh to the coarsest" in capsys.readouterr().out
 
 
+def test_coupled_speed(capsys, monkeypatch):
+    """Times are not asserted: both move the tip alike, and the body has every event."""
+    monkeypatch.syspath_prepend(EXAMPLES)
+    rows = load("coupled_speed").main(rounds=1)
+    assert [row.events for row in rows] == [20, 4, 6]
+    assert max(row.apart for row in rows) < 0.01
+    assert all(0 < row.ratio < math.inf for row in rows)
+    assert capsys.readouterr().out.count("Exudyn alone") == 3
+
+
 def test_body_speed(capsys):
     """Times are not asserted: a step of the body is as good as any other, and its error is that of its modes."""
     rows = load("body_speed").main(rounds=1)

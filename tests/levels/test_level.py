@@ -92,6 +92,19 @@ class TestModesOfALevel:
         assert_allclose(m.level(("stop",)).omega, [0])
         assert_allclose(m.level(("stop",)).shapes[0], 0, atol=1e-15)
 
+    @pytest.mark.parametrize("seed", range(20))
+    def test_the_motion_of_all_masses_together_changes_no_gap_between_them(self, seed):
+        """What round-off left of it was struck once with 1e17 times the momentum."""
+        random = np.random.default_rng(seed)
+        mass, springs = np.diag(random.uniform(0.5, 2, 5)), random.uniform(1, 1e4, 4)
+        across = np.diff(np.eye(5), axis=0)
+        structure = LinearStructure(mass, across.T @ (springs[:, None] * across))
+        pairs = ((3, 2), (1, 0), (0, 4))
+        stops = [UnilateralContact(f"c{k}", np.eye(5)[i] - np.eye(5)[j], 0.0) for k, (i, j) in enumerate(pairs)]
+        free = MultiPhiModel(structure, stops, modes=1)
+        for closed in ((), ("c0",), ("c1",), ("c0", "c1"), ("c0", "c1", "c2")):
+            assert not np.any(free.level(closed).gap_rows)
+
     def test_dependent_rigid_contacts_are_a_failure_that_names_them(self):
         twice = [stop("m0", name="left"), stop("m0", name="right")]
         with pytest.raises(NumericalFailure, match="left, right"):

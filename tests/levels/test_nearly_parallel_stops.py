@@ -31,7 +31,7 @@ def scene(seed, angle):
 def test_none_is_passed_and_none_fails(angle):
     for seed in range(5):
         model, loads, velocity = scene(seed, angle)
-        run = simulate(model, 3.0, velocity=velocity, loads=loads, compiled=False)
+        run = simulate(model, 3.0, velocity=velocity, loads=loads)
         assert run.status == "ok", run.message
         t = np.linspace(0, 3, 501)
         largest = np.max(np.abs(run.displacement(t)))
@@ -60,7 +60,7 @@ def test_below_the_threshold_the_second_follows_from_the_first(angle):
     structure = LinearStructure(np.eye(2), np.diag([3.0, 5.0]))
     model = MultiPhiModel(structure, contacts, modes="all")
     assert np.all(model.level(("one",)).gap_rows == 0)
-    run = simulate(model, 5.0, velocity=[-1.0, 1.0], loads=[ConstantLoad([1.0, 0.0], -1.0)], compiled=False)
+    run = simulate(model, 5.0, velocity=[-1.0, 1.0], loads=[ConstantLoad([1.0, 0.0], -1.0)])
     assert run.status == "ok"
     assert not complaints(run)
     assert_allclose(run.displacement(5.0), [0.0, np.sin(5**1.5) / 5**0.5], atol=1e-14)
@@ -75,7 +75,7 @@ def test_a_failure_of_linear_algebra_ends_a_run_with_its_cause(monkeypatch):
     monkeypatch.setattr(
         "multiphi_exudyn.levels.model.build_level", lambda *given: (singular if given[1] else build_level)(*given)
     )
-    run = simulate(model, 5.0, loads=[ConstantLoad([1.0, 0.0], -1.0)], compiled=False)
+    run = simulate(model, 5.0, loads=[ConstantLoad([1.0, 0.0], -1.0)])
     assert run.status == "failed"
     assert "linear algebra" in run.message
     assert run.message.startswith("at t = 0.451")

@@ -172,7 +172,7 @@ def answers():
     for free, damping in ((False, None), (False, mp.ModalDamping([0.01, 0.02, 0.3, 0.05])), (True, None)):
         model = mp.MultiPhiModel(square(5, damping=damping, free=free), STOPS, modes=4)
         velocity = np.random.default_rng(3).normal(size=25)
-        run = mp.simulate(model, 2.0, velocity=velocity - np.mean(velocity) - 0.3 * free, compiled=False)
+        run = mp.simulate(model, 2.0, velocity=velocity - np.mean(velocity) - 0.3 * free)
         t = np.linspace(0, 2, 30)
         found += [run.at("p", t).tolist(), run.at("q", t).tolist(), [event.time for event in run.events]]
     return found

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from carriers import CARRIERS
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.mathematics.forced_response import particular
@@ -31,16 +32,7 @@ def powers(x, rate, t, derivative, unit):
 @pytest.mark.parametrize("damping", [DIAGONAL, coupled(True), coupled(False)], ids=["diagonal", "rigid-alone", "all"])
 @pytest.mark.parametrize(
     ("rate", "horizon", "degree"),
-    [
-        (0.0, 0.01, 1),  # samples, close together
-        (0.0, 5.0, 8),
-        (1j, 30.0, 0),  # resonance
-        (1j * (1 + 1e-9), 30.0, 0),  # as good as resonance
-        (5j, 3.0, 2),
-        (25j, 0.3, 8),
-        (-1 + 3j, 2.0, 4),
-        (300j, 0.2, 8),
-    ],
+    CARRIERS,
 )
 def test_the_particular_response_satisfies_its_equation(rate, horizon, degree, damping):
     random = np.random.default_rng(0)

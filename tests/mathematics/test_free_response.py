@@ -102,20 +102,12 @@ class TestModalResponse:
             assert_allclose(by_response(response, later, t), by_response(response, c, t + 0.37), rtol=0, atol=1e-11)
 
     @pytest.mark.parametrize("duration", [1e-4, 0.05, 0.9, 6.0])
-    def test_integrals_and_dissipation_equal_quadrature(self, regime, duration):
+    def test_integrals_equal_quadrature(self, regime, duration):
         omega, damping = regime
         response = modal_response(omega**2, damping)
-        c = response.coefficients(*start(3), np.where(omega == 0, 1.7, 0.0))
         parts = np.linspace(0, duration, 9)[1:-1]
         exact, _ = quad_vec(response.basis.at, 0, duration, epsabs=1e-13, points=parts)
         assert_allclose(response.basis.integrals(duration), exact, rtol=1e-10, atol=1e-13)
-
-        def power(t):
-            _, rate = by_response(response, c, t)
-            return rate @ damping @ rate
-
-        work, _ = quad_vec(power, 0, duration, epsabs=1e-13, points=parts)
-        assert_allclose(response.dissipated(c, damping, duration), work, rtol=1e-8, atol=1e-12)
 
     def test_evaluates_many_times_at_once(self, regime):
         (omega, damping), times = regime, np.array([0.0, 0.2, 1.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_structures import chain, oscillator, random_model, stop
 
-from multiphi_exudyn import LinearStructure, ModalDamping, MultiPhiModel, simulate
+from multiphi_exudyn import LinearStructure, ModalDamping, MultiPhiModel, UnilateralContact, simulate
 from reference_models.stepwise import solve_stepwise
 
 METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -114,4 +114,14 @@ def test_a_rigid_contact_is_refused(refused):
         ValueError,
         "contact 'stop' stiffness: got inf",
         lambda: solve_stepwise(oscillator(contact=math.inf), 1.0, np.zeros(1), method="RK45", rtol=1e-6),
+    )
+
+
+def test_a_damper_is_refused(refused):
+    contact = UnilateralContact("stop", "m0", 1.0, 50.0, damping=0.1)
+    model = MultiPhiModel(chain(2), [contact], modes="all")
+    refused(
+        ValueError,
+        "contact 'stop' damping: got 0.1",
+        lambda: solve_stepwise(model, 1.0, np.zeros(2), method="RK45", rtol=1e-6),
     )

@@ -154,9 +154,9 @@ def test_a_studys_page_names_the_rows_of_each_kind():
 
 
 def test_the_catalogue_prints_what_its_models_warn_of():
-    outcomes = (Outcome("NumPy loop", warnings=(SHARE,)), Outcome("full model"))
+    outcomes = (Outcome("native", warnings=(SHARE,)), Outcome("full model"))
     told = text_table([CaseResult("clamp", "hard", outcomes)])
-    assert f"warning: static share: 1 of 2 runs (clamp, NumPy loop); clamp, NumPy loop: {SHARE[14:]}" in told
+    assert f"warning: static share: 1 of 2 runs (clamp, native); clamp, native: {SHARE[14:]}" in told
 
 
 # ---------------------------------------------------------------------- bodies in Exudyn

@@ -9,8 +9,9 @@ from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 
 LEVELS = {"beam-chain": 8, "bed-of-stops": 189, "two-sided-stop": 3}  # built by the run of a scene; two for all others
 POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4}
-MEMORY = {"beam-chain": 5e6, "bed-of-stops": 70e6}  # bytes at most; 2 MB for all others
-MOST_MODULES = 90  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
+MEMORY = {"beam-chain": 10e6, "bed-of-stops": 70e6}  # bytes at most; 8 MB for all others, of the loop's code and record
+PACKAGES = ("llvmlite", "numpy", "scipy", "threadpoolctl")  # llvmlite loads the loop; no exudyn, no matplotlib
+MOST_MODULES = 110  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
 
 
 @pytest.mark.parametrize("name", [name for name in shipped_scenes() if "hole" not in name])
@@ -20,9 +21,9 @@ def test_a_shipped_scene_takes_what_it_visits(name):
     assert needs.levels_built == LEVELS.get(name, 2)
     assert needs.levels_possible == POSSIBLE.get(name, 2)
     assert needs.dofs_carried <= 0.2 * needs.dofs_given
-    assert needs.packages == ("numpy", "scipy", "threadpoolctl")  # the last one by scipy; neither exudyn nor matplotlib
+    assert needs.packages == PACKAGES
     assert 10 < needs.modules <= MOST_MODULES
-    assert 0 < needs.memory <= MEMORY.get(name, 2e6)
+    assert 0 < needs.memory <= MEMORY.get(name, 8e6)
 
 
 def test_a_contact_that_is_never_reached_costs_no_level(tmp_path):
@@ -36,7 +37,7 @@ def test_the_command_prints_a_line_for_every_scene(tmp_path, capsys):
     heads, line = capsys.readouterr().out.splitlines()
     assert heads.split()[:3] == ["scene", "model", "levels"]
     assert "2 of 2" in line
-    assert line.split()[-3:] == ["numpy,", "scipy,", "threadpoolctl"]
+    assert line.endswith(", ".join(PACKAGES))
 
 
 def test_a_scene_without_a_reduced_model_is_refused(tmp_path, capsys):

@@ -225,6 +225,8 @@ def test_modes_of_several_beams_are_of_the_levels_the_reference_held_longest(tmp
         "contacts": [{"name": name, "direction": at} | given for name, at in directions.items()],
         "start": {"load_at": "a.tip", "measured_at": "a.tip", "displacement": 0.01},
         "outputs": {"t_end": 0.2, "points": ["a.tip"], "interval": 1e-3},
+        "models": [{"kind": "reduced", "name": name, "modes": int(name[1:])} for name in ("r24", "r12")],
+        "comparison": {"reference": "r24"},
     }
     scene = load_scene(write(tmp_path / "three.toml", data))
     compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)

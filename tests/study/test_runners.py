@@ -11,11 +11,10 @@ from multiphi_exudyn import (
     NumericalFailure,
     RayleighDamping,
     planar_beam,
-    simulate,
 )
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.running import reduced_runner
+from multiphi_exudyn.study.running import timing
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -118,23 +117,6 @@ def test_labels_say_what_a_model_is(bench, runs):
     assert runs["component"].label == "Craig-Bampton in Exudyn, 2 interface points + 12 modes, step 10 µs"
     assert runs["stepwise"].label == "solve_ivp, DOP853, rtol 1e-09, compliant levels, r = 6"
     assert runs["one-rigid-basis"].label == "global basis, rigid levels, r = 8 from each of two"
-
-
-@pytest.mark.parametrize("kind", ["reduced", "global-basis"])
-@pytest.mark.parametrize(("loop", "compiled"), [("numpy", False), ("compiled", True)])
-def test_the_loop_is_the_one_asked_for(tmp_path, monkeypatch, kind, loop, compiled):
-    asked = set()
-
-    def simulated(model, t_end, displacement, loads, compiled):
-        asked.add(compiled)
-        return simulate(model, t_end, displacement, compiled=False)
-
-    monkeypatch.setattr(reduced_runner, "simulate", simulated)
-    models = [{"kind": kind, "name": "one", "loop": loop}]
-    run = run_model(bench_of(tmp_path, models=models, comparison={"reference": "one"}), "one", progress=False)
-    assert run.ok
-    assert asked == {compiled}
-    assert run.label.endswith(", compiled") is compiled
 
 
 def test_a_component_loaded_inside_starts_from_a_projection_and_says_so(tmp_path):
@@ -252,7 +234,8 @@ def test_modes_and_a_tolerance_are_refused(tmp_path):
         load_scene(write(tmp_path / "scene.toml", data))
 
 
-def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once():
+def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once(monkeypatch):
+    monkeypatch.setattr(timing, "STEADY_S", 0.1)
     for duration, expected in ((0.001, 100), (0.03, 7), (0.5, 3), (3.0, 0)):
         result, first, repeats = repeated(lambda duration=duration: ("answer", duration), 7)
         assert (result, first) == ("answer", duration)

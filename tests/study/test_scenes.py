@@ -149,7 +149,6 @@ BROKEN = {
     "contact of a stepwise model": (
         ["models", 1], STEPWISE | {"contact": "rigid"}, "models[1].contact: got 'rigid', need no field of this name"
     ),
-    "unknown loop": (["models", 1, "loop"], "fast", "models[1].loop: got 'fast', need 'numpy' or 'compiled'"),
     "no start": (["start", "displacement"], 0.0, "start.displacement: got 0.0, need a value that is not zero"),
     "another kind": (["models", 0, "kind"], "exact", "models[0]: got"),
     "structure of no form": (["structure"], {}, "structure: got {}, need a table with the field rig or beam"),

@@ -33,7 +33,7 @@ BY_NAME = {case.name: case for case in CATALOGUE}
     "case", [c for c in chosen_cases(None, quick=True) if c.name not in SLOW], ids=lambda c: c.name
 )
 def test_no_case_of_the_quick_catalogue_is_wrong(case):
-    outcome = run_native(case, case.build(True), "NumPy loop", False, 20.0, BUDGET).outcome
+    outcome = run_native(case, case.build(True), 20.0, BUDGET).outcome
     assert outcome.wrong == ()
     assert outcome.status == "ok" or outcome.message
 
@@ -48,7 +48,7 @@ def honest(request):
     """Four masses over a stop: a problem and its trajectory, in which nothing is wrong."""
     contact = stop("m2", 0.2, request.param)
     problem = Problem(chain(4), [contact], 20.0, displacement=np.linspace(0.5, 2.0, 4))
-    trajectory = simulate(problem.model(), 20.0, problem.displacement, compiled=False)
+    trajectory = simulate(problem.model(), 20.0, problem.displacement)
     assert judge(problem, trajectory, BUDGET).complaints(1.0) == []
     assert len(trajectory.events) > 6
     return problem, trajectory
@@ -92,19 +92,19 @@ class TestTheJudgeSees:
 
     def test_a_loss_that_is_not_in_the_ledger(self):
         problem = Problem(chain(4), [stop("m2", 0.2)], 20.0, displacement=np.linspace(0.5, 2.0, 4))
-        trajectory = simulate(problem.model(), 20.0, problem.displacement, compiled=False)
+        trajectory = simulate(problem.model(), 20.0, problem.displacement)
         free = [dataclasses.replace(e, loss=dataclasses.replace(e.loss, impact=0.0)) for e in trajectory.events]
         assert "ledger residual" in complaints(problem, dataclasses.replace(trajectory, events=tuple(free)))
 
     def test_a_force_that_is_not_the_law(self):
         problem = Problem(chain(4), [stop("m2", 0.2, 40.0)], 20.0, displacement=np.linspace(0.5, 2.0, 4))
-        trajectory = simulate(problem.model(), 20.0, problem.displacement, compiled=False)
+        trajectory = simulate(problem.model(), 20.0, problem.displacement)
         stiffer = dataclasses.replace(problem, contacts=[dataclasses.replace(problem.contacts[0], stiffness=41.0)])
         assert "m beyond the contact law" in complaints(stiffer, trajectory)
 
     def test_a_rigid_contact_that_pulls(self):
         problem = Problem(chain(2), [stop("m1", -0.5)], 4.0, displacement=np.array([0.25, 0.5]))
-        trajectory = simulate(problem.model(), 4.0, problem.displacement, compiled=False)
+        trajectory = simulate(problem.model(), 4.0, problem.displacement)
         assert complaints(problem, trajectory) == ""
         pulled = [dataclasses.replace(s, level=_with_forces(s.level, -1.0)) for s in trajectory.segments]
         assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=tuple(pulled)))
@@ -116,7 +116,7 @@ class TestTheJudgeKnowsLaws:
     @staticmethod
     def run(name):
         problem = BY_NAME[name].build(True)
-        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads, compiled=False)
+        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
         assert complaints(problem, trajectory) == ""
         assert len(trajectory.events) > 2
         return problem, trajectory
@@ -150,7 +150,7 @@ class TestTheJudgeKnowsLaws:
         problem = BY_NAME["law-clearance-both-sides"].build(True)
         law = problem.contacts[0]
         vars(law)["springs"] = law.springs[:1]
-        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, compiled=False)
+        trajectory = simulate(problem.model(), problem.t_end, problem.displacement)
         assert "m beyond the contact law" in complaints(problem, trajectory)
 
     @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-stop-viscous", "moving-base-fixed-rigid-stop"])
@@ -174,7 +174,7 @@ def test_a_truncated_depth_that_is_not_reported_is_wrong():
     model, random = random_model(169, kind="mixed")
     velocity = random.normal(size=model.structure.n) * 3
     problem = Problem(model.structure, model.contacts, 20.0, model.modes, velocity=velocity)
-    trajectory = simulate(problem.model(), 20.0, velocity=velocity, compiled=False)
+    trajectory = simulate(problem.model(), 20.0, velocity=velocity)
     found = judge(problem, trajectory, BUDGET)
     assert found.truncated
     assert found.complaints(1.0) == []
@@ -185,7 +185,7 @@ def test_a_truncated_depth_that_is_not_reported_is_wrong():
 def test_an_answer_does_not_depend_on_the_unit_of_length():
     case = BY_NAME["units-mm-N-t"]
     problem = case.build(True)
-    trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads, compiled=False)
+    trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
     assert case.check(problem, trajectory) == ""
     late = [dataclasses.replace(event, time=event.time + 1e-6) for event in trajectory.events]
     assert "apart" in case.check(problem, dataclasses.replace(trajectory, events=tuple(late)))
@@ -205,7 +205,7 @@ class TestOutcomes:
 
     def native(self, monkeypatch, simulate=simulate, limit_s=20.0):
         monkeypatch.setattr(native_run, "simulate", simulate)
-        return run_native(self.CASE, self.PROBLEM, "NumPy loop", False, limit_s, BUDGET).outcome
+        return run_native(self.CASE, self.PROBLEM, limit_s, BUDGET).outcome
 
     def test_a_failure_of_the_model_s_own_is_not_wrong(self, monkeypatch):
         def failing(*given, **options):
@@ -231,12 +231,11 @@ class TestOutcomes:
 
     def test_every_model_of_a_small_case_agrees_with_the_native_one(self):
         result = run_case(self.CASE, QUICK)
-        numpy_loop, compiled, body, full = result.outcomes
-        assert [o.status for o in result.outcomes if o is not compiled] == ["ok", "ok", "ok"]
+        native, body, full = result.outcomes
+        assert [o.status for o in result.outcomes] == ["ok", "ok", "ok"]
         assert body.difference < 1e-6
         assert full.difference < 1e-3
-        assert compiled.status == "not run" or compiled.difference < 1e-9
-        assert body.events == numpy_loop.events > 0
+        assert body.events == native.events > 0
 
     def test_a_rigid_contact_has_no_full_model_unless_a_penalty_stands_in(self):
         rigid = dataclasses.replace(self.PROBLEM, contacts=[stop("m1", 0.1)])
@@ -305,9 +304,9 @@ RESULTS = [
     CaseResult(
         "sound",
         "Nothing.",
-        (Outcome("NumPy loop", residual=1e-15, events=3), Outcome("user object", "failed", "a cause")),
+        (Outcome("native", residual=1e-15, events=3), Outcome("user object", "failed", "a cause")),
     ),
-    CaseResult("broken", "All & <everything>.", (Outcome("NumPy loop", wrong=("2 closings without an event",)),)),
+    CaseResult("broken", "All & <everything>.", (Outcome("native", wrong=("2 closings without an event",)),)),
 ]
 
 
@@ -322,16 +321,16 @@ class TestTables:
 
     def test_the_json_holds_every_figure(self):
         found = json.loads(json.dumps(contents(RESULTS, {}, quick=False), allow_nan=False))
-        assert found["cases"]["sound"]["models"]["NumPy loop"]["residual"] == 1e-15
+        assert found["cases"]["sound"]["models"]["native"]["residual"] == 1e-15
         assert found["cases"]["broken"]["wrong"] is True
         assert [(m["model"], m["ok"], m["failed"], m["wrong"]) for m in found["models"]] == [
-            ("NumPy loop", 2, 0, 1),
+            ("native", 2, 0, 1),
             ("user object", 0, 1, 0),
         ]
 
     def test_the_worst_figures_and_the_failed_runs_lead_to_their_cases(self):
-        far = CaseResult("far", "Far.", (Outcome("NumPy loop", energy=1e-3), Outcome("user object", difference=0.5)))
-        near = CaseResult("near", "Near.", (Outcome("NumPy loop", energy=1e-9), Outcome("user object", difference=0.1)))
+        far = CaseResult("far", "Far.", (Outcome("native", energy=1e-3), Outcome("user object", difference=0.5)))
+        near = CaseResult("near", "Near.", (Outcome("native", energy=1e-9), Outcome("user object", difference=0.1)))
         loop, body = summaries([near, far])
         assert (loop.energy_case, loop.difference_case) == ("far", "")
         assert (body.energy_case, body.difference_case) == ("", "far")

@@ -164,8 +164,18 @@ class TestCases:
 
 
 class TestRunning:
-    def test_rows_fronts_times_and_uncertainty(self, study_file, store):
-        result = run_study(load_study(study_file()), store, progress=False)
+    @pytest.fixture(scope="class")
+    @classmethod
+    def finished(cls, tmp_path_factory):
+        """The small study, its store, and its result."""
+        folder = tmp_path_factory.mktemp("finished")
+        write(folder / "small.toml", SCENE)
+        study = load_study(write(folder / "study.toml", STUDY))
+        with Store(folder / "runs.sqlite") as opened:
+            yield study, opened, run_study(study, opened, progress=False)
+
+    def test_rows_fronts_times_and_uncertainty(self, finished):
+        _, _, result = finished
         assert len(result.rows) == 2 * (1 + 1 + 3 + 2)
         assert [row.message for row in result.rows if row.status != "ok"] == []
         found = settings(result)
@@ -182,9 +192,8 @@ class TestRunning:
             s.error for s in found if s.method == "stepwise"
         )
 
-    def test_what_has_run_is_not_run_again(self, study_file, store, monkeypatch):
-        study = load_study(study_file())
-        first = run_study(study, store, progress=False)
+    def test_what_has_run_is_not_run_again(self, finished, monkeypatch):
+        study, store, first = finished
         module = "multiphi_exudyn.study.accuracy.study.run_model"
         monkeypatch.setattr(module, lambda *given, **named: pytest.fail("run again"))
         again = run_study(study, store, progress=False)
@@ -192,7 +201,7 @@ class TestRunning:
         assert again.timings == first.timings
 
     def test_in_processes_as_in_this_one(self, study_file, tmp_path, store):
-        study = load_study(study_file(STUDY | {"timing": False}))
+        study = load_study(study_file(STUDY | {"timing": False, "axes": {}}))
         here = run_study(study, store, progress=False)
         with Store(tmp_path / "other.sqlite") as other, open_executor("processes", 2) as executor:
             there = run_study(study, other, executor, progress=False)
@@ -210,7 +219,7 @@ class TestRunning:
     def test_a_method_that_fails_is_a_gap_with_its_cause(self, study_file, store):
         data = changed(["methods", 1, "model"], {"kind": "craig-bampton", "modes": 2, "newton_tolerance": 1e-30}, STUDY)
         data = changed(["methods", 1, "axes"], {"step": [1e-4]}, data)
-        data = changed(["methods", 1, "nearby"], {"step": [0.9]}, data)
+        data = changed(["methods", 1, "nearby"], {"step": [0.9]}, data) | {"axes": {}}
         result = run_study(load_study(study_file(data)), store, progress=False)
         failed = [s for s in settings(result) if s.method == "stepwise"]
         assert all(s.error is None and s.message.startswith("failed: ") for s in failed)

@@ -12,10 +12,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.transition import LoadedLevel
-from multiphi_exudyn.time.driven.excitation import Excitation
-from multiphi_exudyn.time.driven.level import DrivenLevel
-from multiphi_exudyn.time.segment import batches
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 
 TIMES = np.linspace(0.0, 20.0, 101)
 PLACE = np.eye(3)[1]
@@ -206,8 +204,10 @@ class TestQuasiStaticCorrection:
 def driven(model, closed, load):
     """A level under a load that varies, and what of xi = (eta, w) it is at rest in while w = 1."""
     static = LoadedLevel.of(model.level(closed), np.zeros(model.base.modes.count))
-    level = DrivenLevel.under(static, Excitation.of(model, [load], 1.0))
-    return level, np.concatenate([level.force[:, 0] / static.level.squares, np.eye(level.excitation.channels)[0]])
+    level = static.under(Excitation.of(model, [load], 1.0))
+    return level, np.concatenate(
+        [level.channels.force[:, 0] / static.level.squares, np.eye(level.excitation.channels)[0]]
+    )
 
 
 class TestAtRestUnderWhatVaries:
@@ -289,7 +289,7 @@ class TestEquivalences:
         model, random = random_model(seed, damping="modal", kind=kind)
         model = replace(model, modes="all")
         amplitude, x0 = float(random.normal()), np.zeros(model.structure.n)
-        constant = mp.simulate(model, 3.0, x0, loads=[mp.ConstantLoad("m0", amplitude)], compiled=False)
+        constant = mp.simulate(model, 3.0, x0, loads=[mp.ConstantLoad("m0", amplitude)])
         varying = mp.simulate(model, 3.0, x0, loads=[mp.HarmonicLoad("m0", amplitude, 0.0)])
         assert constant.status == varying.status == "ok"
         t = np.linspace(0, 3.0, 50)
@@ -334,7 +334,7 @@ def test_little_damping_of_a_rigid_body_under_a_constant_load_costs_no_accuracy(
         x = resistance * t
         fallen = -10 * t**2 * (0.5 - x / 6 + x**2 / 24 - x**3 / 120) if x < 1e-3 else None
         exact = fallen if fallen is not None else -10 * (t + np.expm1(-x) / resistance) / resistance
-        assert_allclose(run.at("m", t), exact, rtol=1e-11)
+        assert_allclose(run.at("m", t), exact, rtol=1e-11, atol=1e-15)  # of terms of some 10 m
     assert abs(run.ledger.residual) < 1e-12 * run.ledger.work_of_loads
 
 
@@ -345,19 +345,3 @@ def test_a_sweep_of_thousands_of_cycles_is_no_failure_though_its_phase_is_known_
     assert run.status == "ok"
     assert "smooth loads: the response is certain to" in run.message
     assert len(run.segments) < 2000
-
-
-def test_states_of_many_segments_together_are_those_of_each():
-    """Also on pieces of a harmonic so short that it is a polynomial there, whose powers have shapes of their own."""
-    stops = [mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0)]
-    structure = chain(3, damping=mp.ModalDamping([0.02, 0.01, 0.03]), stiffness=10.0)
-    model = mp.MultiPhiModel(structure, stops, modes="all")
-    run = mp.simulate(model, 5.0, loads=[mp.HarmonicLoad("m1", 2.0, 0.3, 0.4)])
-    assert any(not segment.basis.pure for segment in run.segments)
-    for part in batches(run.segments):
-        for row, place in enumerate(part.places):
-            segment = run.segments[place]
-            times = np.linspace(segment.start, segment.end, 7)
-            found = part.states(np.full(7, row), times - segment.start)
-            for derivative in (0, 1):
-                assert_allclose(found[derivative].T, segment.modal(times, derivative), rtol=0, atol=1e-13)

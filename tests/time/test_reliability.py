@@ -140,7 +140,7 @@ class TestTruncation:
         assert run.events
         assert "truncation" in kinds(run)
 
-    def test_both_loops_warn_alike(self):
+    def test_as_plain_python_a_run_warns_alike(self):
         model, start = rig(math.inf)
         model = dataclasses.replace(model, modes=8)
         first, second = (mp.simulate(model, END, displacement=start, compiled=c) for c in (False, None))

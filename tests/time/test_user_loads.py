@@ -8,8 +8,8 @@ from integrated import integrated
 from small_structures import chain
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.excitation import MOST_EFFORT
 from multiphi_exudyn.time import reliability
-from multiphi_exudyn.time.driven.excitation import MOST_EFFORT
 
 TIMES = np.linspace(0.0, 2.0, 81)
 STOPS = (mp.UnilateralContact("below", "m2", 0.02, 500.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.03, 300.0))

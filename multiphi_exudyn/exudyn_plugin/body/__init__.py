@@ -5,5 +5,5 @@ test says after every step whether a contact can have asked to change; if so, th
 to event. One function switches the levels of all bodies of a system.
 
 Order: switching, run_record, coordinates, undisturbed_steps, known_motion, stops, run_ahead,
-certified_step, certified_driven_step, exact_step, body, driven_body, sensors, drawing, binding, solving, create.
+certified_step, own_loads, surroundings, exact_step, body, sensors, drawing, binding, solving, create.
 """

@@ -1,6 +1,6 @@
 """Certified test that nothing happens within a time step, from the states at its two ends.
 
-For a contact's function s (events/rule.py) the cubic Hermite interpolant of s, s' at both ends is off by at most
+For a contact's function s (events/decision.py) the cubic Hermite interpolant of s, s' at both ends is off by at most
 h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s > 0 on the whole step if
 
     min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'| exp(sigma h)
@@ -10,91 +10,217 @@ velocities: under a constant force it grows no faster than with the largest rate
 mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
 looked at exactly (body.py): the test may not decide, but it does not err. Of forces f on points s also holds L f
 (modal_force.py), of the step's mean: what stands at each end, less half its change.
+
+Under loads that vary, s of xi = (eta, w), linear interpolation is off by at most h^2/8 max|s''|:
+
+    min(s0, s1) > h^2/8 (|[P R] A S^-1| max|S z'| + |R| |p'| + |P_w| |w''| + |R_w| |w'''|),
+    max |S z'| <= (max at the ends + h |p'|) exp(sigma h)
+
+p = P w + Q w' the modal force. The channels enter by bounds that hold for the whole run; a kink of a sampled course
+counts as the second derivative 2 |jump of w'| / h. Steps in which a course itself jumps are never taken for clear.
+
+Either is a matrix times x = (q, q', q'', 1, f, w, w') at the ends. Exudyn's own state is read where it stands.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.mathematics.root_search import HERMITE
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled, entry
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.signal_bounds import HERMITE
 
-__all__ = ["StepTest", "energy_norm", "gains", "swell"]
+__all__ = ["Conditions", "StepTest", "driven_conditions", "jump_times", "plain_conditions"]
 
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a contact's function: what no test needs to tell from zero
 
+TIME, STEP, ROUNDING, CLEARANCE, SPEED, TOLD = range(6)  # numbers
+SIZE, POINTS, CHANNELS, LATER, BEHIND, ALL, DIRECT, START, END, MATRIX, NORM, MULTIPLIERS = range(12)  # ints
+
+
+@compiled
+def step_is_clear(
+    q: Numbers, q_t: Numbers, q_tt: Numbers, multipliers: Numbers, ints: Ints, numbers: Numbers, t: float
+) -> int:
+    """1 where nothing can have happened in the step that ends at t [s], whose end is then the start of the next."""
+    ends = abs(t - numbers[TIME] - numbers[STEP]) <= numbers[ROUNDING]
+    if not ends or (ints[CHANNELS] > 0 and numbers[TOLD] != t):
+        return 0
+    s, x = ints[SIZE], ints[END]
+    for i in range(s):
+        numbers[x + i] = q[i]
+        numbers[x + s + i] = q_t[i]
+        numbers[x + 2 * s + i] = q_tt[i]
+    for k in range(ints[POINTS]):
+        numbers[x + 3 * s + 1 + k] = multipliers[ints[ints[MULTIPLIERS] + k]]
+    width, square, row = 3 * s + 1 + ints[POINTS] + ints[CHANNELS], 0.0, ints[NORM]
+    for _ in range(2 * s):
+        total = 0.0
+        for i in range(3 * s):
+            total += numbers[row + i] * numbers[x + i]
+        square += total * total
+        row += 3 * s
+    speed = math.sqrt(square)
+    limit = max(speed, numbers[SPEED])
+    if ints[DIRECT] == 1:
+        limit += half_change(ints, numbers, width)
+    if not numbers[CLEARANCE] > limit:
+        return 0
+    clearance, row = math.inf, ints[MATRIX]
+    for k in range(ints[ALL]):
+        total = 0.0
+        for i in range(width):
+            total += numbers[row + i] * numbers[x + i]
+        if k < ints[BEHIND] and not total > limit:
+            return 0
+        if k >= ints[LATER]:
+            clearance = min(clearance, total)
+        row += width
+    ints[END] = ints[START]
+    ints[START] = x
+    numbers[TIME] = t
+    numbers[CLEARANCE] = clearance
+    numbers[SPEED] = speed
+    return 1
+
+
+@compiled
+def half_change(ints: Ints, numbers: Numbers, width: int) -> float:
+    """How far L f of the mean can be from that of either end of a step, in units of the conditions."""
+    first, largest = 3 * ints[SIZE] + 1, 0.0
+    for k in range(ints[ALL]):
+        row, total = ints[MATRIX] + k * width, 0.0
+        for i in range(first, first + ints[POINTS]):
+            total += numbers[row + i] * (numbers[ints[END] + i] - numbers[ints[START] + i])
+        largest = max(largest, 0.5 * abs(total))
+    return largest
+
+
+clear = entry(step_is_clear)
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What has to exceed |norm (q, q', q'')| in one level, as rows of x, see the module's docstring.
+
+    behind, both, ahead: (.., n), for the step before a state, for either, for the step after it. norm: S z' (2 s, 3 s).
+    points, channels: how many entries of x are f, and w with w'. direct: whether f counts.
+    """
+
+    behind: np.ndarray
+    both: np.ndarray
+    ahead: np.ndarray
+    norm: np.ndarray
+    points: int
+    channels: int
+    direct: bool
+
 
 class StepTest:
-    """The test for the functions ``rows`` of all contacts in one level, for steps of length ``step`` [s].
+    """The test in one level, for the steps of a run of length ``step`` [s]; ``clear(t)`` is called at the end of each.
 
-    direct: L (c, m) for them. directly: whether any of it counts.
+    views: q, q', q'' (s,) in the system's current state, and all its multipliers. places: of f among these.
     """
 
-    def __init__(self, stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> None:
-        size, count = stepped.size, len(rows)
-        norm = np.hstack([energy_norm(stepped), np.zeros((2 * size, 1 + direct.shape[1]))])
-        self.directly = bool(np.any(direct))
-        self._added = np.tile(direct, (3, 1)) / _scales(stepped, rows, step)[:, None]
-        self._matrix = np.vstack([np.hstack([_conditions(stepped, rows, step), self._added]), norm])
-        self._forces = 3 * size + 1
-        self._one, self._two, self._three = count, 2 * count, 3 * count
+    def __init__(
+        self,
+        conditions: Conditions,
+        step: float,
+        rounding: float,
+        views: Sequence[np.ndarray],
+        places: Sequence[int],
+    ) -> None:
+        parts = conditions.behind, conditions.both, conditions.ahead
+        self._matrix, self._norm = np.vstack(parts), conditions.norm
+        behind, both, _ = (len(part) for part in parts)
+        self._later, size, (count, width) = behind, conditions.norm.shape[1] // 3, self._matrix.shape
+        first = TOLD + 1
+        self._width, matrix = width, first + 2 * width
+        self._numbers = np.concatenate([np.zeros(matrix), self._matrix.ravel(), self._norm.ravel()])
+        self._numbers[[STEP, ROUNDING, TIME]] = step, rounding, math.nan
+        self._numbers[[first + 3 * size, first + width + 3 * size]] = 1.0
+        sizes = size, conditions.points, conditions.channels, behind, behind + both, count, int(conditions.direct)
+        starts = first, first + width, matrix, matrix + count * width, MULTIPLIERS + 1
+        self._ints = np.array([*sizes, *starts, *places], dtype=np.int64)
+        self._kept = tuple(views)
+        self.clear = clear.bound(*views, self._ints, self._numbers)
 
-    def at(self, x: np.ndarray) -> tuple[float, float, float]:
-        """Of a state x = (q, q', q'', 1, f): least condition for the step before it and after it, and |S z'|.
+    @property
+    def time(self) -> float:
+        """When [s] the present step began."""
+        return float(self._numbers[TIME])
 
-        A step is clear if the former of its end and the latter of its start exceed the larger |S z'| of the two.
-        """
-        y = self._matrix.dot(x)
-        norm = y[self._three :]
-        conditions: list[float] = y[: self._three].tolist()
-        speed = math.sqrt(norm.dot(norm))
-        if self._one == 1:  # the common case, at a third of the cost
-            behind, here, ahead = conditions
-            return (behind if behind < here else here), (ahead if ahead < here else here), speed
-        return min(conditions[: self._two], default=math.inf), min(conditions[self._one :], default=math.inf), speed
+    @property
+    def start(self) -> np.ndarray:
+        """A copy of x at the start of the present step, without channels."""
+        first = self._ints[START]
+        return self._numbers[first : first + self._width - self._ints[CHANNELS]].copy()
 
-    def half_change(self, before: np.ndarray, after: np.ndarray) -> float:
-        """How far L f of the mean can be from that of either end of a step, in units of the conditions."""
-        return float(np.max(np.abs(self._added @ (after - before)[self._forces :]), initial=0.0)) / 2
+    def begin(self, time: float, x: np.ndarray, armed: bool) -> None:
+        """A step begins at a time [s] with x; what ends a phase that is not armed is looked for exactly."""
+        first, numbers = self._ints[START], self._numbers
+        numbers[first : first + self._width] = x
+        speed = self._norm.dot(x[: self._norm.shape[1]])
+        clearance = np.min(self._matrix[self._later :].dot(x), initial=math.inf) if armed else -math.inf
+        numbers[TIME], numbers[CLEARANCE], numbers[SPEED] = time, clearance, math.sqrt(speed.dot(speed))
+
+    def tell(self, t: float, channels: np.ndarray) -> None:
+        """The step that ends at t [s] ends with w, w' (2 q,); not called for one in which they jump."""
+        first = self._ints[END] + self._width
+        self._numbers[first - len(channels) : first] = channels
+        self._numbers[TOLD] = t
 
 
-def _conditions(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
-    """s - h s'/3, s, s + h s'/3 of all contacts as functions of x = (q, q', q'', 1), (3 c, 3 s + 1).
+# ---------------------------------------------------------------------- under constant loads
 
-    Each is divided by its factor of max |S z'| at the start, so that all have the same right-hand side.
-    """
-    along, rate = _padded(stepped, rows)
+
+def plain_conditions(stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> Conditions:
+    """For the functions ``rows`` (c,) in one level, and steps of length ``step`` [s]; direct: L (c, m) for them."""
+    along, rate = _padded(stepped, rows, 0)
     none = np.zeros_like(along)
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-    functions = np.vstack([value - third, value, value + third]) @ stepped.physical
-    constants = np.tile([row.constant for row in rows], 3)
-    return np.hstack([functions, constants[:, None]]) / _scales(stepped, rows, step)[:, None]
+    constants = np.array([row.constant for row in rows]).reshape(-1, 1)
+    scales = _scales(stepped, along, rate, constants[:, 0], step)[:, None]
+    behind, both, ahead = (
+        np.hstack([functions @ stepped.physical, constants, direct]) / scales
+        for functions in (value - third, value, value + third)
+    )
+    return Conditions(behind, both, ahead, _energy_norm(stepped), direct.shape[1], 0, bool(np.any(direct)))
 
 
-def _scales(stepped: SteppedLevel, rows: list[Row], step: float) -> np.ndarray:
-    """The factors (3 c,) of max |S z'| at the start, by which the conditions are divided.
+def _scales(
+    stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, constants: np.ndarray, step: float
+) -> np.ndarray:
+    """The factors (c,) of max |S z'| at the start, by which the conditions are divided.
 
     Free motion has no fourth derivative: then round-off of the way that max |S z'| makes in a step, or for a contact
     that no mode moves of its gap, stands in for it.
     """
-    along, rate = _padded(stepped, rows)
-    scale = HERMITE * step**4 * gains(stepped, np.hstack([along, rate]), 3)
+    scale = HERMITE * step**4 * _gains(stepped, along, rate, 3)
+    return np.asarray(np.maximum(scale, _least(along, rate, constants, step)) * _swell(stepped, step))
+
+
+def _least(along: np.ndarray, rate: np.ndarray, constants: np.ndarray, step: float) -> np.ndarray:
     way = step**2 * np.linalg.norm(along, axis=1) + step * np.linalg.norm(rate, axis=1)
-    constants = np.array([abs(row.constant) for row in rows]).reshape(-1)
-    least = NEGLIGIBLE * np.where(way > 0, way, np.where(constants > 0, constants, 1.0))
-    return np.tile(np.maximum(scale, least) * swell(stepped, step), 3)
+    return NEGLIGIBLE * np.where(way > 0, way, np.where(constants != 0, np.abs(constants), 1.0))
 
 
-def _padded(stepped: SteppedLevel, rows: list[Row]) -> tuple[np.ndarray, np.ndarray]:
-    """P and R (c, s) of functions."""
+def _padded(stepped: SteppedLevel, rows: list[Row], channels: int) -> tuple[np.ndarray, np.ndarray]:
+    """P and R (c, s + q) of functions."""
     modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
-    along, rate = np.zeros((2, count, size))
-    along[:, :modes] = np.reshape([row.position for row in rows], (count, modes))
-    rate[:, :modes] = np.reshape([row.rate for row in rows], (count, modes))
-    return along, rate
+    padded = np.zeros((2, count, size + channels))
+    for part, values in zip(padded, ([row.position for row in rows], [row.rate for row in rows]), strict=True):
+        found = np.reshape(values, (count, modes + channels))
+        part[:, :modes], part[:, size:] = found[:, :modes], found[:, modes:]
+    return padded[0], padded[1]
 
 
 def _omega(stepped: SteppedLevel) -> np.ndarray:
@@ -106,24 +232,65 @@ def _signed(stepped: SteppedLevel) -> np.ndarray:
     return np.asarray(np.sign(np.diagonal(stepped.stiffness)) * _omega(stepped))
 
 
-def swell(stepped: SteppedLevel, duration: float) -> float:
+def _swell(stepped: SteppedLevel, duration: float) -> float:
     """How much |S z'| can grow in this time."""
     lowest = float(np.min(np.diagonal(stepped.stiffness), initial=0.0))
     return math.exp(math.sqrt(-lowest) * duration)
 
 
-def energy_norm(stepped: SteppedLevel) -> np.ndarray:
+def _energy_norm(stepped: SteppedLevel) -> np.ndarray:
     """S z' (2 s,) from (q, q', q'')."""
     scale = np.concatenate([_omega(stepped), np.ones(stepped.size)])
     return np.asarray(scale[:, None] * stepped.physical[stepped.size :])
 
 
-def gains(stepped: SteppedLevel, functionals: np.ndarray, power: int) -> np.ndarray:
-    """|[P R] A^power S^-1| of every row [P R] (2 s,)."""
-    size = stepped.size
-    none, identity = np.zeros((size, size)), np.eye(size)
-    system = np.block([[none, identity], [-stepped.stiffness, -stepped.own_damping]])
-    scaled = np.block(
-        [[none, identity], [-np.diag(_signed(stepped)), -stepped.own_damping]]
-    )  # A S^-1, also where omega = 0
-    return np.asarray(np.linalg.norm(functionals @ np.linalg.matrix_power(system, power - 1) @ scaled, axis=1))
+def _gains(stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, power: int) -> np.ndarray:
+    """|[P R] A^power S^-1| of every row [P R] (2 s,), also where omega = 0; [P R] A = [-R K, P - R D]."""
+    damping, stiffness = stepped.own_damping, np.diagonal(stepped.stiffness)
+    for _ in range(power - 1):
+        along, rate = -rate * stiffness, along - rate @ damping
+    return np.asarray(np.linalg.norm(np.hstack([-rate * _signed(stepped), along - rate @ damping]), axis=1))
+
+
+# ---------------------------------------------------------------------- under loads that vary
+
+
+def driven_conditions(stepped: SteppedLevel, level: LoadedLevel, rows: list[Row], step: float) -> Conditions:
+    """For the functions ``rows`` (c,) of xi in one level, and steps of length ``step`` [s]."""
+    s, q, share = stepped.size, level.excitation.channels, step**2 / 8
+    along, rate = _padded(stepped, rows, q)
+    modal = np.hstack([along[:, :s], rate[:, :s]])
+    constants = np.array([row.constant for row in rows]).reshape(-1)
+    first, second, third = (np.array(bounds) for bounds in zip(*_bounds(level.excitation, step), strict=True))
+    forced = float(np.linalg.norm(np.abs(level.channels.force) @ first + np.abs(level.channels.force_rate) @ second))
+    gains = _gains(stepped, along[:, :s], rate[:, :s], 1) * _swell(stepped, step)
+    extra = np.linalg.norm(rate[:, :s], axis=1) * forced + step * forced * gains
+    extra += np.abs(along[:, s:]) @ second + np.abs(rate[:, s:]) @ third
+    scales = np.maximum(share * gains, _least(along, rate, constants, step))[:, None]
+    value = np.hstack([modal, np.zeros((len(rows), s))]) @ stepped.physical
+    both = np.hstack([value, (constants - share * extra)[:, None], along[:, s:], rate[:, s:]]) / scales
+    return Conditions(both[:0], both, both[:0], _energy_norm(stepped), 0, 2 * q, direct=False)
+
+
+def jump_times(excitation: Excitation) -> np.ndarray:
+    """When a channel jumps, ascending [s]."""
+    times = np.unique(np.concatenate([history.jump_times() for history in excitation.histories]))
+    return np.asarray(times[times > 0])
+
+
+def _bounds(excitation: Excitation, step: float) -> list[tuple[float, float, float]]:
+    """Bounds of |w'|, |w''|, |w'''| of every channel, kinks counted for steps of this length."""
+    return [_smooth_bounds(history, step) for history in excitation.histories]
+
+
+def _smooth_bounds(history: PiecewiseExponential, step: float) -> tuple[float, float, float]:
+    first = history.derivative
+    second, third = first.derivative, first.derivative.derivative
+    return first.largest, second.largest + _kinks(first, step), third.largest + _kinks(second, step)
+
+
+def _kinks(derivative: PiecewiseExponential, step: float) -> float:
+    """Second derivative that stands for the jumps of a first one within a step."""
+    shortest = float(np.min(np.diff(derivative.breaks)))
+    inner = derivative.jumps[1:-1] if len(derivative.jumps) > 2 else np.zeros(1)
+    return 2 * float(np.max(np.abs(inner), initial=0.0)) / step * (1 + step / shortest)

@@ -9,13 +9,13 @@ connectors of the system on the body's node and, as forces f (m,) on points, on 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, Reactions
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import SystemMatrices
@@ -24,33 +24,36 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 __all__ = ["SAME_STEP", "Coordinates", "flags_of", "matrices"]
 
 PHASES = tuple(Phase)
+ONE = np.ones(1)  # the entry of x that its constants belong to
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
+
+
+@dataclass(frozen=True)
+class Felt:
+    """acting: (p, f) (s + m,). whole: of which forces or accelerations (n,) of the whole system it was found."""
+
+    acting: np.ndarray
+    whole: np.ndarray
 
 
 class Coordinates:
     """Coordinates (s,) of one body. items: its typed indices. stepped: see the module's docstring.
 
-    interface: its interface coordinates or None. surroundings: the system around them, attached: what hangs on them,
-    views: q, q', q'' in the system's current state, all three during a run. most: levels of which Exudyn's own matrices
-    are kept. matched: whether M differs among levels.
+    interface: its interface coordinates or None. surroundings: the system around them, views: q, q', q'' in the
+    system's current state, multipliers: all those of the system, during a run. most: levels of which Exudyn's own
+    matrices are kept. matched: whether M differs among levels. rigid: whether the body has contacts that strike.
     """
 
     def __init__(self, items: dict[str, Any], stepped: SteppedLevel, most: int, matched: bool) -> None:
         self.items = items
         self.stepped = stepped
+        self.rigid = bool(np.any(np.isinf(stepped.loaded.level.base.stiffnesses)))
         self._matched = matched
         self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](most)
         self.interface: Interface | None = None
         self.surroundings: SystemMatrices | None = None
-        self.attached: AttachedInertia | None = None
-        self._reactions: Reactions | None = None
         self.views: tuple[np.ndarray, ...] = ()
-        self._copies: tuple[tuple[np.ndarray, ...], ...] = ()
-
-    @property
-    def rigid(self) -> bool:
-        """Whether the body has contacts that strike."""
-        return bool(np.any(np.isinf(self.stepped.loaded.level.base.stiffnesses)))
+        self.multipliers = np.zeros(0)
 
     @property
     def points(self) -> int:
@@ -61,9 +64,9 @@ class Coordinates:
         """Take the views of the system's current state; they hold for one run."""
         state, size = mbs.systemData.GetSystemStateDict(reference=True), self.stepped.size
         first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
-        self._own = slice(first, first + size)
+        self._own, self._count = slice(first, first + size), len(state["ODE2Coords"])
         self.views = tuple(state[key][self._own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
-        self._copies = tuple((x, *self.split(x)) for x in np.ones((2, 3 * size + 1 + self.points)))
+        self.multipliers = state["AECoords"]
         if self.interface is not None:
             self.interface.attach(state)
             self.surroundings = self.beside(mbs)
@@ -77,13 +80,10 @@ class Coordinates:
         return SystemMatrices(mbs, own, interface.places if interface else (), interface.ties if interface else ())
 
     def read(self) -> np.ndarray:
-        """A copy x = (q, q', q'', 1, f) of the present state, good until the next but one."""
-        self._copies = self._copies[::-1]
-        x, q, q_t, q_tt = self._copies[0]
-        q[:], q_t[:], q_tt[:] = self.views
-        if self.interface is not None:
-            x[3 * self.stepped.size + 1 :] = self.interface.forces
-        return x
+        """A copy x = (q, q', q'', 1, f) of the present state."""
+        if self.interface is None:
+            return np.concatenate([*self.views, ONE])
+        return np.concatenate([*self.views, ONE, self.interface.forces])
 
     def force(self, x: np.ndarray) -> np.ndarray:
         """(p, f) of x."""
@@ -95,12 +95,12 @@ class Coordinates:
         s = self.stepped.size
         return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
-    def write(self, values: Iterable[np.ndarray]) -> None:
-        """Write q, q', q'' (s,), and what follows from them on the interface."""
+    def write(self, stepped: SteppedLevel, values: Iterable[np.ndarray]) -> None:
+        """Write q, q', q'' (s,) in a level, and what follows from them on the interface."""
         for view, value in zip(self.views, values, strict=True):
             view[:] = value
         if self.interface is not None:
-            self.interface.write(self.stepped, self.views)
+            self.interface.write(stepped, self.views)
 
     def load(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
         """Give the system the matrices of a level, and the force (s,) of the body's own that now acts in it."""
@@ -121,64 +121,33 @@ class Coordinates:
 
     def applied(self, mbs: Any) -> np.ndarray:
         """p (s,) in the present state of the system, of a body without interface."""
+        return self.felt(mbs, self.stepped).acting
+
+    def felt(self, mbs: Any, shown: SteppedLevel) -> Felt:
+        """(p, f) of loads and connectors in the present state of the system, with coordinates of the level ``shown``.
+
+        Beside it the forces (n,) on the whole system. The level need not be that of the system's matrices.
+        """
         solver = mbs.sys["dynamicSolver"]
         solver.ComputeODE2RHS(mbs)
-        return np.array(solver.GetSystemResidual())[self._own] + self.stepped.resisting(*self.views[:2])
+        whole = np.array(solver.GetSystemResidual())[: self._count]
+        modal = whole[self._own] + self.stepped.resisting(*self.views[:2])
+        if self.interface is None:
+            return Felt(modal, whole)
+        points = whole[self.interface.places]
+        return Felt(np.concatenate([modal + points @ self.interface.of(shown).rows, points]), whole)
 
-    def mark(self, x: np.ndarray) -> None:
-        """Take the present state, of which x is a copy, as that without an event; find what hangs on the interface."""
-        self.attached = self._reactions = None
-        if self.interface is None or self.surroundings is None:
-            return
-        self.attached = self.surroundings.mark()
-        if not self.rigid:
-            return
-        level, closed = self.stepped.loaded.level, self.stepped.closed
-        physical = self.stepped.physical @ np.concatenate(self.split(x))
-        eta, eta_t, eta_tt = (part[: level.modes] for part in np.split(physical, 3))
-        carried = self.stepped.loaded.asymptotic.forces + self.direct(self.stepped) @ self.interface.forces
-        reactions = carried + level.force_rows @ eta + level.force_rate_rows @ eta_t
-        given = self.interface.in_base(level.base), level.vectors @ eta_tt, closed, reactions
-        self._reactions = Reactions(self.attached, level.base, *given)
-
-    def look_back(self, ago: float) -> None:
-        """Find what hung on the interface some time [s] before the state that was marked: joints may have turned."""
-        if self.surroundings is not None and self.rigid:
-            self.attached = self.surroundings.hanging(ago)
-
-    def acting(self, mbs: Any, step: float) -> np.ndarray:
-        """(p, f) in the present state of the system, with what constraints and inertia make of it on an interface.
-
-        step: of the solver [s].
-        """
-        if self.surroundings is None:
-            return self.applied(mbs)
-        return self._force_of(self.surroundings.leave(step))
-
-    def changed(self, mbs: Any, step: float) -> np.ndarray:
-        """The same, of the state that an event gives the body after the one for which ``acting`` was called."""
-        if self.surroundings is None:
-            return self.applied(mbs)
-        return self._force_of(self.surroundings.arrive(step))
-
-    def settled(self, elapsed: float, step: float) -> np.ndarray:
-        """The same at the end of the step, where all has followed the body; elapsed: time since the event [s]."""
-        assert self.surroundings is not None
-        return self._force_of(self.surroundings.settle(elapsed, step))
-
-    def _force_of(self, accelerations: np.ndarray) -> np.ndarray:
-        """(p, f) from the accelerations (n,) of the whole system in its present state, and its multipliers."""
+    def seen(self, accelerations: np.ndarray) -> Felt:
+        """(p, f) that belong to accelerations (n,) of the whole system in its present state, and to its multipliers."""
         assert self.interface is not None
         q, q_t, _ = self.views
-        return self.force(np.concatenate([q, q_t, accelerations[self._own], [1.0], self.interface.forces]))
+        x = np.concatenate([q, q_t, accelerations[self._own], ONE, self.interface.forces])
+        return Felt(self.force(x), accelerations)
 
-    def told(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
-        """``carried``, with the forces that follow from other reactions of rigid contacts."""
-        carried = self.carried(force, given, wanted)
-        if self.interface is None or self._reactions is None:
-            return carried
-        change = self._reactions.at(wanted.closed) - self._reactions.at(given.closed)
-        return carried + np.concatenate([change @ self.interface.of(wanted).rows, change])
+    def put_forces(self, forces: np.ndarray) -> None:
+        """Make f (m,) what the ties hold."""
+        assert self.interface is not None
+        self.multipliers[self.interface.multipliers] = forces
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """(p, f) of one level in another: what acts on points stays there."""

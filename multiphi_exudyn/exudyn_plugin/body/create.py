@@ -15,7 +15,6 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, Numeri
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.coordinates import flags_of, matrices
 from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
-from multiphi_exudyn.exudyn_plugin.body.driven_body import DrivenBody
 from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface, interface_rows
@@ -24,9 +23,8 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.driven.motion import DrivenMotion
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.simulate import started
+from multiphi_exudyn.time.simulate import Run
 
 __all__ = ["CreateMultiPhiBody"]
 
@@ -75,11 +73,12 @@ def CreateMultiPhiBody(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
+    model.need_contacts("model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
-    body = _body(name, _motion(model, displacement, velocity, loads), loads, matchedStepSize)
-    if rows and isinstance(body, DrivenBody):
+    body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), loads, PROVISIONAL, matchedStepSize)
+    if rows and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
             f"loads: got {', '.join(sorted(varying))} with an interface, need constant loads (a varying force can be a "
@@ -90,9 +89,9 @@ def CreateMultiPhiBody(
         _add_interface(mbs, body, rows)
     body.items.update(add_sensors(mbs, body))
     bodies.add(body)
-    if model.contacts or rows or matchedStepSize is not None or isinstance(body, DrivenBody):
+    if model.contacts or rows or matchedStepSize is not None or body.varies:
         bodies.install(mbs)
-    if isinstance(body, DrivenBody):
+    if body.varies:
         bodies.install_before(mbs)
     return dict(body.items)
 
@@ -106,12 +105,6 @@ def _check_step(step: float | None) -> None:
         raise MultiPhiValueError(f"matchedStepSize: got {step!r}, need a step size > 0 s or None")
 
 
-def _body(name: str, motion: Motion, loads: Sequence[Load], step: float | None) -> MultiPhiBody:
-    if isinstance(motion, DrivenMotion):
-        return DrivenBody(name, motion, loads, step)
-    return MultiPhiBody(name, motion, step)
-
-
 def _motion(
     model: MultiPhiModel,
     displacement: np.ndarray | None,
@@ -119,7 +112,7 @@ def _motion(
     loads: Sequence[Load],
 ) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
-    motion = started(model, PROVISIONAL, displacement, velocity, loads, compiled=False)
+    motion = Run(model, PROVISIONAL, displacement, velocity, loads).begun()
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion

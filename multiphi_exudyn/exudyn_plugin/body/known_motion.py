@@ -1,7 +1,7 @@
 """Known motion: the exact motion of a body on which nothing acts but its own loads, computed before Exudyn gets there.
 
-It is the library's own run (time/motion.py), carried on stretch by stretch; of a stretch one may ask for the states at
-given times and for the events with theirs. A run that fails does so at an instant: what is known ends there.
+It is the library's own run (motion.py), carried on stretch by stretch; of a stretch one may ask for the states
+at given times and for the events with theirs. A run that fails does so at an instant: what is known ends there.
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Phase, State, event_table
-from multiphi_exudyn.events.transition import LoadedLevel
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.time.driven.level import DrivenLevel
-from multiphi_exudyn.time.loop_motion import LoopMotion
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.segment import Batch, batches
+from multiphi_exudyn.time.segment import Segments, listed
 
 __all__ = ["KnownMotion", "Moments", "Stretch"]
 
@@ -44,8 +42,7 @@ class Stretch:
     """A motion up to ``end`` [s]. last: the state there. events: in it, at event_times (k,) [s], where truncation took
     the energies truncated (k,) [J].
 
-    failure: why nothing is known beyond its end, or "". parts: segments by level and exponentials. starts (n,) [s] and
-    phases (n, c), in numbers, of all segments.
+    failure: why nothing is known beyond its end, or "". phases (n, c): of all segments, in numbers.
     """
 
     end: float
@@ -54,35 +51,33 @@ class Stretch:
     truncated: np.ndarray
     last: State
     failure: str
-    parts: Sequence[Batch]
-    starts: np.ndarray
+    segments: Segments
     phases: np.ndarray
 
     @functools.cached_property
     def changes(self) -> np.ndarray:
         """When [s] something was decided, ascending: events, and contacts that were refused."""
-        return np.union1d(self.starts[1:], self.event_times)
+        return np.union1d(self.segments.starts[1:], self.event_times)
 
     def at(self, times: np.ndarray) -> Iterator[Moments]:
         """The states at times (k,) [s], level by level, at an event those after it."""
-        segment = np.searchsorted(self.starts, times, side="right") - 1
-        segment[times >= self.end] = -1
-        for part in self.parts:
-            rows = np.full(len(self.starts) + 1, -1)
-            rows[part.places] = np.arange(len(part.places))
-            places = np.flatnonzero(rows[segment] >= 0)
-            if len(places):
-                row = rows[segment[places]]
-                eta, eta_t = part.states(row, times[places] - part.starts[row])
-                yield _moments(places, part.level, eta, eta_t, self.phases[segment[places]])
-        places = np.flatnonzero(segment < 0)
+        known = np.flatnonzero(times < self.end)
+        owners = self.segments.owners(times[known])
+        states = self.segments.states(owners, times[known] - self.segments.starts[owners])
+        numbers = self.segments.numbers[owners]
+        for number in np.unique(numbers).tolist():
+            own, level = numbers == number, self.segments.levels[number]
+            eta, eta_t = states[:, own, : level.level.modes]
+            yield _moments(known[own], level, eta, eta_t, self.phases[owners[own]])
+        places = np.flatnonzero(times >= self.end)
         if len(places):
             eta, eta_t = (np.tile(x, (len(places), 1)) for x in (self.last.displacement, self.last.velocity))
             yield _moments(places, self.last.level, eta, eta_t, _numbers([self.last.phases] * len(places)))
 
     def levels(self, until: float) -> Iterator[tuple[Level, float]]:
         """Levels entered up to a time [s], with the largest energy [J] there."""
-        for moments in self.at(self.starts[self.starts <= until]):
+        starts = self.segments.starts
+        for moments in self.at(starts[starts <= until]):
             eta, eta_t = moments.displacement.T, moments.velocity.T
             yield moments.level.level, float(np.max(moments.level.kinetic(eta_t) + moments.level.strain(eta)))
 
@@ -92,7 +87,7 @@ class KnownMotion:
 
     def __init__(self, motion: Motion, state: State, time: float) -> None:
         self._motion = motion
-        motion.go_on_from(state, time)
+        motion.go_on_with(state, time)
 
     def advance(self, until: float) -> Stretch:
         """The next stretch, up to ``until`` [s]."""
@@ -100,21 +95,10 @@ class KnownMotion:
         motion.go_on_from(motion.state, motion.time)
         motion.advance(until)
         trajectory = motion.trajectory(until)
-        parts, events = batches(trajectory.segments), trajectory.events
-        starts = np.empty(len(trajectory.segments))
-        for part in parts:
-            starts[part.places] = part.starts
+        events = trajectory.events
         times, _, _, truncated = event_table(events, motion.model.index).T
-        given = motion.state, motion.message, parts, starts, _phases(motion)
+        given = motion.state, motion.message, listed(trajectory.segments), motion.record.standings()
         return Stretch(motion.time, events, times, truncated, *given)
-
-
-def _phases(motion: Motion) -> np.ndarray:
-    """Phases (n, c) at the start of every segment, in numbers."""
-    if isinstance(motion, LoopMotion):
-        return motion.record.standings()
-    phases = [segment.phases for segment in motion.segments]
-    return _numbers(phases).reshape(len(phases), len(motion.model.contacts))
 
 
 def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:
@@ -125,7 +109,5 @@ def _moments(
     places: np.ndarray, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray, phases: np.ndarray
 ) -> Moments:
     """In the coordinates eta of the level under static loads alone."""
-    if isinstance(level, DrivenLevel):
-        r = level.plain.level.modes
-        return Moments(places, level.plain, displacement[:, :r], velocity[:, :r], phases)
-    return Moments(places, level, displacement, velocity, phases)
+    r = level.modal.modes
+    return Moments(places, level.alone, displacement[:, :r], velocity[:, :r], phases)

@@ -22,7 +22,7 @@ from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
-from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of
+from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
@@ -32,7 +32,7 @@ __all__ = ["RunAhead"]
 SAME_TIME = 1e-12  # relative: what adding up thousands of steps leaves of a time
 STEPS_AHEAD = 2**14  # planned at once, of which few are stops: computed in the time of as many steps of Exudyn
 ROWS_AHEAD = 2**8  # planned at once where every step is a stop
-CHANGED = 1e-6  # of the largest coordinate: more than Newton's iterations leave, less than anybody means to change
+CHANGED = 1e-6  # of how far the modes go: more than Newton's iterations leave, less than anybody means to change
 UNSEEN = 1e-3  # of what brings a contact to its stop: coordinates this small are compared with it
 
 
@@ -112,7 +112,7 @@ class RunAhead:
         stepped, self._state = stops.levels[k], stops.states[k]
         if stepped.closed != here.stepped.closed:
             here.enter(mbs, stepped, stepped.drive)
-        here.write(self._state)
+        here.write(stepped, self._state)
         here.store(stops.flags[k])
         self._done, self._place = stops.done[k], k + 1
 
@@ -135,7 +135,7 @@ class RunAhead:
                 return
         steps = self._steps_of(here.stepped) if regular else UndisturbedSteps(here.stepped, step)
         expected = steps.after(self._state[None], np.array([count]))[0, 0]
-        self._check(here.views[0], expected, float(np.max(np.abs(expected), initial=0.0)), t)
+        self._check(here.views[0], expected, float(swings(here.stepped, self._state[None])[0]), t)
 
     def _check(self, q: np.ndarray, expected: np.ndarray, largest: float, t: float) -> None:
         """Raises if somebody has changed the coordinates since the last stop."""

@@ -1,6 +1,6 @@
 """Sensors of a Multi-Phi body, and histories rebuilt from them after a run (eq. 38.4).
 
-    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (rule.py), and L f
+    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (level.py), and L f
 
 Exudyn's own node sensors record eta, its derivatives and the level, and cost next to nothing during a run.
 """

@@ -23,7 +23,7 @@ from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedStep
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
 
-__all__ = ["Departure", "KnownBody", "StepsOf", "Stops", "stops_of"]
+__all__ = ["Departure", "KnownBody", "StepsOf", "Stops", "stops_of", "swings"]
 
 SAME_PLACE = 1e-9  # of a step: a change so close behind the end of one may be rounding of the times
 
@@ -71,7 +71,8 @@ class Stops:
     """n stops. times: [s]; due: a step that ends at this time [s] or later is the stop. indices: of these steps.
 
     done: how many changes of the stretch are then behind. levels, states (n, 3, s): what is written; flags (n, 2 c):
-    what goes into the data node. expected (n, s): q that Exudyn has before, largest (n,): the largest of them so far.
+    what goes into the data node. expected (n, s): q that Exudyn has before, largest (n,): how far the modes have gone
+    so far.
     """
 
     times: list[float]
@@ -108,10 +109,22 @@ def stops_of(
         due = np.minimum(due, coming[first])
     levels, states, flags = _states(body, stretch, times)
     done = start.done + np.searchsorted(places, stops, side="right")
-    expected = _expected(start, stops, levels, states, steps_of)
-    largest = np.maximum.accumulate(np.max(np.abs(expected), axis=1, initial=0.0)).tolist()
+    expected, reached = _expected(start, stops, levels, states, steps_of)
+    largest = np.maximum.accumulate(reached).tolist()
     given = times.tolist(), due.tolist(), (start.index + stops).tolist(), done.tolist()
     return Stops(*given, levels, states, flags, expected, largest)
+
+
+def swings(stepped: SteppedLevel, states: np.ndarray) -> np.ndarray:
+    """How far the modes go (k,) from states (q, q', q'') (k, 3, s): the largest of |q| and |q'| / omega."""
+    omega = stepped.loaded.level.omega
+    periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
+    ways = np.abs(states[:, 1, : len(omega)]) * periods
+    return np.asarray(np.maximum(_largest(states[:, 0]), _largest(ways)))
+
+
+def _largest(rows: np.ndarray) -> np.ndarray:
+    return np.asarray(np.max(np.abs(rows), axis=1, initial=0.0))
 
 
 def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray]:
@@ -132,15 +145,20 @@ def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[
 
 def _expected(
     start: Departure, stops: np.ndarray, levels: list[SteppedLevel], states: np.ndarray, steps_of: StepsOf
-) -> np.ndarray:
-    """q (n, s) that undisturbed steps make of the state at the departure and at every stop up to the next one."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """q (n, s) that undisturbed steps make of the state at the departure and at every stop up to the next one.
+
+    Beside it how far the modes go on that way (n,).
+    """
     if not len(stops):
-        return np.zeros((0, start.level.size))
+        return np.zeros((0, start.level.size)), np.zeros(0)
     before, counts = np.concatenate([start.state[None], states[:-1]]), np.diff(stops, prepend=0)
     found, given = np.empty((len(stops), start.level.size)), [start.level, *levels[:-1]]
+    ways = np.empty(len(stops))
     numbers = {stepped.closed: (number, stepped) for number, stepped in enumerate(given)}
     number = np.array([numbers[stepped.closed][0] for stepped in given])
     for mark, stepped in numbers.values():
         here = number == mark
         found[here] = steps_of(stepped).after(before[here], counts[here])[:, 0]
-    return found
+        ways[here] = swings(stepped, before[here])
+    return found, np.maximum(ways, _largest(found))

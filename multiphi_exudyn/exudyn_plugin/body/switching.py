@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import exudyn as exu
@@ -36,6 +36,10 @@ class SwitchingBody(Protocol):
     @property
     def next_time(self) -> float:
         """When [s] it has something to do next, -inf where that is at the end of every step."""
+
+    @property
+    def clear(self) -> Callable[[float], int] | None:
+        """Says at the end of a step, by its time [s], whether nothing is to do; None where ``next_time`` says it."""
 
     @property
     def rigid(self) -> bool:
@@ -61,6 +65,8 @@ class SwitchingBody(Protocol):
 class Clock:
     """The time of the last step [s], and when the bodies have something to do next; ``due`` is called then.
 
+    clear: says at the end of a step before that, by its time [s], whether there is nothing to do, None for always.
+
     A class of its own, for what it does is done after every step: attributes of a dict take twice the time.
     """
 
@@ -68,10 +74,11 @@ class Clock:
         self.due = due
         self.time = math.nan
         self.next_time = -math.inf
+        self.clear: Callable[[float], int] | None = None
 
     def after_step(self, mbs: Any, t: float) -> bool:
         """Called by Exudyn; whether the run goes on."""
-        if self.time < t < self.next_time:
+        if self.time < t < self.next_time and (self.clear is None or self.clear(t)):
             self.time = t
             return True
         return self.due(mbs, t)
@@ -120,11 +127,12 @@ class Switching(dict[str, SwitchingBody]):
             self._warn()
         elif self.following is None:
             self.clock.next_time = min(self.end, *(body.next_time for body in self.values()))
+            self.clock.clear = _all_of([body.clear for body in self.values() if body.clear is not None])
         return self.following is None or self.following(mbs, t)
 
     def begin(self) -> None:
         """A run of a solver begins."""
-        self.clock.time, self.clock.next_time, self.end = math.nan, -math.inf, math.inf
+        self.clock.time, self.clock.next_time, self.clock.clear, self.end = math.nan, -math.inf, None, math.inf
 
     def check_called(self, t: float) -> None:
         """Raises if a run has come to t [s] without the bodies: somebody else's PostStep function is installed."""
@@ -159,6 +167,13 @@ class Switching(dict[str, SwitchingBody]):
         if present != self.before_step:
             self.preceding = present
             mbs.SetPreStepUserFunction(self.before_step)
+
+
+def _all_of(tests: Sequence[Callable[[float], int]]) -> Callable[[float], int] | None:
+    """Whether all say so; those that have said so are not asked again for the same time."""
+    if len(tests) < 2:
+        return tests[0] if tests else None
+    return lambda t: min(test(t) for test in tests)
 
 
 def _user_function(name: str, present: Any) -> StepFunction | None:

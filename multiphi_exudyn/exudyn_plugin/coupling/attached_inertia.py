@@ -10,27 +10,25 @@ body then gives it
 
 -X R i of it goes back through the points, and what a level's modes miss of R v by e (m,) takes -R^T X e to mend. The
 accelerations of contacts at rest obey the same law. A contact that cannot move for what is attached stays open at its
-stop, without a force, as one does which the closed ones hold (events/rule.py).
+stop, without a force, as one does which the closed ones hold (events/decision.py).
 """
 
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.state import State
-from multiphi_exudyn.events.transition import LoadedLevel, Transition, nearest_admissible
-from multiphi_exudyn.exudyn_plugin.coupling.modal_force import ForcedRule, InLevel
+from multiphi_exudyn.events.impact import IMMOVABLE
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.least_distance import Infeasible
 
-__all__ = ["AttachedInertia", "AttachedRule", "Reactions"]
+__all__ = ["AttachedInertia", "PointInertia", "Reactions"]
 
-IMMOVABLE = 1e-11  # of a contact's mobility: below it what is attached holds it
+ROUND_OFF = 1e-15  # of the largest singular value: below it one is zero
+RowsIn = Callable[[tuple[int, ...]], np.ndarray]  # R (m, r) by the closed contacts of a level
 
 
 @dataclass(frozen=True)
@@ -43,15 +41,21 @@ class AttachedInertia:
     def impedance(self, rows: np.ndarray) -> np.ndarray:
         """X (m, m) beside a body whose points have the rows R (m, r)."""
         own = rows @ rows.T
-        held = self._held / (np.linalg.norm(own) or 1.0)
-        carried, moved = np.hstack([self.mass @ self.free, held]), np.hstack([self.free, np.zeros_like(held)])
-        return np.asarray(carried @ np.linalg.pinv(moved + own @ carried))  # held may be what no mode moves
+        held, k = self._held / (np.linalg.norm(own) or 1.0), self.free.shape[1]
+        carried = np.concatenate([self.mass @ self.free, held], axis=1)
+        moved = own @ carried
+        moved[:, :k] += self.free
+        left, sizes, right = np.linalg.svd(moved)
+        kept = sizes > ROUND_OFF * np.max(sizes, initial=0.0)  # held may be what no mode moves
+        return np.asarray((carried @ right[kept].T) / sizes[kept] @ left[:, kept].T)
 
     @functools.cached_property
     def _held(self) -> np.ndarray:
         """What constraints hold (m, m - k), orthonormal."""
         m, k = self.free.shape
-        return np.linalg.svd(self.free)[0][:, k:] if k else np.eye(m)
+        if k in (0, m):
+            return np.eye(m)[:, k:]
+        return np.linalg.svd(self.free)[0][:, k:]
 
     def reactions(self, rows: np.ndarray, impulses: np.ndarray) -> np.ndarray:
         """Impulses (m, k) on the body's points that follow impulses (r, k) on it."""
@@ -111,86 +115,46 @@ class Reactions:
         return directions, self._attached.reactions(self._rows, directions)
 
 
-class AttachedRule(ForcedRule):
-    """``ForcedRule`` for a body on whose points ``attached`` hangs; rows_in: R (m, r) by a level's closed contacts.
+class PointInertia:
+    """What hangs on the points of a body during a step, as its levels see it (modal_force.py).
 
-    in_base: the same (m, b) in base coordinates.
+    in_base: R (m, b) of the points in base coordinates. rows_in: R (m, r) by the closed contacts of a level.
     """
 
-    def __init__(
-        self,
-        plain: EventRule,
-        force_in: InLevel,
-        direct_in: InLevel,
-        attached: AttachedInertia,
-        rows_in: InLevel,
-        in_base: np.ndarray,
-    ) -> None:
-        super().__init__(plain, force_in, direct_in)
-        self._attached = attached
-        self._rows_in = rows_in
-        self._in_base = in_base
-        self._immovable = attached.immovable(plain.model.base, in_base)
-        self._mobilities = BoundedCache[tuple[int, ...], np.ndarray](plain.model.most_levels)
+    independence = math.sqrt(IMMOVABLE)
 
-    def _nearest_of(
-        self, level: LoadedLevel, rows: np.ndarray, vector: np.ndarray, sizes: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        root = self._mobilities.get_or_build(level.level.indices, lambda: self._mobility_root(level))
-        within, impulses = rows @ root, np.zeros(len(rows))
-        moving = np.sum(within**2, axis=1) > IMMOVABLE * np.sum(rows**2, axis=1)
-        asked = np.column_stack([within, rows @ vector])[moving]
-        terms = np.abs(rows) @ np.abs(vector) + (0.0 if sizes is None else sizes)
-        given = np.append(np.zeros(len(vector)), 1.0)
-        try:
-            moved, impulses[moving] = nearest_admissible(asked, given, len(vector), terms[moving])
-        except Infeasible as found:
-            raise Infeasible(np.flatnonzero(moving)[found.rows].tolist()) from found
-        return vector + root @ moved[:-1], impulses
+    def __init__(self, attached: AttachedInertia, base: ModalBase, in_base: np.ndarray, rows_in: RowsIn) -> None:
+        self._attached, self._base, self._in_base, self._rows_in = attached, base, in_base, rows_in
+        self._impedances = dict[tuple[int, ...], np.ndarray]()
 
-    def _joining(self, state: State, held: set[int], asking: set[int]) -> set[int]:
-        joined = set(held)
-        for i in sorted(super()._joining(state, held, asking)):
-            if self._movable(sorted(joined | {i})):
-                joined.add(i)
-        return joined - held
+    @functools.cached_property
+    def held(self) -> set[int]:
+        """Contacts that cannot move for what is attached: what is left of their gaps is round-off of constraints."""
+        return self._attached.immovable(self._base, self._in_base)
 
-    def _movable(self, rigid: list[int]) -> bool:
-        """Whether what is attached leaves each of these contacts a motion that the others do not take."""
-        return bool(
-            np.min(self._attached.mobilities(self.model.base.directions[:, rigid], self._in_base)[0]) > IMMOVABLE
-        )
-
-    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
-        """As there, without contacts that cannot move: what is left of their gaps is round-off of the constraints."""
-        return tuple(i for i in super().ends(closed) if i not in self._immovable)
-
-    def _mobility_root(self, level: LoadedLevel) -> np.ndarray:
-        """F (r, r) of B = F F^T."""
-        rows = self._rows_in(level.level.indices)
-        impedance = self._attached.impedance(rows)
+    def mobility(self, closed: tuple[int, ...]) -> np.ndarray:
+        """F (r, r) of a level's B = F F^T."""
+        rows, impedance = self._rows_in(closed), self._impedance(closed)
         shares, ways = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ (impedance + impedance.T) @ rows / 2)
         return np.asarray(ways * np.sqrt(np.maximum(shares, 0.0)))
 
-    def _map(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        before, after = (self._rows_in(level.level.indices) for level in (source, target))
-        return _AttachedTransition(source, target, before, after, self._attached.impedance(after))
-
-    @staticmethod
-    def _plastic(lost: float, speeds: np.ndarray, impulses: np.ndarray) -> float:
-        return -0.5 * float(impulses @ speeds)
-
-
-@dataclass(frozen=True)
-class _AttachedTransition(Transition):
-    """before, after: R (m, r) in source and target. impedance: X of the target."""
-
-    before: np.ndarray
-    after: np.ndarray
-    impedance: np.ndarray
-
-    @property
-    def velocity_matrix(self) -> np.ndarray:
+    def velocity_map(self, source: tuple[int, ...], target: tuple[int, ...], matrix: np.ndarray) -> np.ndarray:
         """eta'_m from eta'_l: what hangs on the points keeps its momentum where modes are left out."""
-        missed = self.after @ self.matrix - self.before
-        return np.asarray(self.matrix - self.after.T @ (self.impedance @ missed))
+        before, after = self._rows_in(source), self._rows_in(target)
+        return np.asarray(matrix - after.T @ (self._impedance(target) @ (after @ matrix - before)))
+
+    def directions(self, units: np.ndarray) -> np.ndarray:
+        """Vectors (c, b) whose products are u.B u', of the directions u (c, b) of contacts; zero for compliant ones."""
+        rigid, found = np.flatnonzero(np.isinf(self._base.stiffnesses)), np.zeros_like(units)
+        directions = units[rigid].T
+        moved = directions + self._in_base.T @ self._attached.reactions(self._in_base, directions)
+        products = directions.T @ moved
+        shares, ways = np.linalg.eigh((products + products.T) / 2)
+        left = (ways * np.sqrt(np.maximum(shares, 0.0)))[:, ::-1][:, : units.shape[1]]
+        found[rigid, : left.shape[1]] = left
+        return found
+
+    def _impedance(self, closed: tuple[int, ...]) -> np.ndarray:
+        if closed not in self._impedances:
+            self._impedances[closed] = self._attached.impedance(self._rows_in(closed))
+        return self._impedances[closed]

@@ -165,7 +165,9 @@ class Interface:
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""
-        modal, points = np.split(force, [given.size])
+        if given.closed == wanted.closed:
+            return force
+        modal, points = force[: given.size], force[given.size :]
         return np.concatenate([modal + points @ (self.of(wanted).rows - self.of(given).rows), points])
 
 

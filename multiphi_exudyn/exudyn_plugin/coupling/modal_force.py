@@ -1,28 +1,29 @@
-"""Event rule under a modal force that is constant for the length of a step.
+"""Modal force that is held constant for the length of a step, in the arrays that the loop works on.
 
 A force p on the coordinates eta of a level only moves the centre of their motion,
 
     eta'' + D eta' + diag(omega^2) (eta - d) = drive + p_0,   d = omega^-2 p,   p_0 the part on zero-frequency modes
 
-so a level under p is the same level with another asymptotic configuration, and the event rule holds unchanged.
-Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level holds. Where p comes
-from forces f on points, a closed rigid contact also takes what no mode of its level sees of them: L f.
+so a level under p is the same level with other constants, those of signals, gaps, energies and maps, and the event rule
+holds unchanged. Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level
+holds. Where p comes from forces f on points, a closed rigid contact also takes what no mode of its level sees of them:
+L f. What hangs on the points takes part in impacts (attached_inertia.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from multiphi_exudyn.events.rule import EventRule
-from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 
-__all__ = ["ForcedRule", "InLevel", "centre_of", "shift"]
-
-InLevel = Callable[[tuple[int, ...]], np.ndarray]  # an array by the closed contacts of a level
+__all__ = ["Acting", "HeldForces", "Inertia", "shift"]
 
 
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
@@ -31,51 +32,225 @@ def shift(level: Level, force: np.ndarray) -> np.ndarray:
     return np.divide(force[: level.modes], level.squares, out=centre, where=level.squares != 0)
 
 
-class ForcedRule(EventRule):
-    """The rule ``plain`` under forces (p, f) (s + m,): ``force_in`` gives them by a level's closed contacts.
+@dataclass(frozen=True)
+class Acting:
+    """What acts in a level: a modal force (s,), and what closed contacts carry of forces on points, L f (k,) [N]."""
 
-    direct_in: L (k, m) in the same way.
-    """
+    force: np.ndarray
+    reactions: np.ndarray
 
-    def __init__(
-        self,
-        plain: EventRule,
-        force_in: InLevel,
-        direct_in: InLevel,
-    ) -> None:
-        super().__init__(plain.model, plain.load)
-        self._plain = plain
-        self._force_in = force_in
-        self._direct_in = direct_in
 
-    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
-        return _forced(self._plain.level(closed), self._force_in(closed), self._direct_in(closed))
+class Inertia(Protocol):
+    """What hangs on a structure."""
+
+    independence: float  # of directions of length one that it leaves: what is left beside others if they are redundant
+
+    def mobility(self, closed: tuple[int, ...]) -> np.ndarray:
+        """F (r, r) of a level's B = F F^T."""
+
+    def velocity_map(self, source: tuple[int, ...], target: tuple[int, ...], matrix: np.ndarray) -> np.ndarray:
+        """eta'_m from eta'_l, where ``matrix`` is without it."""
+
+    def directions(self, units: np.ndarray) -> np.ndarray:
+        """What it leaves of directions (c, b)."""
+
+    @property
+    def held(self) -> set[int]:
+        """Contacts that cannot move for it."""
 
 
 @dataclass(frozen=True)
-class _ForcedLevel(LoadedLevel):
-    """``plain`` under a modal force; centre: d (r,). Its energies are those of ``plain``, without the force's."""
+class _Level:
+    """Constants of a level, and how forces change them: numbers[places] = constants + gains . (p, reactions).
 
-    plain: LoadedLevel
-    centre: np.ndarray
+    inverse: omega^-2 (r,), zero where omega is. linear, squares: of its energy without forces, whose constant stands at
+    ``energy``. exits: their records; elements: theirs. ends: what is looked at; mobility: where F has its place.
+    """
 
-    def potential(self, displacement: np.ndarray) -> float:
-        """Strain energy less the potential f.x of the static load [J]."""
-        return self.plain.potential(displacement + self.centre)
+    closed: tuple[int, ...]
+    inverse: np.ndarray
+    places: np.ndarray
+    constants: np.ndarray
+    gains: np.ndarray
+    energy: int
+    potential: float
+    linear: np.ndarray
+    squares: np.ndarray
+    exits: list[int]
+    elements: list[int]
+    ends: np.ndarray
+    mobility: int
 
 
-def centre_of(rule: EventRule, closed: tuple[int, ...]) -> np.ndarray | float:
-    """d (r,) in a level of a rule, zero where no modal force acts."""
-    level = rule.level(closed)
-    return level.centre if isinstance(level, _ForcedLevel) else 0.0
+class HeldForces:
+    """The levels of ``arrays`` under constant forces, and with what hangs on the structure."""
+
+    def __init__(self, arrays: LevelArrays) -> None:
+        self.arrays = arrays
+        self._levels = dict[int, _Level]()
+        self._shifts = dict[int, np.ndarray]()
+        self._offsets = dict[int, np.ndarray]()  # of maps
+        self._rates = dict[int, int]()  # where maps have the velocities of what hangs on the points
+        self._entered = dict[int, float]()  # constants, by exit
+        self._acting: Callable[[tuple[int, ...]], Acting] = _nothing
+        self._inertia: Inertia | None = None
+        kinds = arrays.ints[arrays.ints[a.KINDS] :][: arrays.ints[a.ELEMENTS]]
+        self._rigid = bool(np.any(kinds == a.RIGID))  # only these are struck
+        start, shape = int(arrays.ints[a.DIRECTIONS]), (int(arrays.ints[a.ELEMENTS]), int(arrays.ints[a.COORDINATES]))
+        self._units = arrays.numbers[start : start + shape[0] * shape[1]].reshape(shape).copy()
+        arrays.held = self
+
+    def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
+        """From now on these forces act, by the closed contacts of a level."""
+        arrays, before = self.arrays, self._inertia
+        self._acting, self._inertia = acting, inertia
+        if self._rigid and not (inertia is None and before is None):
+            units = self._units if inertia is None else inertia.directions(self._units)
+            start = int(arrays.ints[a.DIRECTIONS])
+            arrays.numbers[start : start + units.size] = units.ravel()
+            arrays.numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
+        arrays.hide()
+
+    def forget(self) -> None:
+        """Begin anew, without any level."""
+        self.arrays.forget()
+        self._inertia = None
+        for kept in (self._levels, self._shifts, self._offsets, self._rates, self._entered):
+            kept.clear()
+
+    def centre(self, level: int) -> np.ndarray:
+        """d (r,) of a level."""
+        return self._shifts[level]
+
+    # ------------------------------------------------------------------ what the arrays ask for
+
+    def change_level(self, level: int) -> None:
+        """Give a level the constants that belong to the forces, and the mobility that is left to it."""
+        known = self._known(level)
+        ints, numbers, acting = self.arrays.ints, self.arrays.numbers, self._acting(known.closed)
+        force = acting.force[: len(known.inverse)]
+        d = self._shifts[level] = known.inverse * force
+        numbers[known.places] = known.constants + known.gains.dot(np.concatenate([force, acting.reactions]))
+        numbers[known.energy] = known.potential + known.linear.dot(d) + 0.5 * known.squares.dot(d * d)
+        for exit_ in known.exits:
+            if ints[exit_ + a.ENTERED] >= 0:
+                self.change_entered(level, exit_)
+        if self._rigid and (self._inertia is not None or ints[level + a.MOBILITY] >= 0):
+            self._limit(level, known)
+
+    def change_map(self, source: int, target: int, record: int) -> None:
+        """Give a map the offset that belongs to the forces, and the velocities of what hangs on the points."""
+        ints, numbers = self.arrays.ints, self.arrays.numbers
+        rows, width, r = self._width(target), self._width(source), len(self._shifts[source])
+        matrix = numbers[ints[record + a.MATRIX] :][: rows * width].reshape(rows, width)
+        start = int(ints[record + a.OFFSET])
+        if record not in self._offsets:
+            self._offsets[record] = numbers[start : start + rows].copy()
+        offset = self._offsets[record] + matrix[:, :r] @ self._shifts[source]
+        offset[: len(self._shifts[target])] -= self._shifts[target]
+        numbers[start : start + rows] = offset
+        if self._inertia is None:
+            if record in self._rates:
+                ints[record + a.RATE_MATRIX] = ints[record + a.MATRIX]
+            return
+        ends = self._levels[source].closed, self._levels[target].closed
+        rates = self._inertia.velocity_map(*ends, matrix)
+        if record not in self._rates:
+            self._rates[record] = self.arrays.buffers.take("numbers", rates.size)
+        start = self.arrays.ints[record + a.RATE_MATRIX] = self._rates[record]
+        self.arrays.numbers[start : start + rates.size] = rates.ravel()
+
+    def change_entered(self, level: int, exit_: int) -> None:
+        """Give the signal of a contact in the level entered alone its constant."""
+        ints, numbers, n = self.arrays.ints, self.arrays.numbers, self._width(level)
+        contact, r = int(ints[exit_ + a.ELEMENT]), len(self._shifts[level])
+        row = int(ints[ints[exit_ + a.ENTERED] + a.ROW])
+        closed = tuple(sorted(set(self._levels[level].closed) ^ {contact}))
+        plain = self._entered.setdefault(exit_, float(numbers[row + 2 * n]))
+        numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
+        if contact in closed:
+            numbers[row + 2 * n] += self._acting(closed).reactions[closed.index(contact)]
+
+    # ------------------------------------------------------------------ levels
+
+    def _width(self, level: int) -> int:
+        return int(self.arrays.ints[level + a.MODES] + self.arrays.ints[a.CHANNELS])
+
+    def _known(self, level: int) -> _Level:
+        if level not in self._levels:
+            self._levels[level] = self._read(level)
+        return self._levels[level]
+
+    def _read(self, level: int) -> _Level:
+        arrays = self.arrays
+        own, n, r = arrays.loaded[int(arrays.ints[level + a.NUMBER])].level, self._width(level), self._modes(level)
+        squares = own.squares[:r]
+        inverse = np.divide(1.0, squares, out=np.zeros(r), where=squares != 0)
+        beside = np.diag((squares == 0).astype(float))
+        if np.any(beside) and arrays.ints[level + a.FORCE] < 0:
+            place = arrays.buffers.take("numbers", r)
+            arrays.ints[level + a.FORCE] = place
+        mobility = arrays.buffers.take("numbers", r * r)
+        ints, numbers = arrays.ints, arrays.numbers
+        exits = ints[level + a.EXITS] + a.EXIT_INTS * np.arange(ints[level + a.EXIT_COUNT])
+        rows, energy = ints[exits + a.SIGNAL + a.ROW], int(ints[level + a.POTENTIAL])
+        forms = numbers[energy + 1 + n + r :][: (n - r) * n].reshape(n - r, n)
+        gaps, patterns, channels = len(own.gap_rows), self._patterns(level), np.arange(n - r)
+        parts = [
+            (ints[level + a.MOTION] + 2 * n + (2 * n + 1) * np.arange(r), beside),
+            (ints[level + a.GAPS] + n + (n + 1) * np.arange(gaps), own.gap_rows[:, :r] * inverse),
+            (energy + 1 + np.arange(r), np.diag(numbers[energy + 1 + n :][:r] * inverse)),
+            (energy + 1 + r + channels, forms[:, :r] * inverse),
+            (ints[level + a.PATTERNS] + n + (n + 1) * channels, patterns * inverse),
+            (ints[level + a.FORCE] + np.arange(r if ints[level + a.FORCE] >= 0 else 0), beside),
+            (rows + 2 * n, numbers[rows[:, None] + np.arange(r)] * inverse),
+        ]
+        places = np.concatenate([at for at, _ in parts])
+        gains = np.zeros((len(places), r + len(own.indices)))
+        gains[:, :r] = np.vstack([gain[: len(at)] for at, gain in parts])
+        elements = ints[exits + a.ELEMENT].tolist()
+        for k, contact in enumerate(own.indices):
+            carriers = [len(places) - len(exits) + e for e, element in enumerate(elements) if element == contact]
+            gains[carriers, r + k] = 1.0
+        return _Level(
+            closed=own.indices,
+            inverse=inverse,
+            places=places,
+            constants=numbers[places],
+            gains=gains,
+            energy=energy,
+            potential=float(numbers[energy]),
+            linear=numbers[energy + 1 : energy + 1 + r].copy(),
+            squares=numbers[energy + 1 + n :][:r].copy(),
+            exits=exits.tolist(),
+            elements=elements,
+            ends=ints[ints[level + a.ENDS] :][: ints[level + a.END_COUNT]].copy(),
+            mobility=mobility,
+        )
+
+    def _modes(self, level: int) -> int:
+        return int(self.arrays.ints[level + a.MODES])
+
+    def _patterns(self, level: int) -> np.ndarray:
+        """What the modes (q, r) do along the patterns of the channels."""
+        r, n = self._modes(level), self._width(level)
+        rows = self.arrays.numbers[self.arrays.ints[level + a.PATTERNS] :][: (n - r) * (n + 1)]
+        return np.asarray(rows.reshape(n - r, n + 1)[:, :r])
+
+    def _limit(self, level: int, plain: _Level) -> None:
+        """What hangs on the structure: the mobility that it leaves, and the contacts that still are looked at."""
+        ints, r = self.arrays.ints, len(plain.inverse)
+        ints[level + a.MOBILITY], ends = -1, plain.ends
+        if self._inertia is not None:
+            ints[level + a.MOBILITY] = plain.mobility
+            root = self._inertia.mobility(plain.closed)
+            self.arrays.numbers[plain.mobility : plain.mobility + r * r] = root.ravel()
+            held = self._inertia.held
+            ends = np.array([k for k in ends.tolist() if plain.elements[k] not in held], dtype=np.int64)
+        start = int(ints[level + a.ENDS])
+        ints[start : start + len(ends)] = ends
+        ints[level + a.END_COUNT] = len(ends)
 
 
-def _forced(plain: LoadedLevel, force: np.ndarray, direct: np.ndarray) -> LoadedLevel:
-    level, rest, d = plain.level, plain.asymptotic, shift(plain.level, force)
-    asymptotic = replace(
-        rest,
-        configuration=rest.configuration + level.vectors @ d,
-        forces=rest.forces + level.force_rows @ d + direct @ force[len(force) - direct.shape[1] :],
-        drive=rest.drive + np.where(level.squares != 0, 0.0, force[: level.modes]),
-    )
-    return _ForcedLevel(level, asymptotic, plain.gap_constants + level.gap_rows @ d, plain, d)
+def _nothing(closed: tuple[int, ...]) -> Acting:
+    raise AssertionError("no force has been given yet")

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.transition import LoadedLevel
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 
 __all__ = ["SteppedLevel"]
 
@@ -36,10 +36,11 @@ class SteppedLevel:
 
     Coordinates beyond the level's r modes are never excited; they have the frequency of its highest one.
     loaded: the level. mass, damping, stiffness: for the solver. own_damping: Phi^T C Phi. drive: (s,).
-    from_displacement, from_velocity, from_force: Q, V, G.
+    from_displacement, from_velocity, from_force: Q, V, G. step: h [s], or None.
     """
 
     loaded: LoadedLevel
+    step: float | None
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
@@ -60,7 +61,7 @@ class SteppedLevel:
         drive[: level.modes] = loaded.asymptotic.drive
         maps = _plain(damping) if step is None else _matched(squares, damping, step)
         mass, stepped, q, v, g = maps
-        return cls(loaded, mass, stepped, np.diag(squares), damping, drive, q, v, g)
+        return cls(loaded, step, mass, stepped, np.diag(squares), damping, drive, q, v, g)
 
     @property
     def closed(self) -> tuple[int, ...]:
@@ -87,13 +88,16 @@ class SteppedLevel:
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,)."""
-        q, q_t, q_tt = np.split(self.states(eta[None, :], eta_t[None, :], force[None, :])[0], 3)
-        return q, q_t, q_tt
+        q, v, acting = np.zeros(self.size), np.zeros(self.size), force + self.drive
+        q[: len(eta)], v[: len(eta)] = eta, eta_t
+        q_t = self.from_displacement.dot(q) + self.from_velocity.dot(v) + self.from_force.dot(acting)
+        return q, q_t, self._mass_inverse.dot(acting - self.damping.dot(q_t) - self.stiffness.dot(q))
 
     def states(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s)."""
         found = np.zeros((len(eta), 3 * self.size))
-        q, q_t, q_tt = np.split(found, 3, axis=1)
+        s = self.size
+        q, q_t, q_tt = found[:, :s], found[:, s : 2 * s], found[:, 2 * s :]
         v, r = np.zeros_like(q), eta.shape[1]
         q[:, :r], v[:, :r] = eta, eta_t
         q_t[:] = q @ self.from_displacement.T + v @ self.from_velocity.T + (force + self.drive) @ self.from_force.T

@@ -14,21 +14,37 @@ the body's own coordinates and ties left out of it. So an impact on the body is 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg import lapack
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia
 
-__all__ = ["SystemMatrices"]
+__all__ = ["Hanging", "SystemMatrices"]
 
 APART = 1e-3  # of a step: between the states of a difference along the motion
-SCALED = 5  # times rows and columns are divided by the root of their largest entry (D. Ruiz 2001)
+SCALED = 3  # times rows and columns are divided by the root of their largest entry (D. Ruiz 2001)
+ROUND_OFF = 1e-15  # of the largest eigenvalue: below it one is zero
 NEGLIGIBLE = 1e-10  # of the largest mobility: below it constraints hold a point, and of the largest singular value
+
+
+@dataclass(frozen=True)
+class Hanging:
+    """What hangs on the points of a body: its inertia, and S (n, m), how it follows them.
+
+    only_forces: whether nothing but forces acts on the body, neither masses nor constraints. mass: M (n, n);
+    jacobian: C (k, n) but for the ties.
+    """
+
+    attached: AttachedInertia
+    follow: np.ndarray
+    only_forces: bool
+    mass: np.ndarray
+    jacobian: np.ndarray
 
 
 class SystemMatrices:
@@ -45,6 +61,9 @@ class SystemMatrices:
         self._points = np.array(list(points), dtype=int)
         self._own = np.array(list(own), dtype=int)
         self._ties = [row for tie in ties for row in mbs.systemData.GetObjectLTGAE(tie)]
+        self._free = np.setdiff1d(np.arange(len(self._state["AECoords"])), self._ties)  # constraints beside the ties
+        count, m = len(self.coordinates[0]), len(self._points)
+        self._nothing = AttachedInertia(np.zeros((m, m)), np.eye(m)), np.zeros((count, m))
         self._others = np.setdiff1d(np.arange(len(self.coordinates[0])), [*self._own, *self._points])
 
     @property
@@ -56,49 +75,59 @@ class SystemMatrices:
     def on_body(self, inertia: np.ndarray) -> bool:
         """Whether a mass or a constraint beside the ties acts on the body's own coordinates; inertia: its M (s, s)."""
         mass, jacobian = self._matrices()
-        added = mass[self._own].copy()
-        added[:, self._own] -= inertia
-        return bool(np.any(added) or np.any(np.delete(jacobian, self._ties, axis=0)[:, self._own]))
+        return self._on_body(inertia, mass, jacobian[self._free])
 
-    def mark(self) -> AttachedInertia:
-        """Take the current state as that of a step without event; what hangs on the points."""
-        self._unstruck = self._present()
-        return self.hanging(0.0)
+    def _on_body(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> bool:
+        first, last = int(self._own[0]), int(self._own[-1]) + 1  # a node's coordinates stand together
+        own = mass[first:last]
+        alone = np.count_nonzero(own) == np.count_nonzero(inertia) and np.array_equal(own[:, first:last], inertia)
+        return not alone or bool(np.any(jacobian[:, first:last]))
 
-    def hanging(self, ago: float) -> AttachedInertia:
-        """What hung on the points some time [s] before the state that was marked."""
-        q, v = self._unstruck
+    def present(self) -> np.ndarray:
+        """A copy of q, v (2, n)."""
+        return np.array(self.coordinates[:2])
+
+    def forces(self) -> np.ndarray:
+        """f (n,) at the current state, without those of constraints."""
+        solver = self._mbs.sys["dynamicSolver"]
+        solver.ComputeODE2RHS(self._mbs)
+        return np.array(solver.GetSystemResidual())[: len(self.coordinates[0])]
+
+    def hanging(self, unmoved: np.ndarray, inertia: np.ndarray, ago: float = 0.0) -> Hanging:
+        """What hangs on the points some time [s] before the others are at q, v (2, n); inertia: the body's M (s, s)."""
+        if ago == 0:
+            return self._hanging(inertia, *self._matrices())
+        q, v = unmoved
         here = self.coordinates[0].copy()
         self.coordinates[0][self._others] = (q - ago * v)[self._others]
-        attached, self._follow = self._attached()
+        found = self._hanging(inertia, *self._matrices())
         self.coordinates[0][:] = here
-        return attached
-
-    def leave(self, step: float) -> np.ndarray:
-        """a (n,) right before an event of the body."""
-        self._left, self._before = self._present(), self.accelerations(step)
-        return self._before
-
-    def arrive(self, step: float) -> np.ndarray:
-        """a (n,) right after it, where what hangs on the points has followed them."""
-        self._move(self._left)
-        found = self.accelerations(step)
-        self._change = found - self._before
         return found
 
-    def settle(self, elapsed: float, step: float) -> np.ndarray:
-        """a (n,) at the end of the step, where everything has followed the body for the time ``elapsed`` [s]."""
-        q, v = self._unstruck
-        self._move(np.array([q, v + elapsed * self._change]))
-        return self.accelerations(step)
+    def follow(self, hanging: Hanging, unmoved: np.ndarray) -> None:
+        """Move all but the body from q, v (2, n), where they would be without it, as the points have moved."""
+        for view, there in zip(self.coordinates, unmoved, strict=False):
+            moved = hanging.follow @ (view - there)[self._points]
+            view[self._others] = (there + moved)[self._others]
+
+    def spread(self, hanging: Hanging, step: float, elapsed: float, jump: np.ndarray) -> None:
+        """The others, on which nothing of the body hangs but forces, which have jumped by (n,) a time [s] ago."""
+        others, free = self._others, self._free
+        if not len(others):
+            return
+        mass, jacobian, none = hanging.mass[np.ix_(others, others)], hanging.jacobian[:, others], np.zeros(len(free))
+        if np.any(jump[others]):
+            change = _balanced(mass, jacobian, np.concatenate([jump[others], none]))
+            self.coordinates[1][others] += elapsed * change[: len(others)]
+        turning = self._along_the_motion(APART * step)[free] if len(free) else none
+        found = _balanced(mass, jacobian, np.concatenate([self.forces()[others], turning]))
+        self.coordinates[2][others] = found[: len(others)]
+        self._state["AECoords"][free] = found[len(others) :]
 
     def accelerations(self, step: float) -> np.ndarray:
         """a (n,) at the current state, which gets mu and, beside the body, a; step [s]: that of the solver."""
         mass, jacobian = self._matrices()
-        solver = self._mbs.sys["dynamicSolver"]
-        solver.ComputeODE2RHS(self._mbs)
-        forces = np.array(solver.GetSystemResidual())[: len(mass)]
-        turning = np.zeros(len(jacobian))
+        forces, turning = self.forces(), np.zeros(len(jacobian))
         if len(jacobian) > len(self._ties):
             turning = self._along_the_motion(APART * step)
         found = _balanced(mass, jacobian, np.concatenate([forces, turning]))
@@ -106,10 +135,13 @@ class SystemMatrices:
         self.coordinates[2][self._others] = found[self._others]
         return found[: len(mass)]
 
-    def _attached(self) -> tuple[AttachedInertia, np.ndarray]:
-        """What hangs on the points at the current state, and S (n, m)."""
-        mass, jacobian = self._matrices()
-        jacobian = np.delete(jacobian, self._ties, axis=0)
+    def _hanging(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> Hanging:
+        """What hangs on the points at the current state."""
+        jacobian = jacobian[self._free]
+        given = mass, jacobian
+        if not (np.any(mass[self._points]) or np.any(jacobian[:, self._points])):
+            return Hanging(*self._nothing, not self._on_body(inertia, mass, jacobian), *given)
+        jacobian = jacobian.copy()
         jacobian[:, self._own] = 0.0
         moving = _connected(mass, jacobian, self._points)
         for place in sorted(self.apart.keys() & set(moving.tolist())):
@@ -120,27 +152,16 @@ class SystemMatrices:
         jacobian = jacobian[:, moving]
         jacobian = jacobian[np.any(jacobian, axis=1)]
         mass, at = mass[np.ix_(moving, moving)], np.searchsorted(moving, self._points)
-        follow = np.zeros((len(self.coordinates[0]), len(at)))
-        if not (np.any(mass) or np.any(jacobian)):
-            return AttachedInertia(np.zeros((len(at), len(at))), np.eye(len(at))), follow  # nothing hangs there
+        follow = np.zeros((len(given[0]), len(at)))
         ways = _null_space(jacobian)
         shown = ways[at]  # y of the ways that are left
-        inertia, heaviest = ways.T @ mass @ ways, float(np.max(np.diagonal(mass)))
-        flexible = np.linalg.pinv(inertia + (heaviest or 1.0) * shown.T @ shown, hermitian=True)
-        mobility, directions = np.linalg.eigh(shown @ flexible @ shown.T)
-        free = directions[:, mobility > NEGLIGIBLE * np.max(mobility, initial=0.0)]
-        carried = ways @ flexible @ shown.T @ np.linalg.pinv(shown @ flexible @ shown.T, NEGLIGIBLE, hermitian=True)
+        heaviest = float(np.max(np.diagonal(mass)))
+        flexible, _ = _inverted(ways.T @ mass @ ways + (heaviest or 1.0) * shown.T @ shown, ROUND_OFF)
+        inverse, free = _inverted(shown @ flexible @ shown.T, NEGLIGIBLE)
+        carried = ways @ flexible @ shown.T @ inverse
         follow[moving] = carried
-        return AttachedInertia(carried.T @ mass @ carried, free), follow
-
-    def _present(self) -> np.ndarray:
-        """A copy of q, v (2, n)."""
-        return np.array(self.coordinates[:2])
-
-    def _move(self, free: np.ndarray) -> None:
-        """Move all but the body from q, v (2, n), where they would be without it, as the points have moved."""
-        for view, unmoved in zip(self.coordinates, free, strict=False):
-            view[self._others] = (unmoved + self._follow @ (view - unmoved)[self._points])[self._others]
+        attached = AttachedInertia(carried.T @ mass @ carried, free)
+        return Hanging(attached, follow, False, *given)
 
     def _matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """M (n, n) and C (k, n) at the current state."""
@@ -177,26 +198,39 @@ def _connected(mass: np.ndarray, jacobian: np.ndarray, points: np.ndarray) -> np
     masses, holds = mass != 0, jacobian != 0
     found, count = np.zeros(len(mass), bool), 0
     found[points] = True
-    while np.sum(found) > count:
-        count = np.sum(found)
-        found |= np.any(masses[found], axis=0) | np.any(holds[np.any(holds[:, found], axis=1)], axis=0)
+    while np.count_nonzero(found) > count:
+        count = int(np.count_nonzero(found))
+        found |= masses[found].any(axis=0) | holds[holds[:, found].any(axis=1)].any(axis=0)
     return np.flatnonzero(found)
 
 
 def _balanced(mass: np.ndarray, jacobian: np.ndarray, given: np.ndarray) -> np.ndarray:
     """(a, mu) (n + k,) of M a + C^T mu = f, C a = g, (f, g) given; redundant constraints share mu."""
-    system = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(jacobian),) * 2)]])
-    scale = np.ones(len(system))
+    n, count = len(mass), len(mass) + len(jacobian)
+    if n == count and np.count_nonzero(mass) == np.count_nonzero(np.diagonal(mass)) == n:
+        return np.asarray(given / np.diagonal(mass))
+    system = np.zeros((count, count))
+    system[:n, :n], system[n:, :n], system[:n, n:] = mass, jacobian, jacobian.T
+    if not count:
+        return np.zeros(0)
+    scale, sizes = np.ones(count), np.abs(system)
     for _ in range(SCALED):
-        largest = np.max(np.abs(system) * np.outer(scale, scale), axis=1, initial=0.0)
-        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-    system = system * np.outer(scale, scale)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
-        try:
-            return np.asarray(scale * scipy.linalg.solve(system, scale * given, check_finite=False))
-        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
-            return np.asarray(scale * np.linalg.lstsq(system, scale * given, rcond=None)[0])
+        largest = np.sqrt(np.maximum.reduce(sizes * scale, axis=1) * scale)
+        largest[largest == 0] = 1.0
+        scale /= largest
+    system *= scale[:, None] * scale
+    factors, pivots, singular = lapack.dgetrf(system)
+    if not singular and lapack.dgecon(factors, np.max(np.sum(np.abs(system), axis=0)))[0] > np.finfo(float).eps:
+        return np.asarray(scale * lapack.dgetrs(factors, pivots, scale * given)[0])
+    return np.asarray(scale * np.linalg.lstsq(system, scale * given, rcond=None)[0])
+
+
+def _inverted(matrix: np.ndarray, negligible: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pseudo-inverse (k, k) of a symmetric matrix without negative eigenvalues, and its range, orthonormal."""
+    values, ways = np.linalg.eigh(matrix)
+    kept = values > negligible * np.max(values, initial=0.0)
+    found = ways[:, kept]
+    return found / values[kept] @ found.T, found
 
 
 def _null_space(jacobian: np.ndarray) -> np.ndarray:

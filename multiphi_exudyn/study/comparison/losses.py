@@ -82,7 +82,7 @@ def _counts(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> tuple[
     counts: list[int | None] = []
     for factor in FACTORS:
         with kept_back():
-            trajectory = simulate(model, end, displacement=factor * start, compiled=False)
+            trajectory = simulate(model, end, displacement=factor * start)
         intervals = np.array(trajectory.contact_intervals(model.contacts[0].name)).reshape(-1, 2)
         ok = trajectory.status == "ok"
         counts.append(metrics.inner_losses(intervals, bench.longest_period) if ok else None)

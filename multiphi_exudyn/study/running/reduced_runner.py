@@ -48,10 +48,9 @@ def _run(
     horizon: bool,
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
-    compiled = spec.loop == "compiled"
 
     def run_once() -> Trajectory:
-        return simulate(model, bench.t_end, displacement=start, loads=bench.loads, compiled=compiled)
+        return simulate(model, bench.t_end, displacement=start, loads=bench.loads)
 
     trajectory, first, repeats = repeated(lambda: timed(run_once), bench.repeats)
     run = ModelRun(

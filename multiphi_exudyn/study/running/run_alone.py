@@ -47,7 +47,7 @@ def run_alone(task: Task) -> dict[str, Any]:
     tracemalloc.start()
     model = MultiPhiModel(task.structure, task.contacts, modes=task.modes, overrides=task.overrides)
     with kept_back():
-        run = simulate(model, task.t_end, displacement=task.start, loads=task.loads, compiled=False)
+        run = simulate(model, task.t_end, displacement=task.start, loads=task.loads)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]

@@ -81,10 +81,9 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
     if isinstance(spec, UserObjectModel):
         printed = ", printed frequencies" if bench.overrides else ""
         return f"Exudyn user object, {levels}{printed}, step {spec.step * 1e6:g} µs"
-    loop = ", compiled" if spec.loop == "compiled" else ""
     if isinstance(spec, GlobalBasisModel):
-        return f"global basis, {levels} from each of two{loop}"
-    return f"Multi-Phi, {levels}{', printed frequencies' if bench.overrides else ''}{loop}"
+        return f"global basis, {levels} from each of two"
+    return f"Multi-Phi, {levels}{', printed frequencies' if bench.overrides else ''}"
 
 
 def _levels(bench: Workbench, rigid: bool) -> str:

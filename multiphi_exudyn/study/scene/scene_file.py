@@ -125,7 +125,6 @@ class ReducedModel(Table):
     modes: Modes | None = None  # none given: the scene's
     tolerance: Positive | None = None  # truncation error wanted, from which the modes follow, in place of a number
     contact: Literal["as-given", "rigid"] = "as-given"
-    loop: Literal["numpy", "compiled"] = "numpy"  # what carries the run from event to event; the answer is the same
 
     @model_validator(mode="after")
     def _one_choice_of_modes(self) -> ReducedModel:
@@ -185,7 +184,6 @@ class GlobalBasisModel(Table):
     name: Name
     modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
     contact: Literal["as-given", "rigid"] = "as-given"
-    loop: Literal["numpy", "compiled"] = "numpy"
 
 
 ModelSpec = Annotated[

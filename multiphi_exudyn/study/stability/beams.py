@@ -60,7 +60,7 @@ def _rig_scaled(displacement: float, quick: bool) -> Problem:
 def _scales(problem: Problem, trajectory: Trajectory) -> str:
     """The same events as of the rig's own displacement, and the displacement in proportion."""
     own = _rig_scaled(PULLED, True)
-    other = simulate(own.model(), own.t_end, own.displacement, compiled=False)
+    other = simulate(own.model(), own.t_end, own.displacement)
     times = np.linspace(0.0, own.t_end, 5001)
     assert problem.pull is not None, "beams are pulled"
     factor = problem.pull.displacement / PULLED

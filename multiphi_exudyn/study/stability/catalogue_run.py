@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
@@ -12,7 +11,6 @@ from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.exudyn_runs import (
     FULL_MODEL,
     USER_OBJECT,
-    loops_compared,
     run_full_model,
     run_user_object,
 )
@@ -23,7 +21,6 @@ from multiphi_exudyn.time.warning_groups import kept_back
 
 __all__ = ["FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
 
-NUMPY_LOOP, COMPILED_LOOP = "NumPy loop", "compiled loop"
 IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 
 
@@ -69,33 +66,15 @@ def warm_up() -> None:
 
 
 def run_case(case: Case, limits: Limits) -> CaseResult:
-    """Every model in one case; whatever is not the NumPy loop is compared with the first native answer."""
+    """Every model in one case; those in Exudyn are compared with the native answer."""
     with kept_back():
-        return _run_case(case, limits)
+        problem = case.build(limits.quick)
+        native = run_native(case, problem, limits.native_limit_s, limits.budget)
+        return CaseResult(case.name, case.hard, (native.outcome, *_in_exudyn(problem, native, limits)))
 
 
-def _run_case(case: Case, limits: Limits) -> CaseResult:
-    problem = case.build(limits.quick)
-    natives = list(_natives(case, problem, limits))
-    answers = [native.trajectory for native in natives if native.trajectory is not None]
-    outcomes = [native.outcome for native in natives]
-    if len(answers) > 1:
-        outcomes[1] = loops_compared(outcomes[1], problem, *answers)
-    if not answers:
-        cause = "no native answer to be compared with"
-        return CaseResult(case.name, case.hard, (*outcomes, *(Outcome(name, NOT_RUN, cause) for name in IN_EXUDYN)))
-    body = run_user_object(problem, answers[0], limits.most_steps, limits.limit_s)
-    full = run_full_model(problem, answers[0], limits.values, limits.limit_s)
-    return CaseResult(case.name, case.hard, (*outcomes, body, full))
-
-
-def _natives(case: Case, problem: Problem, limits: Limits) -> Iterator[Native]:
-    yield run_native(case, problem, NUMPY_LOOP, False, limits.native_limit_s, limits.budget)
-    if importlib.util.find_spec("numba") is None:
-        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "numba is not installed"))
-    elif problem.driven:
-        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "takes loads that do not vary"))
-    elif problem.laws or any(contact.damping for contact in problem.parts):
-        yield Native(Outcome(COMPILED_LOOP, NOT_RUN, "takes neither force laws nor viscous contacts"))
-    else:
-        yield run_native(case, problem, COMPILED_LOOP, True, limits.native_limit_s, limits.budget)
+def _in_exudyn(problem: Problem, native: Native, limits: Limits) -> tuple[Outcome, ...]:
+    if native.trajectory is None:
+        return tuple(Outcome(name, NOT_RUN, "no native answer to be compared with") for name in IN_EXUDYN)
+    body = run_user_object(problem, native.trajectory, limits.most_steps, limits.limit_s)
+    return body, run_full_model(problem, native.trajectory, limits.values, limits.limit_s)

@@ -25,7 +25,7 @@ from reference_models.body_alone import solve_body_alone
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_matrices import run_matrices
 
-__all__ = ["FULL_MODEL", "USER_OBJECT", "loops_compared", "run_full_model", "run_user_object"]
+__all__ = ["FULL_MODEL", "USER_OBJECT", "run_full_model", "run_user_object"]
 
 USER_OBJECT, FULL_MODEL = "user object", "full model"
 MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; matched modes need more than two
@@ -158,13 +158,6 @@ def _drift(energy: np.ndarray, work: np.ndarray, kinetic: np.ndarray, conservati
     away = np.abs(balance - balance[0]) if conservative else balance - np.minimum.accumulate(balance)
     largest = max(float(np.max(energy)), float(np.max(kinetic)))
     return float(np.max(away)) / largest if largest > 0 else float(np.max(away))
-
-
-def loops_compared(outcome: Outcome, problem: Problem, native: Trajectory, other: Trajectory) -> Outcome:
-    """The outcome of ``other`` with its difference to ``native``, on an even grid."""
-    time = np.linspace(0.0, min(native.t_end, other.t_end), GRID)
-    gaps = {c.name: np.asarray(other.gap(c.name, time)) for c in problem.parts}
-    return _compared(outcome, problem, native, time, gaps)
 
 
 def _compared(

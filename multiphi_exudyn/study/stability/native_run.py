@@ -1,4 +1,4 @@
-"""The native model in a case: NumPy loop and compiled loop, judged."""
+"""The native model in a case, judged."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_withi
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["Native", "run_native"]
+__all__ = ["NATIVE", "Native", "run_native"]
 
+NATIVE = "native"
 TRACE = "no failure of the model's own"  # said of an exception that the model should have turned into a status
 
 
@@ -26,36 +27,34 @@ class Native:
     trajectory: Trajectory | None = None
 
 
-def run_native(case: Case, problem: Problem, name: str, compiled: bool, limit_s: float, budget: int) -> Native:
-    """Run one of the two loops on a model of its own, and judge it.
+def run_native(case: Case, problem: Problem, limit_s: float, budget: int) -> Native:
+    """Run a model of its own, and judge it.
 
     A failure of the model is an outcome with its cause; any other exception is an outcome that is wrong.
     """
     try:
-        trajectory, time_s = call_within(limit_s, lambda: timed(lambda: _simulated(problem, compiled)))
+        trajectory, time_s = call_within(limit_s, lambda: timed(lambda: _simulated(problem)))
     except TimeLimitExceeded:
-        return Native(Outcome(name, FAILED, f"time limit of {limit_s:g} s"))
+        return Native(Outcome(NATIVE, FAILED, f"time limit of {limit_s:g} s"))
     except MultiPhiError as error:
-        return Native(Outcome(name, FAILED, _one_line(error)))
+        return Native(Outcome(NATIVE, FAILED, _one_line(error)))
     except Exception as error:  # what a model lets through is a finding of this catalogue
         cause = f"{type(error).__name__}: {_one_line(error)}"
-        return Native(Outcome(name, FAILED, cause, (f"{cause}: {TRACE}",)))
+        return Native(Outcome(NATIVE, FAILED, cause, (f"{cause}: {TRACE}",)))
     if trajectory.status != OK:
-        return Native(Outcome(name, FAILED, trajectory.message, events=len(trajectory.events), time_s=time_s))
-    return Native(_judged(case, problem, name, trajectory, time_s, budget), trajectory)
+        return Native(Outcome(NATIVE, FAILED, trajectory.message, events=len(trajectory.events), time_s=time_s))
+    return Native(_judged(case, problem, trajectory, time_s, budget), trajectory)
 
 
-def _simulated(problem: Problem, compiled: bool) -> Trajectory:
-    return simulate(
-        problem.model(), problem.t_end, problem.displacement, problem.velocity, problem.loads, compiled=compiled
-    )
+def _simulated(problem: Problem) -> Trajectory:
+    return simulate(problem.model(), problem.t_end, problem.displacement, problem.velocity, problem.loads)
 
 
-def _judged(case: Case, problem: Problem, name: str, trajectory: Trajectory, time_s: float, budget: int) -> Outcome:
+def _judged(case: Case, problem: Problem, trajectory: Trajectory, time_s: float, budget: int) -> Outcome:
     found = judge(problem, trajectory, budget)
     special = case.check(problem, trajectory) if case.check else ""
     return Outcome(
-        name,
+        NATIVE,
         message=trajectory.message,
         wrong=(*found.complaints(problem.metre), *([special] if special else [])),
         energy=found.energy,

@@ -129,7 +129,7 @@ def _in_units(metre: float) -> Problem:
 def _same_in_metres(problem: Problem, trajectory: Trajectory) -> str:
     """The same case in SI units has the same events and displacements."""
     si = _in_units(1.0)
-    other = simulate(si.model(), si.t_end, si.displacement, si.velocity, si.loads, compiled=False)
+    other = simulate(si.model(), si.t_end, si.displacement, si.velocity, si.loads)
     ours, theirs = ([(e.contact, e.kind) for e in run.events] for run in (trajectory, other))
     times = np.linspace(0.0, si.t_end, 5001)
     reference = other.displacement(times)

@@ -19,15 +19,18 @@ MOST_ROCKING = 6  # instants close together: an end of endless impacts
 FINE = 17  # places in two steps at which a dip is looked for
 
 
-def solved(system, displacement, velocity, times, touch=TOUCH):
-    """Motion from t = 0 at times (k,), ascending; touch: of the scene's lengths, see TOUCH."""
-    return _Integration(system, np.asarray(times, float), touch).run(displacement, velocity)
+def solved(system, displacement, velocity, times, touch=TOUCH, finer=1):
+    """Motion from t = 0 at times (k,), ascending; touch: of the scene's lengths, see TOUCH.
+
+    finer: steps, and with them the looks at signs, are so many times as short: a shorter dip is seen.
+    """
+    return _Integration(system, np.asarray(times, float), touch, finer).run(displacement, velocity)
 
 
 class _Integration:
-    def __init__(self, system, times, touch):
+    def __init__(self, system, times, touch, finer):
         self.times, self.touch = times, touch
-        self.levels = Levels(system, times)
+        self.levels = Levels(system, times, finer)
         self.n = self.levels.n
 
     def run(self, displacement, velocity):

@@ -35,12 +35,13 @@ class Level:
 
 
 class Levels:
-    """All levels of a system, on a grid of steps up to the last of ``times``.
+    """All levels of a system, on a grid of steps up to the last of ``times``, ``finer`` times as short as they may be.
 
     ways, speeds, accelerations: of the stops, as columns of the inputs w(t); nodes: of the grid.
     """
 
-    def __init__(self, system, times):
+    def __init__(self, system, times, finer=1):
+        self.step = STEP / finer
         self.system, self.end = system, times[-1]
         self.n, self.c = len(system.mass), len(system.stops)
         self.inverse = np.linalg.inv(system.mass)
@@ -73,7 +74,7 @@ class Levels:
 
     def _grid(self):
         end, courses = self.end, self._courses()
-        longest = min([STEP / self.rate_of_all, end / 8, *(course.step for course in courses)])
+        longest = min([self.step / self.rate_of_all, end / 8, *(course.step for course in courses)])
         fine = [span for course in courses for span in course.fine]
         marks = {0.0, end, *(b for course in courses for b in course.breaks if 0 < b < end)}
         marks |= {float(np.clip(t, 0, end)) for span in fine for t in span[:2]}

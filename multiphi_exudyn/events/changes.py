@@ -1,0 +1,92 @@
+"""Changes of an instant: who asks, which levels are entered, what is lost on the way.
+
+Sets of elements are flags (c,) in the ints; who asks, the state that each asks for, or NOBODY.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    CHANGE_COUNT,
+    CHANGE_IMPULSES,
+    CHANGE_WIDTH,
+    CHANGES,
+    CLOSE,
+    ELEMENTS,
+    KINDS,
+    LEVEL,
+    LOSSES,
+    LOST,
+    LOST_NOW,
+    OK,
+    RIGID,
+    STATES,
+    TRANSITIONS_NOW,
+    WORKED,
+)
+from multiphi_exudyn.events.energies import lose
+from multiphi_exudyn.events.maps import find_level, move
+from multiphi_exudyn.events.phases import update_phases
+from multiphi_exudyn.events.state_arrays import copy_state
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+
+__all__ = ["NOBODY", "clear", "enter", "flag_asking", "is_held", "note", "transfer"]
+
+NOBODY = -1  # in place of the state that an element asks for
+
+
+@compiled
+def flag_asking(ints: Ints, asking: int, flags: int) -> None:
+    """Flags (c,) of those that ask."""
+    for i in range(ints[ELEMENTS]):
+        ints[flags + i] = 1 if ints[asking + i] != NOBODY else 0
+
+
+@compiled
+def is_held(ints: Ints, state: int, element: int) -> int:
+    """1 where a rigid contact is closed."""
+    closed = ints[ints[ints[state + LEVEL] + STATES] + element] == CLOSE
+    return 1 if closed and ints[ints[KINDS] + element] == RIGID else 0
+
+
+@compiled
+def note(ints: Ints, numbers: Numbers, element: int, entered: int, impulse: float) -> None:
+    """List a change: the state entered, or SHARED; shared impulses stand before the change that they belong to."""
+    k = ints[CHANGE_COUNT]
+    ints[ints[CHANGES] + k * CHANGE_WIDTH] = element
+    ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] = entered
+    numbers[ints[CHANGE_IMPULSES] + k] = impulse
+    ints[CHANGE_COUNT] = k + 1
+
+
+@compiled
+def enter(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """A state becomes WORKED, with its phases, and what was lost on the way is added up."""
+    copy_state(ints, numbers, state, WORKED)
+    update_phases(ints, numbers, waves, WORKED, -1)
+    ints[TRANSITIONS_NOW] += 1
+    for k in range(LOSSES):
+        numbers[LOST + k] += numbers[LOST_NOW + k]
+
+
+@compiled
+def transfer(ints: Ints, numbers: Numbers, state: int, key: int, result: int) -> int:
+    """A state in the level with a key (eq. 38.6), and what truncation took in LOST_NOW; OK or NEED."""
+    level = find_level(ints, key)
+    if level < 0:
+        return level
+    clear(numbers, LOST_NOW)
+    if level == ints[state + LEVEL]:
+        copy_state(ints, numbers, state, result)
+        return OK
+    status = move(ints, numbers, state, state, level, result)
+    if status < 0:
+        return status
+    lose(ints, numbers, state, result, 0.0, LOST_NOW)
+    return OK
+
+
+@compiled
+def clear(numbers: Numbers, losses: int) -> None:
+    """Nothing is lost."""
+    for k in range(LOSSES):
+        numbers[losses + k] = 0.0

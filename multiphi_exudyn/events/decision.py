@@ -1,0 +1,261 @@
+"""Law of events: when an element changes its state, and which level follows. It is the same for every run and body.
+
+Every contact has a function that says whether its present state is admissible, s >= 0:
+
+    open                 s = g         gap
+    closed, compliant    s = -g        penetration
+    closed, rigid        s = lambda    reaction
+    closed, viscous      s = lambda    force of spring and damper
+
+With all modes the states exclude each other: where one stops being admissible the other begins to be. The truncated
+bases of two levels need not agree, so the law says what happens then; each sentence with the functions that say it:
+
+1. A contact is *armed* while s >= 0. When s falls through zero it asks to change state.
+   -> phases.phase_of, waiting.watch, waiting.who_asks, decision.decide_jump
+2. A rigid contact that asks to close is decided together with all rigid contacts that touch, in the basis of the
+   level in which they are open: Moreau's impact, then complementarity of acceleration and reaction. A contact closes
+   only if the level it enters gives it a reaction >= 0. At rest is also what would be back at its stop before its gap
+   is more than round-off: so ends a sequence of ever smaller bounces. A contact whose gap the closed ones hold
+   already stays open at its stop, without a force: of redundant contacts a set that is independent carries all.
+   -> striking.impact, impact.collide, resting.list_resting, resting.press, resting.stay_closed, independence.join,
+   striking.close_without_impact
+3. A rigid contact that asks to open always opens: it never pulls.
+   -> switching.is_firm, switching.open_and_enter
+4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
+   several that ask together and may not, the first that may alone changes.
+   -> switching.try_wishes, switching.switch
+5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
+   armed when s reaches zero, and asks again if s turns down before.
+   -> phases.phase_of, waiting.watch
+6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
+   armed), or until s in the level it would enter has (then it changes). Where it then asks again at the same
+   instant, for ever, it is *held back* until s has risen to zero, or until another contact asks.
+   -> phases.update_phases, waiting.watch, waiting.flag_again, phases.hold_back
+7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero; then,
+   open with g < 0, it is refused as in 6: armed when g has risen to zero, closed when its force in the level with it
+   closed has. It may stay closed only with a force >= 0, and may open where its force would be negative.
+   -> switching.is_relaxing
+8. The springs of a force law are compliant contacts whose closed sets are nested. While all of them are armed only
+   the ends of its chains can ask, the last closed and the first open spring, and only they are looked at. The two that
+   meet at the law's centre have the same gap with opposite sign and exchange at one instant.
+   -> phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
+9. A sign is that of the first derivative that is not round-off.
+   -> signals.row_sign, signals.rate_sign, phases.becomes
+
+An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
+``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
+depends on sampling. Negative gaps that truncation leaves are reported; an endless exchange is a failure, with a cause.
+
+The decision works on the state WORKED, which begins as the one REACHED, and leaves that one as it was: where something
+is missing (NEED) it is made again from the start.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AFTER,
+    AGAIN,
+    ARMED,
+    ASKED,
+    ASKING,
+    CAUSE,
+    CAUSED_BY,
+    CHANGE_COUNT,
+    CHANGE_IMPULSES,
+    CHANGE_ROOM,
+    CHANGE_WIDTH,
+    CHANGES,
+    COMPLIANT_KEY,
+    DENIED,
+    ELEMENT,
+    ELEMENTS,
+    EVENT,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FAILED,
+    FIRMNESS,
+    FIRST_CHANGE,
+    FREED,
+    HEARD,
+    KINDS,
+    LEVEL,
+    LOST,
+    LOST_NOW,
+    NOT_ADMISSIBLE,
+    OK,
+    OPEN,
+    PENDING,
+    PHASES,
+    PULLING,
+    REACHED,
+    REFUSED,
+    RIGID,
+    SHARED,
+    SIGNAL,
+    STATES,
+    STRIKING,
+    TRANSITIONS_NOW,
+    WORKED,
+)
+from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held
+from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
+from multiphi_exudyn.events.signals import row_sign
+from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
+from multiphi_exudyn.events.striking import close_without_impact, impact
+from multiphi_exudyn.events.switching import switch
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
+
+__all__ = ["ROUNDS", "decide", "decide_jump"]
+
+ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
+
+
+@compiled
+def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """WORKED becomes the state right after an instant at which the elements in ASKING ask; OK, NEED or FAILED.
+
+    AGAIN: those refused at it before. Energies lost are added up in LOST, changes listed. Where in the end all elements
+    are as before, and none was struck, nothing has happened at it.
+    """
+    clear(numbers, LOST)
+    first, struck = ints[FIRST_CHANGE], 0
+    ints[CHANGE_COUNT] = first
+    ints[TRANSITIONS_NOW] = 0
+    copy_state(ints, numbers, REACHED, WORKED)
+    clear_turning_speeds(ints, numbers, WORKED)
+    status = settle(ints, numbers, waves)
+    if status < 0:
+        return status
+    for k in range(first, ints[CHANGE_COUNT]):
+        shared = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == SHARED
+        if shared or numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
+            struck = 1
+    if ints[CHANGE_COUNT] > first and struck == 0 and same_level(ints, REACHED, WORKED) == 1:
+        copy_state(ints, numbers, REACHED, WORKED)
+        flag_asking(ints, ints[ASKING], ints[DENIED])
+        update_phases(ints, numbers, waves, WORKED, ints[DENIED])
+        hold_back(ints, WORKED)
+        clear(numbers, LOST)
+        ints[CHANGE_COUNT] = first
+    return OK
+
+
+@compiled
+def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """1. The decision after channels have jumped: OK where nobody asks, EVENT where somebody does; NEED or FAILED."""
+    exits, asking = ints[ints[REACHED + LEVEL] + EXITS], 0
+    for i in range(ints[ELEMENTS]):
+        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[AGAIN] + i] = 0
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        exit_ = exits + k * EXIT_INTS
+        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL) < 0:
+            ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
+            asking = 1
+    ints[CHANGE_COUNT] = 0
+    if asking == 0:
+        return OK
+    status = decide(ints, numbers, waves)
+    return status if status < 0 else EVENT
+
+
+@compiled
+def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """Decisions at one instant until nobody is refused who has not been heard; OK, NEED or FAILED."""
+    c, asking, heard, freed, pending = ints[ELEMENTS], ints[ASKING], ints[HEARD], ints[FREED], ints[PENDING]
+    flag_asking(ints, asking, heard)
+    asked = 0
+    for i in range(c):
+        ints[freed + i] = ints[heard + i] * is_held(ints, WORKED, i)
+        asked += ints[heard + i]
+    if asked > 0:
+        status = answer(ints, numbers, waves, asking)
+        if status < 0:
+            return status
+    else:
+        update_phases(ints, numbers, waves, WORKED, -1)
+    for _ in range(ROUNDS + c):
+        keep_entered(ints, numbers)
+        left = find_refused(ints)
+        if left == 0:
+            return OK
+        if ints[CHANGE_COUNT] + 3 * c > ints[CHANGE_ROOM]:
+            break
+        status = OK
+        if left == 1:
+            for i in range(c):
+                if ints[pending + i] != NOBODY:
+                    ints[heard + i] = 1
+                    ints[freed + i] = max(ints[freed + i], is_held(ints, WORKED, i))
+            status = answer(ints, numbers, waves, pending)
+        elif left == 2:  # heard before: what others did at this instant took its reaction away
+            status = switch(ints, numbers, waves, ints[PULLING])
+        else:
+            hold_back(ints, WORKED)
+            return OK
+        if status < 0:
+            return status
+    ints[CAUSE] = NOT_ADMISSIBLE
+    flag_asking(ints, pending, ints[CAUSED_BY])
+    return FAILED
+
+
+@compiled
+def find_refused(ints: Ints) -> int:
+    """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: some always taken, PULLING.
+
+    3: of others only. Who has changed has been heard.
+    """
+    level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
+    for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
+        if ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] != SHARED:
+            ints[heard + ints[ints[CHANGES] + k * CHANGE_WIDTH]] = 1
+    for i in range(ints[ELEMENTS]):
+        ints[pending + i] = NOBODY
+        ints[pulling + i] = NOBODY
+    refused, unheard, pulled = 0, 0, 0
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        element = ints[exit_ + ELEMENT]
+        if ints[ints[WORKED + PHASES] + k] == REFUSED:
+            refused = 1
+            if ints[heard + element] == 0:
+                ints[pending + element] = ints[exit_ + ASKED]
+                unheard = 1
+            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:
+                ints[pulling + element] = ints[exit_ + ASKED]
+                pulled = 1
+    if refused == 0:
+        return 0
+    if unheard == 1:
+        return 1
+    return 2 if pulled == 1 else 3
+
+
+@compiled
+def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
+    """WORKED with its phases after those in ``asking`` (c,) have been heard; OK, NEED or FAILED.
+
+    HEARD: all that touch at this instant. FREED: those of them whose reaction has fallen to zero at it.
+    """
+    c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
+    strikes, before = 0, ints[CHANGE_COUNT]
+    clear(numbers, LOST_NOW)
+    for i in range(c):
+        rigid = ints[ints[KINDS] + i] == RIGID
+        ints[striking + i] = 1 if rigid and ints[ints[HEARD] + i] == 1 and ints[states + i] == OPEN else 0
+        strikes += 1 if ints[striking + i] == 1 and ints[asking + i] != NOBODY else 0
+        asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
+        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
+    if strikes == 0:
+        return switch(ints, numbers, waves, asking)
+    status = impact(ints, numbers, waves)
+    if status < 0:
+        return status
+    if ints[CHANGE_COUNT] == before:
+        clear(numbers, LOST_NOW)
+        return close_without_impact(ints, numbers, waves, asking)
+    enter(ints, numbers, waves, AFTER)
+    return OK

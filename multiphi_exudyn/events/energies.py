@@ -1,0 +1,98 @@
+"""Energies of a state, and what a transition loses of them."""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    CARRIED,
+    CHANNELS,
+    DAMPING,
+    ELEMENTS,
+    KINDS,
+    KINETIC,
+    LEVEL,
+    MODES,
+    PATTERNS,
+    PLACE,
+    POTENTIAL,
+    SPEED,
+    STATES,
+    STIFFNESSES,
+    STRAIN,
+    VISCOUS,
+)
+from multiphi_exudyn.events.signals import gap
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
+
+__all__ = ["kinetic", "lose", "pattern_work", "potential"]
+
+
+@compiled
+def kinetic(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Kinetic energy [J]: |Psi eta' + Y w'|^2 / 2."""
+    level, v = ints[state + LEVEL], ints[state + SPEED]
+    r, q, row = ints[level + MODES], ints[CHANNELS], ints[level + CARRIED]
+    total = 0.0
+    for i in range(r):
+        total += 0.5 * numbers[v + i] * numbers[v + i]
+    if row >= 0:
+        for k in range(q):
+            for i in range(r):
+                total += numbers[row + i] * numbers[v + i] * numbers[v + r + k]
+            for j in range(q):
+                total += 0.5 * numbers[row + r + j] * numbers[v + r + j] * numbers[v + r + k]
+            row += r + q
+    return total
+
+
+@compiled
+def potential(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Strain energy less the potential of the loads [J]."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    r, q, form = ints[level + MODES], ints[CHANNELS], ints[level + POTENTIAL]
+    n = r + q
+    total = numbers[form]
+    for i in range(n):
+        total += numbers[form + 1 + i] * numbers[x + i]
+    for i in range(r):
+        total += 0.5 * numbers[form + 1 + n + i] * numbers[x + i] * numbers[x + i]
+    row = form + 1 + n + r
+    for k in range(q):
+        for i in range(r):
+            total += numbers[row + i] * numbers[x + i] * numbers[x + r + k]
+        for j in range(q):
+            total += 0.5 * numbers[row + r + j] * numbers[x + r + j] * numbers[x + r + k]
+        row += n
+    return total
+
+
+@compiled
+def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Potential [J] that the varying loads have at their present values: (b w) . y."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    r, q, row = ints[level + MODES], ints[CHANNELS], ints[level + PATTERNS]
+    total = 0.0
+    for k in range(q):
+        value = numbers[row + r + q]
+        for i in range(r + q):
+            value += numbers[row + i] * numbers[x + i]
+        total += value * numbers[x + r + k]
+        row += r + q + 1
+    return total
+
+
+@compiled
+def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float, losses: int) -> None:
+    """Add what is lost between two states of one instant to losses (5,), less the energy ``collided`` in an impact.
+
+    Viscous contacts that open inside their stop lose what their springs hold, those that close there bring it back.
+    """
+    relaxed = 0.0
+    states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
+    for i in range(ints[ELEMENTS]):
+        if ints[ints[KINDS] + i] == VISCOUS and ints[states + i] != ints[later + i]:
+            depth = gap(ints, numbers, before, i)
+            stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
+            relaxed += stored if ints[states + i] > ints[later + i] else -stored
+    numbers[losses + KINETIC] += kinetic(ints, numbers, before) - kinetic(ints, numbers, after) - collided
+    numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed
+    numbers[losses + DAMPING] += relaxed

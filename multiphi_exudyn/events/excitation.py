@@ -1,0 +1,311 @@
+"""Excitation: the time-varying loads and moving supports of one run (eqs. 38.1, 38.4).
+
+Everything that varies is a channel w_k(t), k = 1 ... q, a history each:
+
+    load          f = ... + b_k w_k                 b_k a pattern (m,) in base coordinates
+    moving stop   g_i = h_i.x + gap_i - s_ik w_k    s_k (c,); for rigid and viscous contacts w_k' is a channel too
+
+What a level makes of the channels is in channels.py.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential, differentiated, translated
+from multiphi_exudyn.mechanics.force_law import LawSpring
+from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
+from multiphi_exudyn.mechanics.time_functions import Sampled, TimeFunction
+
+__all__ = ["Drive", "Excitation", "columns", "static_load"]
+
+
+CARRIER_EFFORT = 10  # pieces of a polynomial for which one of a sweep stands: each of these has its own exponentials
+MOST_EFFORT = 2**20  # pieces in a run, of 3 kB and half a millisecond or more each
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The channels from an instant on: w(time + t) = Re sum_j exp(mu_j t) sum_d a_jd t^d up to ``until`` [s].
+
+    terms: (mu_j, a_j (D + 1, q)).
+    """
+
+    time: float
+    until: float
+    terms: tuple[tuple[complex, np.ndarray], ...]
+
+    @property
+    def channels(self) -> int:
+        """Number of channels q."""
+        return self.terms[0][1].shape[1] if self.terms else 0
+
+    def beside(self, held: np.ndarray) -> Drive:
+        """The same with constant channels (h,) behind."""
+        terms = [(rate, np.pad(given, ((0, 0), (0, len(held))))) for rate, given in self.terms]
+        constant = np.concatenate([np.zeros(self.channels), held])[None, :].astype(complex)
+        return replace(self, terms=(*terms, (0j, constant))) if len(held) else self
+
+    @functools.cached_property
+    def values(self) -> np.ndarray:
+        """w, w', w'' (3, q) at the instant."""
+        result = np.zeros((3, self.channels))
+        for rate, given in self.terms:
+            first = differentiated(rate, given)
+            result += np.array([given[0], first[0], differentiated(rate, first)[0]]).real
+        return result
+
+    @functools.cached_property
+    def sizes(self) -> np.ndarray:
+        """Of which terms w, w', w'' (3, q) at the instant are the sums."""
+        result = np.zeros((3, self.channels))
+        for rate, given in self.terms:
+            first = differentiated(rate, given)
+            result += np.abs([given[0], first[0], differentiated(rate, first)[0]])
+        return result
+
+    def after(self, t: float) -> Drive:
+        """The same from a time t [s] later."""
+        return Drive(self.time + t, self.until, tuple((rate, translated(rate, a, t)) for rate, a in self.terms))
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """See the module's docstring.
+
+    static: constant loads (m,) in base coordinates. patterns: b (m, q). stops: s (c, q). histories: w (q,).
+    rate_of: for every channel the channel that is its derivative, -1 where none is needed. end: of the run [s].
+    """
+
+    static: np.ndarray
+    patterns: np.ndarray
+    stops: np.ndarray
+    histories: tuple[PiecewiseExponential, ...]
+    rate_of: tuple[int, ...]
+    end: float
+
+    @classmethod
+    def of(cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0) -> Excitation:
+        """The loads of a run of ``model`` until ``end`` [s], smooth courses to their tolerance / finer."""
+        if not isinstance(loads, Iterable):
+            raise MultiPhiTypeError(f"loads: got {type(loads).__name__}, need a sequence of loads")
+        base, channels = model.base, _Channels(model, end, finer)
+        for number, load in enumerate(loads):
+            channels.called = _called(number, load)
+            channels.add(load)
+        channels.add_static(static_load(model, loads))
+        patterns = columns(channels.patterns, base.modes.count)
+        stops = columns(channels.stops, len(model.contacts))
+        if model.held:
+            patterns = np.hstack([patterns, np.zeros((base.modes.count, len(model.held)))])
+            stops = np.hstack([stops, np.eye(len(model.contacts))[:, list(model.held)]])
+        rate_of = *channels.rate_of, *(-1 for _ in model.held)
+        found = cls(channels.static, patterns, stops, tuple(channels.histories), rate_of, end)
+        if found.effort(end) > MOST_EFFORT:
+            raise MultiPhiValueError(
+                f"loads: got {found.pieces(end)} pieces in {end:g} s, need at most {MOST_EFFORT}, or of sweeps "
+                f"{MOST_EFFORT // CARRIER_EFFORT}: fewer samples, a larger tolerance or a shorter run"
+            )
+        return found
+
+    @classmethod
+    def constant(cls, load: np.ndarray, contacts: int) -> Excitation:
+        """A static load (m,) alone, on a structure with so many contacts."""
+        return cls(load, np.zeros((len(load), 0)), np.zeros((contacts, 0)), (), (), math.inf)
+
+    @functools.cached_property
+    def shape(self) -> tuple[bytes | tuple[int, ...], ...]:
+        """What a level makes of the channels depends on nothing else."""
+        return self.static.tobytes(), self.patterns.tobytes(), self.stops.tobytes(), self.rate_of
+
+    @property
+    def channels(self) -> int:
+        """Number of channels q."""
+        return len(self.rate_of)
+
+    @property
+    def prescribed(self) -> int:
+        """Number of those that are functions of time, the first ones; the places held by links are the others."""
+        return len(self.histories)
+
+    def pieces(self, end: float) -> int:
+        """Number of pieces in which all channels together are followed up to ``end`` [s]."""
+        inner = [history.breaks[(history.breaks > 0) & (history.breaks < end)] for history in self.histories]
+        return 1 + len(np.unique(np.concatenate(inner))) if inner else 0
+
+    def effort(self, end: float) -> int:
+        """The pieces up to ``end`` [s], those of a run with changing carriers counted as often as they cost more."""
+        carriers = max((len(np.unique(history.rates)) for history in self.histories), default=0)
+        return self.pieces(end) * (CARRIER_EFFORT if carriers > 1 else 1)
+
+    def drive(self, time: float) -> Drive:
+        """The channels from a time on, until the first of their pieces ends."""
+        pieces = [history.local(time) for history in self.histories]
+        terms = {}
+        for rate in dict.fromkeys(piece.rate for piece in pieces):
+            degree = max(len(piece.coefficients) for piece in pieces if piece.rate == rate)
+            terms[rate] = np.zeros((degree, len(pieces)), complex)
+        for channel, piece in enumerate(pieces):
+            terms[piece.rate][: len(piece.coefficients), channel] = piece.coefficients
+        return Drive(time, min((piece.until for piece in pieces), default=math.inf), tuple(terms.items()))
+
+    @property
+    def stop_ways(self) -> np.ndarray:
+        """Bound (c,) [m] of how far every stop moves."""
+        largest = np.array([history.largest for history in self.histories])
+        return np.asarray(np.abs(self.stops[:, : self.prescribed]) @ largest)
+
+    @property
+    def largest_load(self) -> np.ndarray:
+        """Bound (m,) of all loads."""
+        largest = np.array([history.largest for history in self.histories])
+        return np.asarray(np.abs(self.static) + np.abs(self.patterns[:, : self.prescribed]) @ largest)
+
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """w, w' (k, 2, q) at times (k,), from the end of the run on those that it ends with."""
+        times = np.minimum(times, np.nextafter(self.end, 0.0))  # the course of a function is known so far
+        found = [(history.at(times), history.derivative.at(times)) for history in self.histories]
+        return np.array(found).reshape(self.prescribed, 2, len(times)).transpose(2, 1, 0)
+
+    def load(self, values: np.ndarray) -> np.ndarray:
+        """All loads (m,) at an instant with channels w (q,)."""
+        return np.asarray(self.static + self.patterns[:, : len(values)] @ values)
+
+    def moved(self, values: np.ndarray) -> np.ndarray:
+        """How far (c,) [m] the stops have moved at an instant with prescribed channels w."""
+        return np.asarray(self.stops[:, : len(values)] @ values)
+
+
+class _Channels:
+    """Loads as channels, one after the other."""
+
+    def __init__(self, model: MultiPhiModel, end: float, finer: float) -> None:
+        self._model, self._end, self._finer = model, end, finer
+        self.patterns: list[np.ndarray] = []
+        self.stops: list[np.ndarray] = []
+        self.histories: list[PiecewiseExponential] = []
+        self.rate_of: list[int] = []
+        self.called = ""  # the load that is added
+
+    def add(self, load: Load) -> None:
+        """One load's channels; static loads have none."""
+        if isinstance(load, VaryingLoad):
+            self._append(self._row(load.at), self._no_stop(), self._history(load.course))
+        elif isinstance(load, StopMotion):
+            self._check_stop(load.contact)
+            stop = self._no_stop()
+            stop[self._model.index(load.contact)] = 1.0
+            self._move(stop, load.course)
+        elif isinstance(load, BaseMotion):
+            self._shake(load)
+        elif not isinstance(load, (ConstantLoad, Gravity)):
+            raise MultiPhiTypeError(
+                f"loads: got {type(load).__name__}, need ConstantLoad, Gravity, HarmonicLoad, SampledLoad, "
+                "FunctionLoad, SweepLoad, StopMotion or BaseMotion"
+            )
+
+    def add_static(self, load: np.ndarray) -> None:
+        """Constant loads (m,); those that pull at damped rigid-body motion are a channel too.
+
+        Its free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for little damping d;
+        the response to a channel does not.
+        """
+        base, self.static = self._model.base, load
+        rigid = base.modes.rigid
+        if np.any(base.damping[:rigid]) and np.any(load[:rigid]):
+            self._append(load, self._no_stop(), PiecewiseExponential.constant(1.0))
+            self.static = np.zeros_like(load)
+
+    def _shake(self, load: BaseMotion) -> None:
+        """Inertia of the moving frame, and the stops that do not move with it."""
+        structure = self._model.structure
+        moved = structure.row(load.direction)
+        inertia = -self._model.base.modal_load(structure.mass @ moved)
+        self._check_continuous(self._history(load.course), "of the base", speed=True)
+        self._append(inertia, self._no_stop(), load.course.acceleration(self._end, self._finer))
+        fixed = self._no_stop()
+        for name in load.fixed_stops:
+            self._check_stop(name)
+            i = self._model.index(name)
+            fixed[i] = -float(structure.row(self._model.contacts[i].direction) @ moved)
+        if np.any(fixed):
+            self._move(fixed, load.course)
+
+    def _check_stop(self, name: str) -> None:
+        contact = self._model.contacts[self._model.index(name)]
+        if isinstance(contact, LawSpring):
+            raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
+
+    def _move(self, stop: np.ndarray, course: TimeFunction) -> None:
+        """Stops that move by their entries of (c,) times the course."""
+        history, nothing = self._history(course), np.zeros(self._model.base.modes.count)
+        self._append(nothing, stop, history)
+        moving = [contact for contact, moves in zip(self._model.contacts, stop, strict=True) if moves]
+        rigid = [contact.name for contact in moving if contact.rigid]
+        if rigid and isinstance(course, Sampled):
+            raise MultiPhiTypeError(
+                f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
+            )
+        viscous = [contact.name for contact in moving if contact.damping]
+        if rigid or viscous:
+            self._check_continuous(history, f"of the stop of {(rigid + viscous)[0]!r}", speed=bool(rigid))
+            self.rate_of[-1] = len(self.histories)
+            self._append(nothing, self._no_stop(), history.derivative)
+
+    def _check_continuous(self, history: PiecewiseExponential, of: str, speed: bool) -> None:
+        """Refuse a motion that jumps, or whose speed does."""
+        rate = history.derivative.jump_times(history.error) if speed else np.zeros(0)
+        for what, times in (("position", history.jump_times()), ("speed", rate)):
+            jumps = times[(times > 0) & (times < self._end)]
+            if len(jumps):
+                raise MultiPhiValueError(
+                    f"{self.called}: got a motion {of} whose {what} jumps at t = {jumps[0]:.9g} s, need a {what} "
+                    "without jumps"
+                )
+
+    def _append(self, pattern: np.ndarray, stop: np.ndarray, history: PiecewiseExponential) -> None:
+        self.patterns.append(pattern)
+        self.stops.append(stop)
+        self.histories.append(history)
+        self.rate_of.append(-1)
+
+    def _row(self, at: Any) -> np.ndarray:
+        return self._model.base.modal_load(self._model.structure.row(at))
+
+    def _no_stop(self) -> np.ndarray:
+        return np.zeros(len(self._model.contacts))
+
+    def _history(self, course: TimeFunction) -> PiecewiseExponential:
+        """The course of the load that is added; what is wrong with it is told with the load's name."""
+        try:
+            return course.history(self._end, self._finer)
+        except MultiPhiError as error:
+            raise type(error)(f"{self.called}: {error}") from error
+
+
+def _called(number: int, load: Load) -> str:
+    """How errors call a load."""
+    place = getattr(load, "at", getattr(load, "contact", None))
+    named = f" at {place!r}" if isinstance(place, (str, dict)) else ""
+    return f"loads[{number}] ({type(load).__name__}{named})"
+
+
+def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:
+    """The constant loads among ``loads``, (m,) in base coordinates."""
+    rows = [load.row(model.structure) for load in loads if isinstance(load, (ConstantLoad, Gravity))]
+    if not rows:
+        return np.zeros(model.base.modes.count)
+    return model.base.modal_load(np.sum(rows, axis=0))
+
+
+def columns(vectors: list[np.ndarray], length: int) -> np.ndarray:
+    """Vectors (length,) side by side, (length, 0) where there are none."""
+    return np.array(vectors).reshape(len(vectors), length).T

@@ -1,0 +1,70 @@
+"""Exits: the ways out of the states of a level's elements, and what their signals say of the level's motion.
+
+    s = gap q + rate q' + force lambda + constant,   q, lambda linear in xi, xi'    (mechanics/element.py)
+
+An exit whose element may not leave asks what it would say in the level entered: that of the exit that leads back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import Row
+from multiphi_exudyn.events.transition import Transition
+from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
+from multiphi_exudyn.mechanics.element import ElementState, Exit
+
+__all__ = ["after", "entered_row", "exits_of", "signal_row", "signal_rows", "state_of"]
+
+
+def state_of(level: LoadedLevel, element: int) -> ElementState:
+    """The state in which an element is in a level."""
+    return level.level.base.contacts[element].states[level.states[element]]
+
+
+def exits_of(level: LoadedLevel) -> list[tuple[int, Exit]]:
+    """All exits of a level, in the order of its elements, with their positions."""
+    return [(i, exit_) for i in range(len(level.states)) for exit_ in state_of(level, i).exits]
+
+
+def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
+    """The states of all elements after one has taken an exit."""
+    names = [state.name for state in level.level.base.contacts[element].states]
+    states = list(level.states)
+    states[element] = names.index(exit_.asked)
+    return tuple(states)
+
+
+def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
+    """s of an element's exit in a level."""
+    own = level.level
+    position, rate = exit_.gap * own.gap_rows[element], exit_.rate * own.gap_rows[element]
+    constant = exit_.constant + exit_.gap * float(level.gap_constants[element])
+    if exit_.force:
+        k = own.indices.index(element)
+        position, rate = position + exit_.force * own.force_rows[k], rate + exit_.force * own.force_rate_rows[k]
+        constant += exit_.force * float(level.asymptotic.forces[k])
+    return Row(position, rate, constant)
+
+
+def signal_rows(level: LoadedLevel) -> list[Row]:
+    """s of all exits of a level, which keeps them."""
+    if "signals" not in level.entries:
+        level.entries["signals"] = [signal_row(level, element, exit_) for element, exit_ in exits_of(level)]
+    rows: list[Row] = level.entries["signals"]
+    return rows
+
+
+def entered_row(move: Transition, element: int) -> Row:
+    """s that an element would have after a transition, as a function of the states of its source."""
+    back = state_of(move.source, element).name
+    exits = state_of(move.target, element).exits
+    there = signal_row(move.target, element, next((e for e in exits if e.asked == back), exits[0]))
+    terms = there.position * move.offset
+    constant = 0.0 if sign_of(terms, there.constant) == 0 else there.constant + float(np.sum(terms))
+    return Row(
+        drop_round_off(there.position @ move.matrix, np.abs(there.position) @ np.abs(move.matrix)),
+        there.rate @ move.velocity_matrix,
+        constant,
+    )

@@ -1,0 +1,74 @@
+"""What describes a level's motion, gaps, energies and powers, and those of the base, as arrays (arrays.py).
+
+All of it is in the coordinates xi = (eta, w) of a loaded level, with q >= 0 channels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.modal_base import ModalBase
+
+__all__ = ["base_parts", "from_base", "level_parts", "powers"]
+
+
+def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
+    """Motion, gaps and energies of a level."""
+    own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
+    motion = [-np.diag(modal.squares), channels.force, -modal.damping, channels.force_rate, level.asymptotic.drive]
+    moved, patterns = channels.carried.T, level.excitation.patterns.T
+    parts = {
+        a.MOTION: np.column_stack(motion),
+        a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
+        a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
+        a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
+    }
+    if own.speed_rows is not own.gap_rows:
+        parts[a.SPEEDS] = np.column_stack([own.speed_rows, np.zeros(len(own.gap_rows))])
+    if np.any(moved):
+        parts[a.CARRIED] = np.hstack([moved @ modal.vectors, moved @ channels.carried])
+    return parts
+
+
+def base_parts(base: ModalBase, excitation: Excitation) -> dict[int, np.ndarray]:
+    """Gaps and energies of the base, all contacts open, in (y, w)."""
+    q, patterns = excitation.channels, excitation.patterns.T
+    rows = np.column_stack([patterns, np.zeros((q, q))])
+    linear = [-base.preload - excitation.static, np.zeros(q)]
+    return {
+        a.GAPS: np.column_stack([base.directions.T, -excitation.stops, base.gaps]),
+        a.POTENTIAL: np.concatenate([[base.energy_offset], *linear, base.modes.omega**2, -rows.ravel()]),
+        a.PATTERNS: np.column_stack([rows, np.zeros(q)]),
+    }
+
+
+def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[float]]:
+    """The map (T, c, T') from the base to a level; |y| of its channels, and of its rest behind them."""
+    vectors, channels, rest = level.modal.vectors.T, level.channels, level.asymptotic.configuration
+    (r, m), q = vectors.shape, channels.carried.shape[1]
+    place, speed = np.eye(r + q, m + q, m - r), np.eye(r + q, m + q, m - r)
+    for matrix, moved in ((place, channels.shapes), (speed, channels.carried)):
+        matrix[:r, :m], matrix[:r, m:] = vectors, -(vectors @ moved)
+    sizes = [*np.linalg.norm(channels.shapes, axis=0).tolist(), float(np.linalg.norm(rest))]
+    return place, np.concatenate([-(vectors @ rest), np.zeros(q)]), speed, sizes
+
+
+def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
+    """The power of damping as a form in xi' (n, n), and of what varies (q, 4 n + 1), as in work.py."""
+    own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
+    modal, patterns, static = level.modal, level.excitation.patterns, level.excitation.static + base.preload
+    moved = np.hstack([modal.vectors, carried])
+    springs = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
+    pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
+    held = springs * level.gap_constants[index]
+    worked = carried.T @ base.directions[:, index] - level.excitation.stops[index].T  # by their forces
+    placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
+    placed[:, modal.modes :] -= carried.T @ patterns
+    speed = worked @ drags + carried.T @ base.damping @ moved
+    constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
+    damping = moved.T @ base.damping @ moved + own.speed_rows[index].T @ drags
+    damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
+    return damping, np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])

@@ -1,0 +1,206 @@
+"""Loaded level: a level under the loads of one run, in the coordinates xi = (eta, w), with its energies.
+
+    x = Psi eta + y_inf + R w        w (q,) what varies, q >= 0 (channels.py)
+
+In xi rows, maps between levels, events and energies are those of a level under static loads, with q more columns.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.events.channels import Channels
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.levels.level import Asymptotic, Level
+from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics.least_distance import FOLLOWING
+from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+
+__all__ = ["LoadedLevel", "PotentialForm"]
+
+
+@dataclass(frozen=True)
+class StrainForm:
+    """1/2 weights . (rows xi + offsets)^2 + linear . xi + constant: no difference of large energies.
+
+    Rows of 1/2 |Omega y|^2 are a triangular factor of Omega (V, y_inf), those of springs their gaps.
+    """
+
+    weights: np.ndarray
+    rows: np.ndarray
+    offsets: np.ndarray
+    linear: np.ndarray
+    constant: float
+
+    def __call__(self, xi: np.ndarray) -> np.ndarray:
+        """Of (n,) or of every column of (n, k)."""
+        stretched = (self.rows @ xi).T + self.offsets
+        return np.asarray((stretched * stretched) @ (0.5 * self.weights) + self.linear @ xi + self.constant)
+
+
+@dataclass(frozen=True)
+class PotentialForm:
+    """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q)."""
+
+    constant: float
+    linear: np.ndarray
+    squares: np.ndarray
+    rows: np.ndarray
+
+    def __call__(self, xi: np.ndarray) -> float:
+        r = len(self.squares)
+        eta, w = xi[:r], xi[r:]
+        mixed = w @ (self.rows[:, :r] @ eta + 0.5 * self.rows[:, r:] @ w)
+        return self.constant + float(self.linear @ xi + 0.5 * self.squares @ (eta * eta) + mixed)
+
+
+@dataclass(frozen=True)
+class LoadedLevel:
+    """A level under static and varying loads, in the coordinates xi = (eta, w) (r + q,).
+
+    level: in xi, without channels as it is. asymptotic: where its motion is centred while w = 0. gap_constants: gaps
+    (c,) of all contacts at xi = 0. excitation: of the run; channels: what the level makes of it.
+    static: the level under its static loads alone, None where that is this one. own_states: numbers of its elements'
+    states, None where they are what the closed contacts say. stored: strain energy [J] of links that keep a stretch and
+    do not hold. entries: what is kept of this level and of the ways into it (exits.py, defects.py); of levels
+    that differ by their histories alone it is the same.
+    """
+
+    level: Level
+    asymptotic: Asymptotic
+    gap_constants: np.ndarray
+    excitation: Excitation
+    channels: Channels
+    static: LoadedLevel | None = None
+    own_states: tuple[int, ...] | None = None
+    stored: float = 0.0
+    entries: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
+        """``level`` under a static load (m,) in base coordinates."""
+        rest = level.asymptotic(load)
+        magnitudes, initial = level.base.magnitudes
+        gaps = level.base.directions.T @ rest.configuration + level.base.gaps
+        terms = initial + np.abs(rest.configuration) @ magnitudes
+        held = ~np.any(level.gap_rows, axis=1)  # by the closed contacts, of which its gap is the sum
+        gaps = drop_round_off(gaps, np.where(held, FOLLOWING / ZERO, 1.0) * terms)
+        return cls(level, rest, gaps, Excitation.constant(load, len(gaps)), Channels.none(level))
+
+    def under(self, excitation: Excitation) -> LoadedLevel:
+        """This one with the channels of an excitation; the last one is kept for other histories of these channels."""
+        kept: LoadedLevel | None = self.entries.get("under")
+        if kept is None or kept.excitation.shape != excitation.shape:
+            kept = self.entries["under"] = self._under(excitation)
+        return replace(kept, excitation=excitation)
+
+    def _under(self, excitation: Excitation) -> LoadedLevel:
+        channels = Channels.of(self.level, excitation)
+        return LoadedLevel(
+            level=channels.extended(self.level, excitation.stops),
+            asymptotic=self.asymptotic,
+            gap_constants=self.gap_constants,
+            excitation=excitation,
+            channels=channels,
+            static=self,
+            own_states=self.states,
+            stored=_stored(self.level.base, self.states),
+        )
+
+    @property
+    def alone(self) -> LoadedLevel:
+        """The level under its static loads alone."""
+        return self.static or self
+
+    @property
+    def modal(self) -> Level:
+        """The level with its r modes, without channels."""
+        return self.alone.level
+
+    @functools.cached_property
+    def states(self) -> tuple[int, ...]:
+        """The number of every element's state: the level's key."""
+        if self.own_states is not None:
+            return self.own_states
+        closed = set(self.level.indices)
+        return tuple(int(i in closed) for i in range(len(self.gap_constants)))
+
+    @functools.cached_property
+    def driven(self) -> bool:
+        """Whether a static load drives zero-frequency modes."""
+        return bool(np.any(self.asymptotic.drive))
+
+    def split(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """eta (r, ...) and w (q, ...) of xi."""
+        r = self.modal.modes
+        return xi[:r], xi[r:]
+
+    def motion(self, velocity: np.ndarray) -> np.ndarray:
+        """y' (m, ...) of xi', without the quasi-static part: Psi eta' + Y w'."""
+        eta_t, w_t = self.split(velocity)
+        return np.asarray(self.modal.vectors @ eta_t + self.channels.carried @ w_t)
+
+    def kinetic(self, velocity: np.ndarray) -> np.ndarray:
+        """Kinetic energy [J] of (r + q,) or of every column."""
+        moving = self.motion(velocity) if self._carries else self.split(velocity)[0]
+        return np.asarray(0.5 * (moving * moving).sum(axis=0))
+
+    @functools.cached_property
+    def _carries(self) -> bool:
+        """Whether channels move rigid stops, and the structure with them."""
+        return bool(np.any(self.channels.carried))
+
+    def strain(self, displacement: np.ndarray) -> np.ndarray:
+        """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column; given frequencies count."""
+        if "strain" not in self.entries:
+            self.entries["strain"] = self._strain_form()
+        form: StrainForm = self.entries["strain"]
+        return form(displacement)
+
+    def _strain_form(self) -> StrainForm:
+        own, base = self.level, self.level.base
+        index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
+        motion = np.column_stack([own.vectors, self.asymptotic.configuration])
+        bent = np.linalg.qr(base.modes.omega[:, None] * motion, mode="r")
+        gaps = np.column_stack([own.gap_rows[index], self.gap_constants[index]])
+        given = np.flatnonzero(own.squares != own.computed)
+        rows = np.vstack([bent, gaps, np.eye(len(own.squares), motion.shape[1])[given]])
+        weights = [np.ones(len(bent)), base.stiffnesses[index], (own.squares - own.computed)[given]]
+        linear = -(base.preload @ motion)
+        constant = base.energy_offset + self.stored + float(linear[-1])
+        return StrainForm(np.concatenate(weights), rows[:, :-1], rows[:, -1], linear[:-1], constant)
+
+    def potential(self, displacement: np.ndarray) -> float:
+        """Strain energy less the potential f.x of the loads [J] at their present values."""
+        return self.potential_form(displacement)
+
+    @functools.cached_property
+    def potential_form(self) -> PotentialForm:
+        """The same as a form in xi."""
+        own, base, rest = self.level, self.level.base, self.asymptotic
+        y, r, static = rest.configuration, self.modal.modes, self.excitation.static
+        index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
+        springs, rows = base.stiffnesses[index], own.gap_rows[index]
+        shapes, columns, pulled = own.vectors[:, r:], rows[:, r:], self.excitation.patterns.T @ own.vectors
+        form = (base.modes.omega[:, None] ** 2 * shapes).T @ own.vectors + (columns.T * springs) @ rows - pulled
+        form[:, r:] -= pulled[:, r:].T
+        modal = rest.load - self.modal.vectors.T @ static - rest.drive
+        load = base.modes.omega**2 * y - base.preload - static
+        along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
+        constant = rest.strain + self.stored - float(static @ y)
+        return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form)
+
+    def configuration(self, displacement: np.ndarray) -> np.ndarray:
+        """y (m, ...) in base coordinates."""
+        return np.asarray((self.level.vectors @ displacement).T + self.asymptotic.configuration).T
+
+
+def _stored(base: ModalBase, states: Sequence[int]) -> float:
+    """Strain energy [J] of links that keep a stretch in these states without holding."""
+    given = ((element, element.states[state].stretch) for element, state in zip(base.contacts, states, strict=True))
+    return sum(0.5 * element.stiffness * stretch**2 for element, stretch in given if stretch)

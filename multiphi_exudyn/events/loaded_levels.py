@@ -1,0 +1,162 @@
+"""Loaded levels: those of one model under the loads of a run, and the maps between them.
+
+All of it is made when it is asked for, and kept as long as the model's bound allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import State
+from multiphi_exudyn.events.transition import Transition
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+
+__all__ = ["LoadedLevels"]
+
+FURTHER = 8  # of a level: of two steps of a solver, with what is attached at two places
+
+T = TypeVar("T")
+
+
+@dataclass
+class _Known:
+    """What is kept of a level: its ``ends``, maps to other levels by their closed contacts.
+
+    further: what others make of it, by their keys.
+    """
+
+    level: LoadedLevel
+    ends: tuple[int, ...] = ()
+    ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
+    further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(FURTHER))
+
+
+class LoadedLevels:
+    """Levels of ``model`` under an excitation, for motions from ``time`` to ``until`` [s]; drive: at ``time``.
+
+    alone: those under its static loads alone, which outlast a run; these where there are no channels.
+    arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
+    for a step (modal_force.py).
+    """
+
+    def __init__(
+        self,
+        model: MultiPhiModel,
+        excitation: Excitation,
+        time: float = 0.0,
+        until: float = math.inf,
+        alone: LoadedLevels | None = None,
+    ) -> None:
+        self.model = model
+        self.excitation = excitation
+        self.alone = alone or self
+        self.set_out(time, until)
+        self.arrays: Any = None
+        self.held: Any = None
+        self._all = tuple(range(len(model.contacts)))
+        self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "arrays": None, "held": None}
+
+    @classmethod
+    def static(cls, model: MultiPhiModel, load: np.ndarray) -> LoadedLevels:
+        """Levels under a static ``load`` (m,) in base coordinates alone."""
+        return cls(model, Excitation.constant(load, len(model.contacts)))
+
+    def set_out(self, time: float, until: float) -> None:
+        """Take another time and end [s] for the motions that follow."""
+        self.drive, self.until = self.excitation.drive(time), until
+
+    @property
+    def load(self) -> np.ndarray:
+        """The static load (m,)."""
+        return self.excitation.static
+
+    def level(self, closed: Iterable[int]) -> LoadedLevel:
+        """The level with these contacts closed, under the loads."""
+        key = tuple(sorted(closed))
+        self.model.level_at(key)  # of the levels that the model keeps it is now the one used last
+        return self._of(key).level
+
+    def further(self, closed: tuple[int, ...], key: Hashable, make: Callable[[], T]) -> T:
+        """What others make of a level, by a key of theirs that says all it depends on; kept with the level."""
+        made: T = self._of(closed).further.get_or_build(key, make)
+        return made
+
+    def forget(self, closed: tuple[int, ...]) -> None:
+        """Let go of what is kept of a level."""
+        self._known.drop(closed)
+
+    def _of(self, closed: tuple[int, ...]) -> _Known:
+        return self._known.get_or_build(closed, lambda: _Known(self._loaded(closed)))
+
+    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
+        if self.alone is self:
+            return LoadedLevel.of(self.model.level_at(closed), self.load)
+        return self.alone.level(closed).under(self.excitation)
+
+    def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
+        """The level of elements in these states, under the loads and what they push."""
+        level = LoadedLevel.of(self.model.level_at(self.model.links_held(states)), self.load + self.model.push(states))
+        return replace(level, own_states=states).under(self.excitation)
+
+    def with_channels(self, state: State) -> State:
+        """A state under the static loads alone as one of these levels, at the time at which they set out."""
+        w, w_t, _ = self.drive.values
+        xi, xi_t = np.concatenate([state.displacement, w]), np.concatenate([state.velocity, w_t])
+        return State(self.level(state.closed), xi, xi_t, state.phases)
+
+    def _close(self, closed: tuple[int, ...], gone: _Known) -> None:
+        """The ways to a level that is not kept any more."""
+        for _, known in self._known.items():
+            known.ways.pop(closed, None)
+
+    @property
+    def levels_kept(self) -> int:
+        """Number of levels of which something is kept."""
+        return len(self._known)
+
+    @property
+    def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+        """From and to which closed contacts maps between levels are kept."""
+        return [(source, target) for source, known in self._known.items() for target in known.ways]
+
+    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+        """The map between two levels, computed once as long as they are kept."""
+        if self.model.general:  # kept by the arrays of a run alone
+            return Transition(source, target)
+        ways = self._of(source.level.indices).ways
+        if target.level.indices not in ways:
+            ways[target.level.indices] = Transition(source, target)
+        return ways[target.level.indices]
+
+    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
+        """Contacts that can ask first while all are armed: of a force law the ends of its chains."""
+        if not self.model.chains:
+            return self._all
+        known = self._of(closed)
+        if not known.ends:
+            chains, held = self.model.chains, set(closed)
+            linked = {i for chain in chains for i in chain}
+            found = {i for i in self._all if i not in linked}
+            for chain in chains:
+                found.update(_ends(chain, held))
+            known.ends = tuple(sorted(found))
+        return known.ends
+
+
+def _ends(chain: tuple[int, ...], closed: set[int]) -> tuple[int, ...]:
+    """Last closed and first open spring of a chain; the whole chain where its closed springs are not the first ones."""
+    count = sum(i in closed for i in chain)
+    if not all(i in closed for i in chain[:count]):
+        return chain
+    return chain[max(count - 1, 0) : count + 1]

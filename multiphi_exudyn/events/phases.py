@@ -1,0 +1,201 @@
+"""Phases: how every exit of a state stands, by sentences 1, 5, 6 and 8 of the law (decision.py).
+
+An exit is ARMED, RECOVERING, REFUSED or HELD_BACK. s is its signal.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AGAIN,
+    ARMED,
+    ASKED,
+    CHAIN_COUNT,
+    CHAIN_MARKS,
+    CHAINS,
+    CHANNELS,
+    ELEMENT,
+    END_COUNT,
+    ENDS,
+    ENTERED,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FIRMNESS,
+    FIRST_EXITS,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    HELD_BACK,
+    KINDS,
+    LEVEL,
+    MODES,
+    NEED,
+    NEED_ENTERED,
+    NEEDED,
+    NEEDED_FROM,
+    NEEDED_KEY,
+    PHASES,
+    REACHED,
+    RECOVERING,
+    REFUSED,
+    RIGID,
+    ROW,
+    SEARCH_NUMBERS,
+    SEARCH_WAVES,
+    SETTLED,
+    SIGNAL,
+    STATES,
+    WORK_WAVES,
+    WORKED,
+)
+from multiphi_exudyn.events.flow import expand, signal_sizes, signal_waves
+from multiphi_exudyn.events.signals import held_part, rate_sign, row_sign
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.zero_crossing import first_sign
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER
+
+__all__ = [
+    "becomes",
+    "entered_signal",
+    "first_exit",
+    "hold_back",
+    "is_end",
+    "is_refused",
+    "keep_entered",
+    "mark_chains",
+    "phase_of",
+    "update_phases",
+]
+
+
+@compiled
+def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
+    """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
+    signal = exit_ + SIGNAL
+    value = row_sign(ints, numbers, state, signal)
+    if value > 0:
+        return ARMED
+    rate = rate_sign(ints, numbers, state, signal)
+    if rate == 0:
+        rate = becomes(ints, numbers, waves, state, signal, 2)
+    if value == 0 and rate >= 0:
+        return ARMED
+    return RECOVERING if rate > 0 and ints[exit_ + FIRMNESS] == MAY_RECOVER else REFUSED
+
+
+@compiled
+def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, since: int) -> int:
+    """9. Sign of a signal's first derivative, of order ``since`` or higher, that is not round-off."""
+    n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
+    expand(ints, numbers, waves, state)
+    signal_waves(ints, numbers, waves, state, signal, ints[WORK_WAVES])
+    signal_sizes(ints, numbers, waves, state, signal, ints[SEARCH_NUMBERS])
+    constant = numbers[ints[signal + ROW] + 2 * n] + held_part(ints, numbers, state, signal)
+    basis = ints[FLOW_BASIS]
+    return first_sign(
+        ints, numbers, waves, basis, ints[WORK_WAVES], constant, ints[SEARCH_NUMBERS], since,
+        ints[SEARCH_NUMBERS] + ints[FLOW_COUNT], ints[SEARCH_WAVES],
+    )  # fmt: skip
+
+
+@compiled
+def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refused: int) -> None:
+    """6, 8. The phase in which every exit of a state stands; refused: flags of those that asked in vain, -1 for none.
+
+    While all springs of a law's chains are armed only the ends of the chains can ask, and only they are looked at.
+    """
+    level, phases = ints[state + LEVEL], ints[state + PHASES]
+    count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
+    for k in range(count):
+        ints[phases + k] = ARMED
+    for e in range(ints[level + END_COUNT]):
+        k = ints[ints[level + ENDS] + e]
+        ints[phases + k] = phase_of(ints, numbers, waves, state, exits + k * EXIT_INTS)
+        if ints[phases + k] != ARMED:
+            settled = 0
+    if settled == 0 and ints[CHAIN_COUNT] > 0:
+        mark_chains(ints, state)
+        for k in range(count):
+            chain = ints[ints[CHAINS] + ints[exits + k * EXIT_INTS + ELEMENT]]
+            if chain >= 0 and ints[ints[CHAIN_MARKS] + chain] == 1 and is_end(ints, level, k) == 0:
+                ints[phases + k] = phase_of(ints, numbers, waves, state, exits + k * EXIT_INTS)
+    if refused >= 0:
+        for k in range(count):
+            if ints[refused + ints[exits + k * EXIT_INTS + ELEMENT]] == 1 and ints[phases + k] != ARMED:
+                ints[phases + k] = REFUSED
+    ints[state + SETTLED] = settled
+
+
+@compiled
+def mark_chains(ints: Ints, state: int) -> None:
+    """8. Flags (chains,) of the chains with an exit that is not armed."""
+    exits, phases = ints[ints[state + LEVEL] + EXITS], ints[state + PHASES]
+    for chain in range(ints[CHAIN_COUNT]):
+        ints[ints[CHAIN_MARKS] + chain] = 0
+    for k in range(ints[ints[state + LEVEL] + EXIT_COUNT]):
+        chain = ints[ints[CHAINS] + ints[exits + k * EXIT_INTS + ELEMENT]]
+        if chain >= 0 and ints[phases + k] != ARMED:
+            ints[ints[CHAIN_MARKS] + chain] = 1
+
+
+@compiled
+def is_end(ints: Ints, level: int, exit_number: int) -> int:
+    """1 where an exit is among those that are always looked at."""
+    for e in range(ints[level + END_COUNT]):
+        if ints[ints[level + ENDS] + e] == exit_number:
+            return 1
+    return 0
+
+
+@compiled
+def is_refused(ints: Ints, state: int, element: int) -> int:
+    """1 where an exit of an element is refused."""
+    first = ints[ints[state + LEVEL] + FIRST_EXITS] + element
+    for k in range(ints[first], ints[first + 1]):
+        if ints[ints[state + PHASES] + k] == REFUSED:
+            return 1
+    return 0
+
+
+@compiled
+def hold_back(ints: Ints, state: int) -> None:
+    """6. Those that were refused at this instant before, and are once more, wait until s has risen to zero."""
+    level = ints[state + LEVEL]
+    for k in range(ints[level + EXIT_COUNT]):
+        element = ints[ints[level + EXITS] + k * EXIT_INTS + ELEMENT]
+        if ints[ints[AGAIN] + element] == 1 and ints[ints[state + PHASES] + k] == REFUSED:
+            ints[ints[state + PHASES] + k] = HELD_BACK
+            ints[state + SETTLED] = 0
+
+
+@compiled
+def keep_entered(ints: Ints, numbers: Numbers) -> None:
+    """An exit that is always taken is armed where it leads back to where the instant began, and its signal is zero.
+
+    The signal that brought the element here was zero too: what either says beyond that is round-off. A rigid contact
+    that is left without reaction opens nevertheless.
+    """
+    level, before = ints[WORKED + LEVEL], ints[ints[REACHED + LEVEL] + STATES]
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
+        back = ints[exit_ + FIRMNESS] == ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
+        back = back and ints[phase] == REFUSED and ints[ints[KINDS] + element] != RIGID
+        if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL) == 0:
+            ints[phase] = ARMED
+
+
+@compiled
+def first_exit(ints: Ints, level: int, element: int) -> int:
+    """The first exit of an element in a level."""
+    return ints[level + EXITS] + ints[ints[level + FIRST_EXITS] + element] * EXIT_INTS
+
+
+@compiled
+def entered_signal(ints: Ints, level: int, exit_: int) -> int:
+    """The signal that an exit's element would have in the level entered alone; or NEED."""
+    if ints[exit_ + ENTERED] < 0:
+        ints[NEEDED] = NEED_ENTERED
+        ints[NEEDED_FROM] = level
+        ints[ints[NEEDED_KEY]] = (exit_ - ints[level + EXITS]) // EXIT_INTS
+        return NEED
+    return ints[exit_ + ENTERED]

@@ -1,0 +1,94 @@
+"""Signals of a state, and gaps: s = row . (xi, xi', 1), and its sign.
+
+A sum is judged by the sizes of its own terms (round_off.py), to which the scales of the state belong (state_arrays.py).
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    CHANNELS,
+    GAPS,
+    LEVEL,
+    MODES,
+    PLACE,
+    PRESCRIBED,
+    RATED,
+    REACH,
+    ROW,
+    SPEED,
+    SWING,
+)
+from multiphi_exudyn.events.state_arrays import accelerate
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = ["gap", "held_part", "rate_sign", "row_sign", "sign_of"]
+
+
+@compiled
+def sign_of(value: float, size: float) -> int:
+    """Sign of a sum, zero where it is round-off of its terms, which add up to ``size`` without their signs."""
+    if abs(value) <= ZERO * size:
+        return 0
+    return 1 if value > 0.0 else -1
+
+
+@compiled
+def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
+    """9. Sign of a signal, zero where it is round-off of its terms.
+
+    At the root of a signal all displacements, or velocities, may be round-off of what they were before: |eta'| / omega
+    and omega |eta| count too.
+    """
+    n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
+    x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
+    value = numbers[row + 2 * n]
+    size = abs(value)
+    for i in range(n):
+        term = numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i]
+        value += term
+        size += abs(term) + abs(numbers[row + i]) * numbers[reach + i] + abs(numbers[row + n + i]) * numbers[swing + i]
+    return sign_of(value, size)
+
+
+@compiled
+def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
+    """9. Sign of a signal's time derivative, zero where it is round-off of its terms.
+
+    At a turning point all velocities may be round-off of what they were before: omega |eta| counts too.
+    """
+    n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
+    v, swing, accelerations = ints[state + SPEED], ints[state + SWING], ints[ACCELERATION]
+    if ints[signal + RATED] == 1:
+        accelerate(ints, numbers, state, accelerations)
+    value, size = 0.0, 0.0
+    for i in range(n):
+        term = numbers[row + i] * numbers[v + i]
+        if ints[signal + RATED] == 1:
+            term += numbers[row + n + i] * numbers[accelerations + i]
+        value += term
+        size += abs(term) + abs(numbers[row + i]) * numbers[swing + i]
+    return sign_of(value, size)
+
+
+@compiled
+def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
+    """What the held channels of a state add to a signal, until the next transition."""
+    held = ints[CHANNELS] - ints[PRESCRIBED]
+    first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
+    for k in range(first, first + held):
+        total += numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k]
+    return total
+
+
+@compiled
+def gap(ints: Ints, numbers: Numbers, state: int, element: int) -> float:
+    """Gap of a contact [m]."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    n = ints[level + MODES] + ints[CHANNELS]
+    row = ints[level + GAPS] + element * (n + 1)
+    value = numbers[row + n]
+    for i in range(n):
+        value += numbers[row + i] * numbers[x + i]
+    return value

@@ -1,0 +1,160 @@
+"""Start of a run in flat arrays: from displacement and velocity in all modes of the base to the first state of a level.
+
+The base stands among the levels as one with xi = (y, w), in which all contacts are open. Its key (c,) has the contacts
+that touch or lie inside their stop at the start as closed: the rigid ones touch, the compliant ones penetrate.
+
+    v = y' + H p,   p = argmin |v|,  p >= 0,   of the rigid contacts that touch          (impact.py, in all modes)
+    eta = Psi^T (y - y_inf - R w),   eta' = Psi^T (v - Y w')                             (eq. 38.6)
+
+What stays closed of those that touch is decided as at any impact; what is lost is an impact and truncation like any.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AFTER,
+    AGAIN,
+    ARMED,
+    ASKING,
+    CHANGE_COUNT,
+    CHANNELS,
+    CLOSE,
+    COMPLIANT_KEY,
+    COORDINATES,
+    ELEMENTS,
+    EXIT_COUNT,
+    FAILED,
+    FIRST_CHANGE,
+    FREED,
+    GIVEN,
+    IMPULSES,
+    KINDS,
+    LEVEL,
+    LOSSES,
+    LOST,
+    LOST_AT_START,
+    MAP_SIZES,
+    MODES,
+    OK,
+    OPEN,
+    PHASES,
+    PLACE,
+    REACHED,
+    RIGID,
+    SETTLED,
+    SLOWED,
+    STATES,
+    STIFFNESSES,
+    STRAIN,
+    STRIKING,
+    TOUCHING,
+    TRANSITIONS_NOW,
+    WORKED,
+)
+from multiphi_exudyn.events.changes import NOBODY, clear
+from multiphi_exudyn.events.decision import decide
+from multiphi_exudyn.events.energies import lose
+from multiphi_exudyn.events.impact import collide
+from multiphi_exudyn.events.maps import find_level, find_map, move
+from multiphi_exudyn.events.signals import gap
+from multiphi_exudyn.events.state_arrays import copy_state, measure
+from multiphi_exudyn.events.striking import impact, list_changes
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = ["begin"]
+
+
+@compiled
+def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """WORKED becomes the state right after the start from GIVEN; OK, NEED or FAILED.
+
+    REACHED: the state before anybody was heard. Energies lost are added up in LOST, changes listed.
+    """
+    states, count, strikes = ints[ints[GIVEN + LEVEL] + STATES], 0, 0
+    measure(ints, numbers, GIVEN)
+    for i in range(ints[ELEMENTS]):
+        rigid = ints[ints[KINDS] + i] == RIGID
+        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
+        ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
+        ints[ints[FREED] + i] = 0
+        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[AGAIN] + i] = 0
+        count += ints[ints[STRIKING] + i]
+    level = find_level(ints, ints[COMPLIANT_KEY])
+    if level < 0:
+        return level
+    ints[CHANGE_COUNT] = 0
+    clear(numbers, LOST_AT_START)
+    copy_state(ints, numbers, GIVEN, SLOWED)
+    if count > 0:
+        strikes = strike(ints, numbers, waves, level, count)
+        level = ints[AFTER + LEVEL]
+    status = enter_given(ints, numbers, SLOWED, level, REACHED) if strikes >= 0 else strikes
+    if status < 0:
+        return status
+    ints[FIRST_CHANGE] = ints[CHANGE_COUNT]
+    status = decide(ints, numbers, waves)
+    ints[FIRST_CHANGE] = 0
+    if status < 0:
+        return status
+    ints[TRANSITIONS_NOW] += strikes
+    lose(ints, numbers, SLOWED, REACHED, 0.0, LOST)
+    numbers[LOST + STRAIN] += springs(ints, numbers, GIVEN)
+    for k in range(LOSSES):
+        numbers[LOST + k] += numbers[LOST_AT_START + k]
+    return OK
+
+
+@compiled
+def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -> int:
+    """Those that touch are struck by the given velocity: SLOWED, in all modes; who stays closed: the level of AFTER.
+
+    level: in which all of them are open. 1 where that makes a transition, 0 where not; NEED or FAILED.
+    """
+    status = enter_given(ints, numbers, GIVEN, level, WORKED)
+    if status >= 0:
+        status = impact(ints, numbers, waves)
+    if status < 0:
+        return status
+    strikes = 1 if ints[CHANGE_COUNT] > 0 else 0
+    ints[CHANGE_COUNT] = 0
+    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
+        return FAILED
+    list_changes(ints, numbers, count)
+    return strikes
+
+
+@compiled
+def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: int) -> int:
+    """The displacement of GIVEN and the velocity of ``speeds`` as a state of a level, all armed; OK or NEED.
+
+    Where a level is at its own rest there is no round-off of its place.
+    """
+    status = move(ints, numbers, GIVEN, speeds, level, result)
+    if status < 0:
+        return status
+    x, y, q = ints[result + PLACE], ints[GIVEN + PLACE], ints[CHANNELS]
+    sizes = ints[find_map(ints, ints[GIVEN + LEVEL], level) + MAP_SIZES]
+    size = norm(numbers, y, ints[COORDINATES]) + numbers[sizes + q]
+    for k in range(q):
+        size += numbers[sizes + k] * abs(numbers[y + ints[COORDINATES] + k])
+    for i in range(ints[level + MODES]):
+        if abs(numbers[x + i]) <= ZERO * size:
+            numbers[x + i] = 0.0
+    for i in range(ints[level + EXIT_COUNT]):
+        ints[ints[result + PHASES] + i] = ARMED
+    ints[result + SETTLED] = 1
+    return OK
+
+
+@compiled
+def springs(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level."""
+    states, total = ints[ints[state + LEVEL] + STATES], 0.0
+    for i in range(ints[ELEMENTS]):
+        if ints[states + i] == CLOSE:
+            depth = gap(ints, numbers, state, i)
+            total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
+    return total

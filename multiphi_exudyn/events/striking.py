@@ -1,0 +1,164 @@
+"""Rigid contacts that ask to close are decided together, by sentence 2 of the law (decision.py)."""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AFTER,
+    CHANGE_COUNT,
+    CLOSE,
+    CLOSED,
+    COMPLIANT_KEY,
+    DENIED,
+    ELEMENTS,
+    ENTERED_STATE,
+    FURTHER,
+    HELD,
+    IMPULSES,
+    KEY,
+    KINDS,
+    LEVEL,
+    LOSSES,
+    LOST_IN_IMPACT,
+    LOST_NOW,
+    LOST_STILLED,
+    NEED,
+    OK,
+    OPEN,
+    PUSHED,
+    RELEASED,
+    RIGID,
+    SHARED,
+    STATES,
+    STILL,
+    STRIKING,
+    STRUCK,
+    TOUCHING,
+    WORKED,
+)
+from multiphi_exudyn.events.changes import NOBODY, clear, enter, is_held, note, transfer
+from multiphi_exudyn.events.energies import kinetic, lose
+from multiphi_exudyn.events.impact import collide
+from multiphi_exudyn.events.independence import join
+from multiphi_exudyn.events.maps import find_level
+from multiphi_exudyn.events.phases import update_phases
+from multiphi_exudyn.events.resting import press, reaction_sign, same_speed, stay_closed
+from multiphi_exudyn.events.state_arrays import copy_state
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+
+__all__ = ["close_without_impact", "impact", "list_changes"]
+
+
+@compiled
+def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """2. Rigid contacts strike: velocities, then which of all that touch stay closed, then their level: AFTER.
+
+    STRIKING: who strikes. COMPLIANT_KEY: the level in which all that touch are open. One of FREED stays closed only
+    with a reaction that is more than round-off of zero, and not in the level and at the speed at which it fell to zero.
+    Changes and losses (LOST_NOW) are of the whole impact. OK, NEED or FAILED.
+    """
+    c, touching, count = ints[ELEMENTS], ints[TOUCHING], 0
+    for i in range(c):
+        if ints[ints[STRIKING] + i] == 1 or is_held(ints, WORKED, i) == 1:
+            ints[touching + count] = i
+            count += 1
+    status = transfer(ints, numbers, WORKED, ints[COMPLIANT_KEY], RELEASED)
+    if status < 0:
+        return status
+    clear(numbers, LOST_IN_IMPACT)
+    status = collide(ints, numbers, RELEASED, touching, count, 0, STRUCK, ints[IMPULSES], LOST_IN_IMPACT)
+    if status < 0:
+        return status
+    same = same_speed(ints, numbers, RELEASED, STRUCK)
+    if same == 1:
+        for k in range(count):
+            numbers[ints[IMPULSES] + k] = 0.0  # round-off of them: nothing was struck
+    closed = press(ints, numbers, waves, count)
+    if closed < 0:
+        return closed
+    copy_state(ints, numbers, STRUCK, AFTER)
+    while closed > 0:
+        pulled = stay_closed(ints, numbers, count, same)
+        if pulled < 0:
+            return pulled
+        if pulled == 0:
+            clear(numbers, LOST_NOW)
+            collided = kinetic(ints, numbers, RELEASED) - kinetic(ints, numbers, STILL)
+            lose(ints, numbers, WORKED, AFTER, collided, LOST_NOW)
+            for k in range(LOSSES):
+                numbers[LOST_NOW + k] += numbers[LOST_STILLED + k]
+            for k in range(count):
+                numbers[ints[IMPULSES] + k] += numbers[ints[FURTHER] + k]
+            break
+        closed -= pulled
+        copy_state(ints, numbers, STRUCK, AFTER)
+    for k in range(LOSSES):
+        numbers[LOST_NOW + k] += numbers[LOST_IN_IMPACT + k]
+    list_changes(ints, numbers, count)
+    return OK
+
+
+@compiled
+def close_without_impact(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
+    """2. Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
+    c, states, closing, key = ints[ELEMENTS], ints[ints[WORKED + LEVEL] + STATES], ints[CLOSED], ints[KEY]
+    for i in range(c):
+        ints[ints[HELD] + i] = is_held(ints, WORKED, i)
+        ints[closing + i] = 1 if ints[ints[STRIKING] + i] == 1 and ints[asking + i] != NOBODY else 0
+        ints[ints[DENIED] + i] = ints[closing + i]
+    join(ints, numbers, closing)
+    willing = 0
+    for i in range(c):
+        if ints[closing + i] == 0:
+            continue
+        for k in range(c):
+            ints[key + k] = CLOSE if k == i else ints[states + k]
+        level = find_level(ints, key)
+        if level < 0:
+            return level
+        sign = reaction_sign(ints, numbers, WORKED, WORKED, level, i)
+        if sign <= NEED:
+            return sign
+        ints[closing + i] = 1 if sign >= 0 else 0
+        willing += ints[closing + i]
+    if willing == 0:
+        update_phases(ints, numbers, waves, WORKED, ints[DENIED])
+        return OK
+    for i in range(c):
+        ints[key + i] = CLOSE if ints[closing + i] == 1 else ints[states + i]
+    status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+    if status < 0:
+        return status
+    for i in range(c):
+        if ints[closing + i] == 1:
+            note(ints, numbers, i, CLOSE, 0.0)
+    enter(ints, numbers, waves, ENTERED_STATE)
+    return OK
+
+
+@compiled
+def list_changes(ints: Ints, numbers: Numbers, count: int) -> None:
+    """All changes of an impact; who strikes and does not stay closed has closed and opened at one instant."""
+    c, pushed, striking, first = ints[ELEMENTS], ints[PUSHED], ints[STRIKING], ints[CHANGE_COUNT]
+    before, after = ints[ints[WORKED + LEVEL] + STATES], ints[ints[AFTER + LEVEL] + STATES]
+    for i in range(c):
+        numbers[pushed + i] = 0.0
+    for k in range(count):
+        numbers[pushed + ints[ints[TOUCHING] + k]] = numbers[ints[IMPULSES] + k]
+    for i in range(c):
+        stays = ints[before + i] == CLOSE and ints[after + i] == CLOSE
+        if stays and numbers[pushed + i] > 0.0:
+            note(ints, numbers, i, SHARED, numbers[pushed + i])
+    unchanged = ints[CHANGE_COUNT]
+    for i in range(c):
+        if ints[striking + i] == 1 and (ints[after + i] == CLOSE or numbers[pushed + i] > 0.0):
+            note(ints, numbers, i, CLOSE, numbers[pushed + i])
+    for i in range(c):
+        if ints[ints[KINDS] + i] != RIGID and ints[after + i] != ints[before + i] and ints[after + i] != OPEN:
+            note(ints, numbers, i, ints[after + i], 0.0)
+    for i in range(c):
+        if ints[striking + i] == 1 and ints[after + i] == OPEN and numbers[pushed + i] > 0.0:
+            note(ints, numbers, i, OPEN, 0.0)
+        if ints[before + i] != OPEN and ints[after + i] == OPEN:
+            note(ints, numbers, i, OPEN, numbers[pushed + i])
+    if ints[CHANGE_COUNT] == unchanged:
+        ints[CHANGE_COUNT] = first

@@ -1,0 +1,176 @@
+"""Waiting: for which signals a motion waits, and who asks when they fall, by sentences 1, 5, 6 and 8 of the law.
+
+The first descent of a signal, of its opposite or of its rate through zero (zero_crossing.py) makes an exit ask, or
+arms it.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    AGAIN,
+    ARMED,
+    ASKED,
+    ASKING,
+    CHAIN_COUNT,
+    CHAIN_MARKS,
+    CHAINS,
+    CHANNELS,
+    CONSTANTS,
+    CURRENT,
+    ELEMENT,
+    ELEMENTS,
+    END_COUNT,
+    ENDS,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FALLEN,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    LEVEL,
+    MODES,
+    NOISES,
+    PHASES,
+    PLACE,
+    REACH,
+    REACHED,
+    RECOVERING,
+    REFUSED,
+    ROW,
+    SETTLED,
+    SIGNAL,
+    SIGNALS,
+    SPEED,
+    SWING,
+    WAITING,
+    WORK_WAVES,
+)
+from multiphi_exudyn.events.changes import NOBODY
+from multiphi_exudyn.events.flow import signal_waves
+from multiphi_exudyn.events.phases import entered_signal, is_end, mark_chains
+from multiphi_exudyn.events.signals import held_part
+from multiphi_exudyn.events.state_arrays import accelerate
+from multiphi_exudyn.mathematics.basis_arrays import differentiate
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.round_off import CLEAR
+from multiphi_exudyn.mathematics.zero_crossing import simultaneous
+
+__all__ = ["arm", "flag_again", "watch", "who_asks"]
+
+
+@compiled
+def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """1, 5, 6, 8. Signals whose first descent is next, of the flow from CURRENT; how many, or NEED.
+
+    Of each the exit, and whether that then asks or is armed, in WAITING. The phases are those of REACHED.
+    """
+    level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
+    if ints[REACHED + SETTLED] == 1:
+        for e in range(ints[level + END_COUNT]):
+            count = wait_for(ints, numbers, waves, count, ints[ints[level + ENDS] + e], 0, 1.0, 0, 1)
+        return count
+    if ints[CHAIN_COUNT] > 0:
+        mark_chains(ints, REACHED)
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        chain = ints[ints[CHAINS] + ints[exit_ + ELEMENT]]
+        if is_end(ints, level, k) == 0 and (chain < 0 or ints[ints[CHAIN_MARKS] + chain] == 0):
+            continue
+        phase = ints[phases + k]
+        if phase == ARMED:
+            count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
+            continue
+        count = wait_for(ints, numbers, waves, count, k, 0, -1.0, 0, 0)
+        if phase == RECOVERING:
+            count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 1, 1)
+        if phase == REFUSED:
+            signal = entered_signal(ints, level, exit_)
+            if signal < 0:
+                return signal
+            count = wait_for(ints, numbers, waves, count, k, signal, -1.0, 0, 1)
+    return count
+
+
+@compiled
+def wait_for(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    count: int,
+    exit_number: int,
+    entered: int,
+    sign: float,
+    rate: int,
+    asks: int,
+) -> int:
+    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1."""
+    level = ints[CURRENT + LEVEL]
+    signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
+    n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
+    x, v, scale = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH]
+    first = ints[SIGNALS] + count * p
+    signal_waves(ints, numbers, waves, CURRENT, signal, first)
+    constant, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
+    constant = sign * (constant + held_part(ints, numbers, CURRENT, signal))
+    if rate == 1:
+        differentiate(ints, numbers, waves, ints[FLOW_BASIS], first, first)
+        accelerate(ints, numbers, CURRENT, ints[ACCELERATION])
+        x, v, scale = ints[CURRENT + SPEED], ints[ACCELERATION], ints[CURRENT + SWING]
+        constant, size = 0.0, 0.0
+    for i in range(n):
+        size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
+        size += abs(numbers[row + n + i]) * abs(numbers[v + i])
+    if sign < 0.0:
+        for j in range(p):
+            waves[first + j] = -waves[first + j]
+    numbers[ints[CONSTANTS] + count] = constant
+    numbers[ints[NOISES] + count] = CLEAR * size
+    ints[ints[WAITING] + 2 * count] = exit_number
+    ints[ints[WAITING] + 2 * count + 1] = asks
+    return count + 1
+
+
+@compiled
+def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
+    """1, 8. ASKING: of the elements whose signals fall at an instant those that then ask; how many."""
+    level, flags, waiting, asking = ints[CURRENT + LEVEL], ints[FALLEN], ints[WAITING], 0
+    for i in range(ints[ELEMENTS]):
+        ints[ints[ASKING] + i] = NOBODY
+    if ints[level + EXIT_COUNT] > 1:
+        simultaneous(
+            ints, numbers, waves, ints[FLOW_BASIS], ints[SIGNALS], ints[CONSTANTS], count, found, reached,
+            ints[WORK_WAVES], flags,
+        )  # fmt: skip
+    else:  # one contact's signals exclude each other
+        for s in range(count):
+            ints[flags + s] = 1 if s == found else 0
+    for s in range(count):
+        if ints[flags + s] == 1 and ints[waiting + 2 * s + 1] == 1:
+            exit_ = ints[level + EXITS] + ints[waiting + 2 * s] * EXIT_INTS
+            ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
+            asking += 1
+    return asking
+
+
+@compiled
+def arm(ints: Ints, exit_number: int) -> None:
+    """An exit of the state REACHED is armed."""
+    phases, settled = ints[REACHED + PHASES], 1
+    ints[phases + exit_number] = ARMED
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        if ints[phases + k] != ARMED:
+            settled = 0
+    ints[REACHED + SETTLED] = settled
+
+
+@compiled
+def flag_again(ints: Ints, at_once: int) -> None:
+    """6. AGAIN: who asks at the instant at which it was refused before."""
+    phases, exits = ints[REACHED + PHASES], ints[ints[REACHED + LEVEL] + EXITS]
+    for i in range(ints[ELEMENTS]):
+        ints[ints[AGAIN] + i] = 0
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        element = ints[exits + k * EXIT_INTS + ELEMENT]
+        if at_once == 1 and ints[ints[ASKING] + element] != NOBODY and ints[phases + k] == REFUSED:
+            ints[ints[AGAIN] + element] = 1

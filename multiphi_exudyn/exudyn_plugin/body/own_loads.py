@@ -1,0 +1,129 @@
+"""Own loads of a body: what of them varies in time, in one run, as modal forces and as channels (excitation.py).
+
+    p = P w(t) + Q w'(t)
+
+Without loads that vary there are no channels, and p is zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.exits import signal_rows
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import Phase, State
+from multiphi_exudyn.exudyn_plugin.body.certified_step import (
+    Conditions,
+    driven_conditions,
+    jump_times,
+    plain_conditions,
+)
+from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.simulate import levels_of
+
+__all__ = ["OwnLoads"]
+
+FINER = 10.0  # smooth courses of loads are taken to a tenth of their tolerance
+CHUNK = 256  # steps whose channels are evaluated at once
+
+
+class OwnLoads:
+    """Loads on a body of ``size`` coordinates from a time until ``end`` [s].
+
+    loaded: the levels under all of them. levels: those under the static ones.
+    """
+
+    def __init__(self, model: MultiPhiModel, loads: Sequence[Load], size: int, time: float, end: float) -> None:
+        self.excitation = Excitation.of(model, loads, end, FINER)
+        self.loaded = levels_of(model, self.excitation, time, end)
+        self.varies = self.excitation.channels > 0
+        self.levels = self.loaded.alone
+        self._size = size
+        self._jumps = jump_times(self.excitation) if self.varies else np.zeros(0)
+        self._step = self._begun = math.nan
+        self._values = np.zeros((0, 2, self.excitation.channels))
+
+    def take_step(self, step: float) -> None:
+        """Steps are of this length [s] from now on."""
+        self._step = step
+
+    def forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) at times (k,) [s], in a level."""
+        return self._forces(closed, self.excitation.values(times))
+
+    def force_at(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+        """The same (s,) at the end of a step."""
+        return self._forces(closed, self._channels(time)[None])[0] if self.varies else np.zeros(self._size)
+
+    def channels_at(self, time: float) -> np.ndarray:
+        """w, w' (2 q,) at the end of a step, of which many are evaluated at once."""
+        return self._channels(time).ravel() if self.varies else np.zeros(0)
+
+    def jump(self, begun: float, end: float, rounding: float) -> bool:
+        """Whether a load jumps in a step, its ends included: their times are rounded, in a force as in the solver."""
+        first = int(np.searchsorted(self._jumps, begun - rounding))
+        return first < len(self._jumps) and bool(self._jumps[first] <= end + rounding)
+
+    def shown(
+        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, time: np.ndarray
+    ) -> tuple[LoadedLevel, np.ndarray, np.ndarray]:
+        """Level and coordinates xi, xi' (r + q, k) in which configurations and forces at times (k,) are read."""
+        w, w_t = self.excitation.values(time).transpose(1, 2, 0)
+        return self.loaded.level(stepped.closed), np.vstack([eta, w]), np.vstack([eta_t, w_t])
+
+    def stepped(self, closed: tuple[int, ...], step: float | None) -> SteppedLevel:
+        """The level under the static loads as a solver takes it; step [s]: to which it is matched, or None."""
+        levels = self.levels
+        return levels.further(
+            closed, ("stepped", step), lambda: SteppedLevel.of(levels.level(closed), self._size, step)
+        )
+
+    def conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
+        """What a step has to meet to be clear in a level; direct: L (k, m) of its closed contacts."""
+        key = "conditions", stepped.step, step, direct.shape, direct.tobytes()
+        return self.loaded.further(stepped.closed, key, lambda: self._conditions(stepped, step, direct))
+
+    def _conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
+        closed, level = stepped.closed, self.loaded.level(stepped.closed)
+        ends = self.loaded.ends(closed)
+        rows = [row for contact, row in enumerate(signal_rows(level)) if contact in ends]
+        if self.varies:
+            return driven_conditions(stepped, level, rows, step)
+        carried = np.zeros((len(rows), direct.shape[1]))
+        for k, contact in enumerate(ends):
+            if contact in closed:
+                carried[k] = direct[closed.index(contact)]
+        return plain_conditions(stepped, rows, step, carried)
+
+    def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:
+        """Phases of a state that was entered with others: who has risen since is armed again."""
+        level, xi, xi_t, reach = self.loaded.level(state.closed), state.displacement, state.velocity, state.reach
+        drive = self.excitation.drive(time)
+        xi, xi_t = np.concatenate([xi, drive.values[0]]), np.concatenate([xi_t, drive.values[1]])
+        reach = np.concatenate([reach, drive.sizes[0]])
+        signs = (row.sign(xi, xi_t, reach) for row in signal_rows(level))
+        return tuple(Phase.ARMED if sign > 0 else phase for sign, phase in zip(signs, state.phases, strict=True))
+
+    def _forces(self, closed: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+        """Modal forces (k, s) of w, w' (k, 2, q) in a level."""
+        level, forces = self.loaded.level(closed), np.zeros((len(values), self._size))
+        channels = level.channels
+        forces[:, : level.modal.modes] = values[:, 0] @ channels.force.T + values[:, 1] @ channels.force_rate.T
+        return forces
+
+    def _channels(self, t: float) -> np.ndarray:
+        """(2, q) at a time."""
+        place = (t - self._begun) / self._step
+        index = round(place) if math.isfinite(place) else -1
+        if not (0 <= index < len(self._values) and abs(place - index) <= 1e-9 * max(1.0, t / self._step)):
+            if not math.isfinite(self._step):
+                return np.asarray(self.excitation.values(np.array([t]))[0])
+            self._begun, index = t, 0
+            self._values = self.excitation.values(t + self._step * np.arange(CHUNK))
+        return np.asarray(self._values[index])

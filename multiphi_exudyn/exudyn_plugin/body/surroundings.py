@@ -1,0 +1,167 @@
+"""Surroundings: what the system does to a body at an event in a step, and what the event does to the system.
+
+    (p, f) right after an event = those held before it + what changes in the system between the states before and after
+
+p (s,) acts on the coordinates of the body, f (m,) on its points. Where only connectors and loads act there, they are
+read off the system's forces. Where masses or constraints hang on the points, the accelerations of the whole system are
+solved for, and reactions of rigid contacts are followed by forces on the points (attached_inertia.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from multiphi_exudyn.events.state import State
+from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
+from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import PointInertia, Reactions
+from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import Hanging, SystemMatrices
+
+__all__ = ["BodyAmongOthers", "Instant", "Surroundings", "surroundings_of"]
+
+
+class BodyAmongOthers(Protocol):
+    """What is needed of a body."""
+
+    coordinates: Coordinates
+
+    def stepped_level(self, closed: tuple[int, ...]) -> SteppedLevel:
+        """The level of closed contacts as the solver has it."""
+
+    def own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+        """(p, f) of its own varying loads at a time [s], in a level."""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Of the first event in a step of length ``step`` that ends at ``end``: its time [s], eta and eta' (r,) right
+    before, the state right after."""
+
+    time: float
+    end: float
+    step: float
+    before: tuple[np.ndarray, np.ndarray]
+    after: State
+
+    @property
+    def elapsed(self) -> float:
+        """Time [s] from the event to the end of the step."""
+        return self.end - self.time
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The system around a body at the end of a step, as it is without an event in it.
+
+    unmoved: q, v (2, n). hanging: what hangs on the points; inertia: the same for the body's levels, None where nothing
+    hangs there. reactions: forces that follow those of rigid contacts. All None without an interface.
+    """
+
+    body: BodyAmongOthers
+    system: SystemMatrices | None
+    unmoved: np.ndarray
+    hanging: Hanging | None
+    inertia: PointInertia | None
+    reactions: Reactions | None
+
+    def told(self, force: np.ndarray, given: SteppedLevel, closed: tuple[int, ...]) -> np.ndarray:
+        """(p, f) of one level in another, with the forces that follow from other reactions of rigid contacts."""
+        here, wanted = self.body.coordinates, self.body.stepped_level(closed)
+        carried = here.carried(force, given, wanted)
+        if self.reactions is None or here.interface is None:
+            return carried
+        change = self.reactions.at(closed) - self.reactions.at(given.closed)
+        return carried + np.concatenate([change @ here.interface.of(wanted).rows, change])
+
+    def changed_by(self, mbs: Any, instant: Instant, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(p, f) right after an event, from ``force`` before it, and what it changes in the system.
+
+        That is of accelerations (n,) where something hangs on the points, else of forces (n,).
+        """
+        body, here, after = self.body, self.body.coordinates, instant.after
+        own, entered = here.stepped, body.stepped_level(after.closed)
+        given, there = body.own_force(own.closed, instant.end), body.own_force(after.closed, instant.end)
+        here.write(own, own.state(*instant.before, (force + given)[: own.size]))
+        shown = entered.state(
+            after.displacement, after.velocity, (self.told(force, own, after.closed) + there)[: own.size]
+        )
+        if self.inertia is None or self.system is None or self.hanging is None:
+            felt = here.felt(mbs, own)
+            here.write(entered, shown)
+            changed = here.felt(mbs, entered)
+        else:
+            left, felt = self.system.present(), here.seen(self.system.accelerations(instant.step))
+            if entered.closed != own.closed:
+                here.enter(mbs, entered, entered.drive)
+            here.write(entered, shown)
+            self.system.follow(self.hanging, left)
+            changed = here.seen(self.system.accelerations(instant.step))
+        return changed.acting + here.carried(force - felt.acting, own, entered), changed.whole - felt.whole
+
+    def at_event(self, instant: Instant) -> Surroundings:
+        """The same with what hung on the points at the event: joints may have turned since."""
+        here = self.body.coordinates
+        if self.system is None or self.inertia is None or not here.rigid:
+            return self
+        hanging = self.system.hanging(self.unmoved, here.stepped.mass, instant.elapsed)
+        return replace(self, hanging=hanging, inertia=_inertia(self.body, hanging))
+
+    def settled(self, mbs: Any, instant: Instant, change: np.ndarray) -> np.ndarray:
+        """(p, f) at the end of the step, where all has followed the body since the event; change: what it changed."""
+        here, system = self.body.coordinates, self.system
+        assert system is not None
+        assert self.hanging is not None
+        if self.inertia is None:
+            system.spread(self.hanging, instant.step, instant.elapsed, change)
+            felt = here.felt(mbs, here.stepped)
+            here.put_forces(felt.acting[here.stepped.size :])
+            return felt.acting
+        q, v = self.unmoved
+        system.follow(self.hanging, np.array([q, v + instant.elapsed * change]))
+        return here.seen(system.accelerations(instant.step)).acting
+
+    def kinetic(self, state: State) -> float:
+        """Kinetic energy [J] of the body and of what its points carry."""
+        if self.hanging is None or self.inertia is None:
+            return state.kinetic
+        speeds = _rows_in(self.body, state.closed) @ state.velocity
+        return state.kinetic + 0.5 * float(speeds @ self.hanging.attached.mass @ speeds)
+
+
+def surroundings_of(body: BodyAmongOthers, x: np.ndarray) -> Surroundings:
+    """What the system is around a body in its present state, of which x is a copy."""
+    here = body.coordinates
+    system = here.surroundings
+    if here.interface is None or system is None:
+        return Surroundings(body, None, np.zeros((2, 0)), None, None, None)
+    unmoved = system.present()
+    hanging = system.hanging(unmoved, here.stepped.mass)
+    inertia = _inertia(body, hanging)
+    if inertia is None or not here.rigid:
+        return Surroundings(body, system, unmoved, hanging, inertia, None)
+    level, closed = here.stepped.loaded.level, here.stepped.closed
+    physical = here.stepped.physical @ np.concatenate(here.split(x))
+    eta, eta_t, eta_tt = (part[: level.modes] for part in np.split(physical, 3))
+    carried = here.stepped.loaded.asymptotic.forces + here.direct(here.stepped) @ here.interface.forces
+    pushed = carried + level.force_rows @ eta + level.force_rate_rows @ eta_t
+    rows = here.interface.in_base(level.base)
+    reactions = Reactions(hanging.attached, level.base, rows, level.vectors @ eta_tt, closed, pushed)
+    return Surroundings(body, system, unmoved, hanging, inertia, reactions)
+
+
+def _inertia(body: BodyAmongOthers, hanging: Hanging) -> PointInertia | None:
+    interface = body.coordinates.interface
+    if hanging.only_forces or interface is None:
+        return None
+    base = body.coordinates.stepped.loaded.level.base
+    return PointInertia(hanging.attached, base, interface.in_base(base), lambda closed: _rows_in(body, closed))
+
+
+def _rows_in(body: BodyAmongOthers, closed: tuple[int, ...]) -> np.ndarray:
+    """R (m, r) in a level."""
+    stepped, interface = body.stepped_level(closed), body.coordinates.interface
+    assert interface is not None
+    return interface.of(stepped).rows[:, : stepped.loaded.level.modes]

@@ -1,0 +1,151 @@
+"""Exact motion of a body within a step, from event to event, under forces that are held constant: the loop's.
+
+The arrays serve all bodies in the same levels, one after the other: what the loop finds there is put there for every
+advance, the ring of the chatter check too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.state import Event, State
+from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting, HeldForces, Inertia
+from multiphi_exudyn.time.chatter import allowed, window
+from multiphi_exudyn.time.motion import NUMBERS, Motion, carry, measured
+from multiphi_exudyn.time.record import PHASES, Record
+
+__all__ = ["ExactMotion", "Reached"]
+
+ROOM = 32  # segments of a step that are recorded before they are taken
+
+
+@dataclass(frozen=True)
+class Reached:
+    """state at ``time`` [s]; changed: whether anything happened on the way, and the events, not of a trial.
+
+    before: eta, eta' (r,) right before the last instant.
+    """
+
+    time: float
+    state: State
+    changed: bool
+    before: tuple[np.ndarray, np.ndarray]
+    events: tuple[Event, ...]
+
+
+class ExactMotion:
+    """Motions in the levels of ``motion``; levels: those of its static loads. name: with which failures are told."""
+
+    def __init__(self, motion: Motion, levels: LoadedLevels, name: str) -> None:
+        self._motion, self._levels, self._name = motion, levels, name
+        self._forces = motion.levels.held = motion.levels.held or _forces_in(motion.levels)
+        self._arrays = motion.arrays = self._forces.arrays
+        self._record = Record(motion.model.contacts, self._arrays)
+        self._ring = np.zeros(2 * (window(motion.model) + 1))
+        self._decisions, self._last_decision = 0, math.nan
+
+    def begin(self, time: float) -> None:
+        """A run begins at a time [s]."""
+        self._ring[:] = 0.0
+        self._decisions, self._last_decision = 0, time
+
+    def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
+        """From now on these forces act, by the closed contacts of a level, and this hangs on the structure."""
+        if self._arrays.full:
+            self._forces.forget()
+        self._forces.hold(acting, inertia)
+
+    def advance(self, state: State, time: float, until: float, stop: bool = False, trial: bool = False) -> Reached:
+        """From a state at a time [s] until another; stop: no further than an event; trial: it is done once more."""
+        arrays = self._arrays
+        level = arrays.level(state.level.states)
+        arrays.begin_record()
+        self._put_ring()
+        self._set_out(level, state, time)
+        arrays.ints[a.STOP_AT_EVENT] = int(stop)
+        try:
+            with np.errstate(all="ignore"):
+                changed, events = self._run(until, trial)
+        except (MultiPhiError, np.linalg.LinAlgError) as failure:
+            singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
+            at = float(arrays.numbers[a.TIME])
+            raise NumericalFailure(f"{self._name}: at t = {at:.9g} s: {singular}{failure}") from failure
+        if not trial:
+            self._take_ring()
+        after, end = self._state(a.CURRENT), float(arrays.numbers[a.TIME])
+        before = self._state(a.REACHED) if stop else after
+        return Reached(end, after, changed, (before.displacement, before.velocity), events)
+
+    def _put_ring(self) -> None:
+        """The ring of the chatter check into the arrays, which other bodies use too."""
+        arrays, model, count = self._arrays, self._motion.model, len(self._ring)
+        start = arrays.ring(count)
+        arrays.numbers[start : start + count] = self._ring
+        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = window(model), self._decisions
+        arrays.numbers[a.ALLOWED], arrays.numbers[a.LAST_DECISION] = allowed(model), self._last_decision
+
+    def _take_ring(self) -> None:
+        """The same from the arrays."""
+        arrays = self._arrays
+        if arrays.ints[a.DECISIONS] == self._decisions:
+            return
+        self._ring[:] = arrays.numbers[arrays.ints[a.RING] :][: len(self._ring)]
+        self._decisions, self._last_decision = int(arrays.ints[a.DECISIONS]), float(arrays.numbers[a.LAST_DECISION])
+
+    def _set_out(self, level: int, state: State, time: float) -> None:
+        """A state at a time [s] into the arrays."""
+        arrays, centre = self._arrays, self._forces.centre(level)
+        place, speed = state.displacement - centre, state.velocity
+        arrays.numbers[a.TIME] = time
+        w, w_t = arrays.channels.at(arrays.buffers, time)
+        place, speed = np.concatenate([place, w]), np.concatenate([speed, w_t])
+        arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
+
+    def _run(self, until: float, trial: bool) -> tuple[bool, tuple[Event, ...]]:
+        """The loop until it ends, with all that it needs; whether there were events on the way, and which."""
+        arrays, events, changed = self._arrays, list[Event](), False
+        while True:
+            answer = int(carry(*arrays.buffers.all, until))
+            if answer == a.NEED:
+                arrays.supply()
+                if not arrays.outgrown:
+                    continue
+            if arrays.ints[a.EVENT_COUNT]:
+                changed = True
+                events += [] if trial else self._events()
+            arrays.begin_record()
+            if answer == a.FAILED:
+                raise self._motion.failure()
+            if answer not in (a.FULL, a.NEED):
+                return changed, tuple(events)
+
+    def _events(self) -> list[Event]:
+        """What the loop has recorded, which is then forgotten."""
+        known = len(self._record.places)
+        self._record.take_events()
+        return [self._record.event(i) for i in range(known, len(self._record.places))]
+
+    def _state(self, place: int) -> State:
+        """A state of the run record, under static loads."""
+        ints, numbers = self._arrays.ints, self._arrays.numbers
+        record = int(ints[place + a.LEVEL])
+        level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].level.indices)
+        r, phases = level.level.modes, ints[ints[place + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
+        eta = numbers[ints[place + a.PLACE] :][:r] + self._forces.centre(record)
+        eta_t = numbers[ints[place + a.SPEED] :][:r].copy()
+        return State(level, eta, eta_t, tuple(PHASES[k] for k in phases.tolist()))
+
+
+def _forces_in(levels: LoadedLevels) -> HeldForces:
+    """Forces in levels, with arrays that only bodies use."""
+    arrays = LevelArrays(levels)
+    arrays.room = ROOM
+    return HeldForces(arrays)

@@ -1,0 +1,325 @@
+"""Free and forced response of modal equations in flat buffers: free_response.py and forced_response.py, for the loop.
+
+    eta'' + D eta' + S eta = p,   eta(t) = Re V (c phi(t)),   c = A eta(0) + B eta'(0) + P p
+
+D and S (r, r) are whatever the rates, shapes and maps were made for; nothing is symmetric here.
+
+A response is a record in the ints:
+
+    ints[response + MODES]               r
+    ints[response + FREE]                the basis of its p exponentials (basis_arrays.py)
+    ints[response + REACHED]             where first and last + 1 of the modes that an exponential takes part in begin
+                                         in the ints, (p, 2): elsewhere V, A, B and P are zero
+    ints[response + FROM_DISPLACEMENT]   where A (p, r) begins in the waves
+    ints[response + FROM_VELOCITY]       B (p, r)
+    ints[response + FROM_FORCE]          P (p, r)
+    ints[response + SHAPES]              V^T (p, r)
+    ints[response + SQUARES]             where omega^2 (r,) begins in the numbers,
+    ints[response + HALF_DAMPING]        and delta (r,)
+    ints[response + UNCOUPLED]           where 1 for a mode with an equation of its own begins in the ints, (r,):
+                                         eta'' + 2 delta eta' + omega^2 eta = p
+    ints[response + POLES]               and 1 for an exponential of the other modes, (p,)
+
+Forced response, as forced_response.py has it, to p = Re( exp(mu t) sum_d p_d u^d ), u = t/T, T the horizon:
+
+    eta = Re( exp(mu t) sum_k x_k u^k )
+
+as the sum of equations of first order, z' = s z + exp(mu t) p(t), for every pole s; two poles that (nearly) coincide
+are one equation of second order.
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.forced_response import COINCIDING, NEAREST_FAR, PER_DEGREE, TAYLOR
+
+__all__ = [
+    "FREE",
+    "FROM_DISPLACEMENT",
+    "FROM_FORCE",
+    "FROM_VELOCITY",
+    "HALF_DAMPING",
+    "MODES",
+    "POLES",
+    "REACHED",
+    "RESPONSE",
+    "SHAPES",
+    "SQUARES",
+    "UNCOUPLED",
+    "coefficients_of",
+    "forced_response",
+    "reached_modes",
+    "state_of",
+]
+
+MODES, FREE, REACHED, FROM_DISPLACEMENT, FROM_VELOCITY, FROM_FORCE, SHAPES = 0, 1, 2, 3, 4, 5, 6
+SQUARES, HALF_DAMPING, UNCOUPLED, POLES = 7, 8, 9, 10
+RESPONSE = 11  # ints of the record
+
+
+@compiled
+def reached_modes(ints: Ints, waves: Waves, response: int) -> None:
+    """Fill in the modes that every exponential takes part in: where V, A, B or P is not zero."""
+    r, p, reached = ints[response + MODES], ints[ints[response + FREE] + SIZE], ints[response + REACHED]
+    for j in range(p):
+        first, end = r, 0
+        for k in range(FROM_DISPLACEMENT, SHAPES + 1):
+            row = ints[response + k] + j * r
+            for i in range(r):
+                if waves[row + i] != 0:
+                    first, end = min(first, i), max(end, i + 1)
+        ints[reached + 2 * j], ints[reached + 2 * j + 1] = first, end
+
+
+@compiled
+def coefficients_of(
+    ints: Ints, numbers: Numbers, waves: Waves, response: int, eta: int, eta_t: int, force: int, result: int
+) -> None:
+    """c (p,) of the motion that starts at eta, eta' (r,) under the constant modal force p (r,), -1 for none."""
+    r, p, reached = ints[response + MODES], ints[ints[response + FREE] + SIZE], ints[response + REACHED]
+    for j in range(p):
+        moved, pushed = ints[response + FROM_DISPLACEMENT] + j * r, ints[response + FROM_VELOCITY] + j * r
+        c = 0j
+        for i in range(ints[reached + 2 * j], ints[reached + 2 * j + 1]):
+            c += waves[moved + i] * numbers[eta + i] + waves[pushed + i] * numbers[eta_t + i]
+        if force >= 0:
+            forced = ints[response + FROM_FORCE] + j * r
+            for i in range(ints[reached + 2 * j], ints[reached + 2 * j + 1]):
+                c += waves[forced + i] * numbers[force + i]
+        waves[result + j] = c
+
+
+@compiled
+def state_of(
+    ints: Ints, numbers: Numbers, waves: Waves, response: int, c: int, t: float, eta: int, eta_t: int, scratch: int
+) -> None:
+    """eta(t), eta'(t) (r,) of the motion with coefficients c (p,); scratch: 2p waves."""
+    r, basis = ints[response + MODES], ints[response + FREE]
+    p, reached, shapes = ints[basis + SIZE], ints[response + REACHED], ints[response + SHAPES]
+    phi, rate = scratch, scratch + p
+    exponentials(ints, numbers, waves, basis, t, t, phi)
+    differentiate(ints, numbers, waves, basis, c, rate)
+    for i in range(r):
+        numbers[eta + i] = 0.0
+        numbers[eta_t + i] = 0.0
+    for j in range(p):
+        value, slope = waves[c + j] * waves[phi + j], waves[rate + j] * waves[phi + j]
+        for i in range(ints[reached + 2 * j], ints[reached + 2 * j + 1]):
+            numbers[eta + i] += (waves[shapes + j * r + i] * value).real
+            numbers[eta_t + i] += (waves[shapes + j * r + i] * slope).real
+
+
+@compiled
+def forced_response(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    response: int,
+    carrier: int,
+    forces: int,
+    degree: int,
+    horizon: float,
+    most: int,
+    scratch: int,
+    result: int,
+) -> int:
+    """One response x (K + 1, r) to modal forces p (degree + 1, r) on a carrier, good for [0, horizon]: K + 1.
+
+    carrier: where its mu stands in the waves. most: rows that there is room for, more than the degree; where a larger
+    number comes back, so many are needed, and x is nothing. scratch: 2 ``most`` waves.
+    """
+    r, basis = ints[response + MODES], ints[response + FREE]
+    rows = clear_rows(waves, result, r, 0, 1)
+    for i in range(r):
+        if ints[ints[response + UNCOUPLED] + i] == 1 and is_forced(waves, forces + i, r, degree) == 1:
+            square, delta = numbers[ints[response + SQUARES] + i], numbers[ints[response + HALF_DAMPING] + i]
+            rows = force_mode(waves, square, delta, carrier, forces, degree, horizon, i, r, rows, most, scratch, result)
+    for j in range(ints[basis + SIZE]):
+        if ints[ints[response + POLES] + j] == 1:
+            for mirrored in range(2):
+                rows = force_pole(
+                    ints, waves, response, j, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
+                )
+    return rows
+
+
+@compiled
+def clear_rows(waves: Waves, x: int, r: int, rows: int, wanted: int) -> int:
+    """Makes x (rows, r) longer by zeros where more rows are wanted: how many it has then."""
+    for k in range(rows * r, wanted * r):
+        waves[x + k] = 0j
+    return max(rows, wanted)
+
+
+@compiled
+def is_forced(waves: Waves, forces: int, r: int, degree: int) -> int:
+    """1 where anything acts on a mode; its p_d stand r apart."""
+    for d in range(degree + 1):
+        if waves[forces + d * r] != 0:
+            return 1
+    return 0
+
+
+@compiled
+def force_mode(
+    waves: Waves,
+    square: float,
+    delta: float,
+    carrier: int,
+    forces: int,
+    degree: int,
+    horizon: float,
+    mode: int,
+    r: int,
+    rows: int,
+    most: int,
+    scratch: int,
+    x: int,
+) -> int:
+    """Adds the response of one mode, eta'' + 2 delta eta' + omega^2 eta = p, to x (rows, r): its rows then.
+
+    Poles -delta +- (delta^2 - omega^2)^(1/2), apart or together.
+    """
+    mu, difference, given = waves[carrier], delta * delta - square, scratch + most
+    root = math.sqrt(abs(difference))
+    if 2 * root <= COINCIDING * math.sqrt(abs(square)):
+        for d in range(degree + 1):
+            waves[given + d] = waves[forces + d * r + mode]
+        own = second_order(waves, square, delta, mu.real, mu.imag, given, degree, horizon, most, scratch)
+        return add_mode(waves, scratch, own, mode, r, rows, most, x)
+    fast = complex(-delta - root, 0.0) if difference > 0.0 else complex(-delta, -root)
+    ratio = square / (fast.real * fast.real + fast.imag * fast.imag)
+    weight = complex(0.5 / root, 0.0) if difference > 0.0 else complex(0.0, -0.5 / root)
+    for sign in range(2):
+        pole = fast - mu if sign == 1 else complex(ratio * fast.real, -ratio * fast.imag) - mu
+        for d in range(degree + 1):
+            waves[given + d] = weight * waves[forces + d * r + mode]
+        own = first_order(waves, pole.real, pole.imag, given, degree, horizon, most, scratch)
+        rows = add_mode(waves, scratch, own, mode, r, rows, most, x)
+        weight = -weight
+    return rows
+
+
+@compiled
+def add_mode(waves: Waves, w: int, own: int, mode: int, r: int, rows: int, most: int, x: int) -> int:
+    """Adds w (own,) to a mode's column of x (rows, r), where there is room for it: its rows then."""
+    if max(own, rows) > most:
+        return max(own, rows)
+    rows = clear_rows(waves, x, r, rows, own)
+    for k in range(own):
+        waves[x + k * r + mode] += waves[w + k]
+    return rows
+
+
+@compiled
+def force_pole(
+    ints: Ints,
+    waves: Waves,
+    response: int,
+    j: int,
+    mirrored: int,
+    carrier: int,
+    forces: int,
+    degree: int,
+    horizon: float,
+    rows: int,
+    most: int,
+    scratch: int,
+    x: int,
+) -> int:
+    """Adds the response of one exponential of coupled modes, or of its conjugate, to x (rows, r): its rows then.
+
+    w' = (lambda - mu) w + B p / 2 along V, with conj(lambda), conj(B), conj(V) where ``mirrored`` is 1.
+    """
+    r, reached, given = ints[response + MODES], ints[response + REACHED] + 2 * j, scratch + most
+    maps, shapes = ints[response + FROM_VELOCITY] + j * r, ints[response + SHAPES] + j * r
+    pole, mu, sign = waves[ints[ints[response + FREE] + RATES] + j], waves[carrier], 1.0 - 2.0 * mirrored
+    for d in range(degree + 1):
+        push = 0j
+        for i in range(ints[reached], ints[reached + 1]):
+            weight = waves[maps + i]
+            push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * waves[forces + d * r + i]
+        waves[given + d] = push
+    distance = complex(pole.real, sign * pole.imag) - mu
+    own = first_order(waves, distance.real, distance.imag, given, degree, horizon, most, scratch)
+    if max(own, rows) > most:
+        return max(own, rows)
+    rows = clear_rows(waves, x, r, rows, own)
+    for k in range(own):
+        for i in range(ints[reached], ints[reached + 1]):
+            shape = waves[shapes + i]
+            waves[x + k * r + i] += waves[scratch + k] * complex(shape.real, sign * shape.imag)
+    return rows
+
+
+@compiled
+def first_order(
+    waves: Waves, real: float, imag: float, given: int, degree: int, horizon: float, most: int, w: int
+) -> int:
+    """w (K + 1,) of w' = distance w + p(t), distance = s - mu: K + 1, and nothing more if that is above ``most``.
+
+    Far from the pole w_k = ((k + 1) w_k+1 / T - p_k) / distance, near to it w_k+1 = T (distance w_k + p_k) / (k + 1).
+    """
+    distance, size = complex(real, imag), math.hypot(real, imag)
+    if size * horizon >= NEAREST_FAR + PER_DEGREE * degree:
+        inverse, above = complex(real / size / size, -imag / size / size), 0j
+        for k in range(degree, -1, -1):
+            above = ((k + 1) / horizon * above - waves[given + k]) * inverse
+            waves[w + k] = above
+        return degree + 1
+    rows = taylor_terms(degree, size * horizon, 1)
+    if rows <= most:
+        waves[w] = 0j
+        for k in range(rows - 1):
+            push = waves[given + k] if k <= degree else 0j
+            waves[w + k + 1] = (distance * waves[w + k] + push) * (horizon / (k + 1))
+    return rows
+
+
+@compiled
+def second_order(
+    waves: Waves,
+    square: float,
+    delta: float,
+    real: float,
+    imag: float,
+    given: int,
+    degree: int,
+    horizon: float,
+    most: int,
+    w: int,
+) -> int:
+    """w (K + 1,) of w'' + 2 (delta + mu) w' + (omega^2 + 2 delta mu + mu^2) w = p(t), poles close together; K + 1."""
+    mu = complex(real, imag)
+    slope, value = 2 * (delta + mu), square + 2 * delta * mu + mu * mu
+    size = math.hypot(value.real, value.imag)
+    distance = math.sqrt(size)
+    if distance * horizon >= NEAREST_FAR + PER_DEGREE * (degree + 1):
+        inverse, first, second = complex(value.real / size / size, -value.imag / size / size), 0j, 0j
+        for k in range(degree, -1, -1):
+            above = (k + 1) / horizon * first
+            waves[w + k] = (waves[given + k] - slope * above - (k + 1) / horizon * second) * inverse
+            first, second = waves[w + k], above
+        return degree + 1
+    rows = taylor_terms(degree, max(distance, math.hypot(slope.real, slope.imag)) * horizon, 2)
+    if rows <= most:
+        waves[w] = 0j
+        waves[w + 1] = 0j
+        for k in range(rows - 2):
+            push = waves[given + k] if k <= degree else 0j
+            pulled = slope * waves[w + k + 1] * ((k + 1) / horizon) + value * waves[w + k]
+            waves[w + k + 2] = (push - pulled) * (horizon * horizon / ((k + 1) * (k + 2)))
+    return rows
+
+
+@compiled
+def taylor_terms(degree: int, reach: float, order: int) -> int:
+    """Coefficients of a Taylor series up to round-off, reach = |distance| T."""
+    term, count = 1.0, 0
+    while term > TAYLOR:
+        count += 1
+        term *= reach / count
+    return degree + 1 + order + count

@@ -1,0 +1,44 @@
+"""Growing: an array that a run adds to, part by part, without copying what is there each time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["Growing"]
+
+BLOCK = 2**15  # rows of a block: some megabytes, that go back to the system when blocks are joined
+
+
+class Growing:
+    """An array to which parts are added, in blocks that are joined when somebody looks at it."""
+
+    def __init__(self, empty: np.ndarray) -> None:
+        self._blocks, self._used = [empty], 0  # of the last block
+        self.count = 0
+
+    def add(self, part: np.ndarray) -> None:
+        """Add a part, which is copied unless it is the first."""
+        if not len(part):
+            return
+        last = self._blocks[-1]
+        if self._used + len(part) > len(last):
+            self._blocks[-1] = last[: self._used]
+            last = part if self.count == 0 else np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
+            self._blocks.append(last)
+            self._used = 0
+        last[self._used : self._used + len(part)] = part
+        self._used += len(part)
+        self.count += len(part)
+
+    @property
+    def whole(self) -> np.ndarray:
+        """All parts."""
+        if len(self._blocks) > 1:
+            self._blocks[-1] = self._blocks[-1][: self._used]
+            whole, end = np.empty((self.count, *self._blocks[0].shape[1:]), self._blocks[0].dtype), self.count
+            while self._blocks:  # each goes as soon as it is copied
+                start = end - len(self._blocks[-1])
+                whole[start:end] = self._blocks.pop()
+                end = start
+            self._blocks, self._used = [whole], self.count
+        return self._blocks[0]

@@ -1,0 +1,122 @@
+"""What the loop records of a run: segments, events, and whether the last decisions were chatter."""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AGE,
+    ALLOWED,
+    CHANGE_COUNT,
+    CHANGE_IMPULSES,
+    CHANGE_WIDTH,
+    CHANGES,
+    CHANNELS,
+    COORDINATE_COUNT,
+    COORDINATE_NUMBERS,
+    CURRENT,
+    DECISIONS,
+    EVENT_COUNT,
+    EVENT_INTS,
+    EVENT_NUMBERS,
+    EVENT_WIDTH,
+    EVENT_WIDTH_NUMBERS,
+    EXIT_COUNT,
+    INSTANT_TIME,
+    LEVEL,
+    LOSSES,
+    LOST,
+    MODES,
+    NUMBER,
+    PHASE_COUNT,
+    PHASE_INTS,
+    PHASES,
+    PIECE,
+    PLACE,
+    RING,
+    SEGMENT_COUNT,
+    SEGMENT_INTS,
+    SEGMENT_NUMBERS,
+    SEGMENT_WIDTH,
+    SEGMENT_WIDTH_NUMBERS,
+    SETTLED,
+    SHARED,
+    SPEED,
+    TIME,
+    TOLD,
+    WINDOW,
+    WORK,
+)
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
+
+__all__ = ["ACCUMULATED", "is_chatter", "keep_events", "keep_segment"]
+
+ACCUMULATED = 1e-6  # of the time so far: a window of events within it is chatter, also where no mode oscillates
+
+
+@compiled
+def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) -> None:
+    """Record the segment from CURRENT to the instant, which becomes the present time."""
+    k, level = ints[SEGMENT_COUNT], ints[CURRENT + LEVEL]
+    n, row = ints[level + MODES] + ints[CHANNELS], ints[SEGMENT_INTS] + k * SEGMENT_WIDTH
+    ints[row] = ints[level + NUMBER]
+    ints[row + 1] = ints[PIECE]
+    ints[row + 2] = ints[EVENT_COUNT]
+    ints[row + 3] = ints[COORDINATE_COUNT]
+    ints[row + 4] = ints[PHASE_COUNT] if ints[CURRENT + SETTLED] == 0 else -1
+    if ints[CURRENT + SETTLED] == 0:
+        for e in range(ints[level + EXIT_COUNT]):
+            ints[ints[PHASE_INTS] + ints[PHASE_COUNT] + e] = ints[ints[CURRENT + PHASES] + e]
+        ints[PHASE_COUNT] += ints[level + EXIT_COUNT]
+    given = ints[SEGMENT_NUMBERS] + k * SEGMENT_WIDTH_NUMBERS
+    numbers[given] = numbers[TIME]
+    numbers[given + 1] = numbers[INSTANT_TIME]
+    numbers[given + 2] = armed_at
+    numbers[given + 3] = horizon
+    numbers[given + 4] = numbers[WORK]
+    numbers[given + 5] = numbers[AGE]
+    kept = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
+    for i in range(n):
+        numbers[kept + i] = numbers[ints[CURRENT + PLACE] + i]
+        numbers[kept + n + i] = numbers[ints[CURRENT + SPEED] + i]
+    ints[COORDINATE_COUNT] += 2 * n
+    ints[SEGMENT_COUNT] = k + 1
+    numbers[TIME] = numbers[INSTANT_TIME]
+    numbers[WORK] = 0.0
+
+
+@compiled
+def keep_events(ints: Ints, numbers: Numbers) -> None:
+    """Record the changes of a decision; the first carries the energy lost at the whole instant."""
+    first = 1
+    for k in range(ints[CHANGE_COUNT]):
+        row = ints[EVENT_INTS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH
+        given = ints[EVENT_NUMBERS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH_NUMBERS
+        entered = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1]
+        ints[row] = ints[ints[CHANGES] + k * CHANGE_WIDTH]
+        ints[row + 1] = entered
+        numbers[given] = numbers[TIME]
+        for part in range(LOSSES):
+            numbers[given + 1 + part] = numbers[LOST + part] if first == 1 and entered != SHARED else 0.0
+        numbers[given + 1 + LOSSES] = numbers[ints[CHANGE_IMPULSES] + k]
+        if entered != SHARED:
+            first = 0
+    ints[EVENT_COUNT] += ints[CHANGE_COUNT]
+
+
+@compiled
+def is_chatter(ints: Ints, numbers: Numbers) -> int:
+    """1 where the last window of decisions holds more than ALLOWED in a period of the highest mode, or no time."""
+    window, decisions, ring = ints[WINDOW], ints[DECISIONS], ints[RING]
+    if decisions <= window:
+        return 0
+    oldest = (decisions - window) % (window + 1)
+    elapsed, limit = numbers[TIME] - numbers[ring + 2 * oldest], window / numbers[ALLOWED]
+    last = (decisions - 1) % (window + 1)
+    if elapsed > ACCUMULATED * numbers[TIME] and numbers[ring + 2 * last + 1] * elapsed >= limit:
+        return 0
+    highest = 0.0
+    for k in range(window + 1):
+        if k != (decisions - window - 1) % (window + 1):
+            highest = max(highest, numbers[ring + 2 * k + 1])
+    numbers[TOLD] = elapsed
+    numbers[TOLD + 1] = highest
+    return 1 if elapsed <= ACCUMULATED * numbers[TIME] or 0.0 < highest * elapsed < limit else 0

@@ -1,0 +1,257 @@
+"""Work of damping and of what varies in time over recorded segments, in closed form.
+
+    damping   integral of xi'.D xi'
+    varying   integral of sum_k  w_k a_k.xi' + w_k' (b_k.xi + c_k.xi' + d_k.xi'' + e_k)
+
+f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so that f g is one of their products,
+
+    f g = 1/2 Re sum_jk F_j G_k phi_j phi_k + F_j conj(G_k phi_k) phi_j
+
+and needs no exponentials but those at the end. A chain is a rate with its powers of time: the products of two chains
+are (t/T)^d exp(s t), s the sum of their rates, and d goes up to the sum of their degrees.
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.events.arrays import (
+    AFTER,
+    CHANNELS,
+    DISSIPATION,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    FLOW_FORCED,
+    FLOW_FREE,
+    FLOW_WAVES,
+    LEVEL,
+    MODES,
+    NEED,
+    OK,
+    PLACE,
+    POWER,
+    PRESCRIBED,
+    RESPONSE,
+    SEGMENT_WIDTH,
+    SEGMENT_WIDTH_NUMBERS,
+    WORK_WAVES,
+)
+from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES, exponentials
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.response_arrays import REACHED, SHAPES
+from multiphi_exudyn.time.sampling import resume
+
+__all__ = ["integrate_works", "work_waves"]
+
+UPWARDS_ABOVE = 0.5  # |s t| - d from which I_d follows from I_d-1: below, that loses d! / |s t|^d
+SERIES_ROUND_OFF = 1e-18  # of the first term of a power series: terms below it are left out
+
+
+def work_waves(n: int, p: int, q: int) -> int:
+    """Waves that the work of a segment takes, of n coordinates, p exponentials and q channels."""
+    return 4 * n * p + 2 * q * p + 10 * p
+
+
+@compiled
+def integrate_works(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    rows: Ints,
+    spans: Numbers,
+    coordinates: Numbers,
+    offsets: Ints,
+    segments: int,
+    scratch: Waves,
+    works: Numbers,
+) -> int:
+    """Work (segments, 2) [J] of damping and of what varies; OK or NEED. scratch: ``work_waves`` of them."""
+    for i in range(segments):
+        level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
+        if level == 0:
+            continue
+        if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i) == NEED:
+            return NEED
+        q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
+        n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
+        place, sums = 0, 4 * n * p + 2 * q * p
+        list_terms(ints, numbers, waves, scratch)
+        weigh_terms(ints, numbers, scratch)
+        exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
+        raised = sums + 8 * p  # powers of t / T at the end
+        scratch[raised] = 1.0 + 0j
+        for d in range(1, 2 * p):
+            scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
+        works[2 * i] = 0.0
+        works[2 * i + 1] = 0.0
+        add_constants(ints, numbers, waves, scratch, works, 2 * i + 1)
+        while place < p:
+            other, length = place, chain(ints, place)
+            while other < p:
+                further = chain(ints, other)
+                if multiply(ints, scratch, n, place, length, other, further, sums) == 1:
+                    for mirrored in range(2):
+                        integrate(
+                            ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
+                            works, 2 * i,
+                        )  # fmt: skip
+                other += further
+            place += length
+    return OK
+
+
+@compiled
+def chain(ints: Ints, first: int) -> int:
+    """How many exponentials with the rate of the ``first`` one follow it as its powers, itself included."""
+    basis, end = ints[FLOW_BASIS], first + 1
+    while end < ints[FLOW_COUNT] and ints[ints[basis + POWERS] + end] > 0:
+        end += 1
+    return end - first
+
+
+@compiled
+def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> None:
+    """Coefficients of xi, xi', xi'' (3, p, n) of the flow."""
+    level, basis, p, free = ints[AFTER + LEVEL], ints[FLOW_BASIS], ints[FLOW_COUNT], ints[FLOW_FREE]
+    r, c, unit = ints[level + MODES], ints[FLOW_WAVES], numbers[ints[ints[FLOW_BASIS] + SCALES]]
+    n, moving = r + ints[CHANNELS], r + ints[PRESCRIBED]
+    for j in range(p):
+        shape, size = ints[ints[level + RESPONSE] + SHAPES] + j * r, r
+        if j >= free:
+            shape, size = ints[FLOW_FORCED] + (j - free) * moving, moving
+        for i in range(n):
+            scratch[j * n + i] = waves[shape + i] * waves[c + j] if i < size else 0j
+    for j in range(p, 3 * p if n > r else 2 * p):
+        rate, power = waves[ints[basis + RATES] + j % p], 0
+        if j % p + 1 < p:
+            power = ints[ints[basis + POWERS] + j % p + 1]
+        for i in range(n):
+            scratch[j * n + i] = rate * scratch[(j - p) * n + i]
+            if power > 0:
+                scratch[j * n + i] += power / unit * scratch[(j - p + 1) * n + i]
+
+
+@compiled
+def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves) -> None:
+    """Coefficients of D xi' (p, n), and of what w_k and w_k' are multiplied by (p, 2 q), without e_k."""
+    level, p, q = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS]
+    n = ints[level + MODES] + q
+    for j in range(p):
+        for i in range(n):
+            row, total = ints[level + DISSIPATION] + i * n, 0j
+            for k in range(n):
+                total += numbers[row + k] * scratch[(p + j) * n + k]
+            scratch[(3 * p + j) * n + i] = total
+        for k in range(q):
+            row, held, moved = ints[level + POWER] + k * (4 * n + 1), 0j, 0j
+            for i in range(n):
+                x, v, a = scratch[j * n + i], scratch[(p + j) * n + i], scratch[(2 * p + j) * n + i]
+                held += numbers[row + i] * v
+                moved += numbers[row + n + i] * x + numbers[row + 2 * n + i] * v + numbers[row + 3 * n + i] * a
+            scratch[4 * p * n + 2 * q * j + k] = held
+            scratch[4 * p * n + 2 * q * j + q + k] = moved
+
+
+@compiled
+def multiply(ints: Ints, scratch: Waves, n: int, a: int, length: int, b: int, further: int, sums: int) -> int:
+    """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree; whether there are any.
+
+    In the scratch memory from ``sums`` on, (4, 2 p): of damping and of what varies, then both with conj(G_k).
+    """
+    p, q, some, reached = ints[FLOW_COUNT], ints[CHANNELS], 0, ints[ints[ints[AFTER + LEVEL] + RESPONSE] + REACHED]
+    for m in range(4):
+        for d in range(length + further - 1):
+            scratch[sums + m * 2 * p + d] = 0j
+    for j in range(a, a + length):
+        lowest, highest = 0, n
+        if j < ints[FLOW_FREE]:
+            lowest, highest = ints[reached + 2 * j], ints[reached + 2 * j + 1]
+        for k in range(j if a == b else b, b + further):
+            same, crossed, varying, mirrored = 0j, 0j, 0j, 0j
+            for i in range(lowest, highest):
+                f, g = scratch[(p + j) * n + i], scratch[(3 * p + k) * n + i]
+                same += f * g
+                crossed += f * g.conjugate()
+            if j != k:  # either way round; D is symmetric
+                same, crossed = 2.0 * same, 2.0 * crossed
+            for i in range(2 * q):
+                part = (i // q * p) * n + n - q + i % q
+                f, g = scratch[part + j * n], scratch[4 * p * n + 2 * q * k + i]
+                varying += f * g
+                mirrored += f * g.conjugate()
+                if j != k:
+                    f, g = scratch[part + k * n], scratch[4 * p * n + 2 * q * j + i]
+                    varying += f * g
+                    mirrored += f.conjugate() * g
+            if same != 0 or crossed != 0 or varying != 0 or mirrored != 0:
+                some, at = 1, sums + j - a + k - b
+                scratch[at] += same
+                scratch[at + 2 * p] += varying
+                scratch[at + 4 * p] += crossed
+                scratch[at + 6 * p] += mirrored
+    return some
+
+
+@compiled
+def integrate(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    scratch: Waves,
+    a: int,
+    b: int,
+    count: int,
+    mirrored: int,
+    duration: float,
+    sums: int,
+    works: Numbers,
+    result: int,
+) -> None:
+    """Adds what the products of two chains make of the works (2,), in powers d < ``count`` of t / T.
+
+    I_d = (u^d exp(s t) - d / T I_d-1) / s, u = t / T, upwards while d is below |s t|; the others downwards from
+
+    I_d = t u^d exp(s t) sum_n (-s t)^n / ((d + 1) (d + 2) ... (d + n + 1))
+    """
+    basis, phi, p = ints[FLOW_BASIS], ints[WORK_WAVES], ints[FLOW_COUNT]
+    rate, end, unit = waves[ints[basis + RATES] + b], waves[phi + b], numbers[ints[basis + SCALES]]
+    if mirrored == 1:
+        rate, end = complex(rate.real, -rate.imag), complex(end.real, -end.imag)
+    s, end, first = waves[ints[basis + RATES] + a] + rate, waves[phi + a] * end, sums + 4 * p * mirrored
+    x, size, raised = s * duration, math.sqrt(s.real * s.real + s.imag * s.imag), sums + 8 * p
+    upwards = min(max(math.floor(size * duration - UPWARDS_ABOVE) + 1, 0), count)
+    integral, inverse = end - 1.0, complex(s.real / size / size, -s.imag / size / size) if upwards > 0 else 0j
+    for d in range(upwards):
+        if d > 0:
+            integral = scratch[raised + d] * end - d / unit * integral
+        integral *= inverse
+        works[result] += 0.5 * (scratch[first + d] * integral).real
+        works[result + 1] += 0.5 * (scratch[first + 2 * p + d] * integral).real
+    if upwards == count:
+        return
+    term, integral, n = duration / count * scratch[raised + count - 1] * end, 0j, count
+    least = SERIES_ROUND_OFF * (abs(term.real) + abs(term.imag))
+    while abs(term.real) + abs(term.imag) > least:
+        integral += term
+        n += 1
+        term *= x * (-1.0 / n)
+    for d in range(count - 1, upwards - 1, -1):
+        works[result] += 0.5 * (scratch[first + d] * integral).real
+        works[result + 1] += 0.5 * (scratch[first + 2 * p + d] * integral).real
+        if d > 0:
+            integral = (scratch[raised + d] * end - s * integral) * (unit / d)
+
+
+@compiled
+def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers, result: int) -> None:
+    """Adds e_k, and b_k times what is held, times what w_k has changed by to the work of what varies."""
+    level, p, q, basis = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS], ints[FLOW_BASIS]
+    n = ints[level + MODES] + q
+    for k in range(ints[PRESCRIBED]):
+        row = ints[level + POWER] + k * (4 * n + 1)
+        constant = numbers[row + 4 * n]
+        for held in range(n - q + ints[PRESCRIBED], n):
+            constant += numbers[row + n + held] * numbers[ints[AFTER + PLACE] + held]
+        for j in range(ints[FLOW_FREE], p):
+            began = 1.0 if ints[ints[basis + POWERS] + j] == 0 else 0.0
+            works[result] += constant * (scratch[j * n + n - q + k] * (waves[ints[WORK_WAVES] + j] - began)).real

@@ -1,0 +1,96 @@
+"""A level with channels is the level without them in eta, and in w what the full equations say."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from small_structures import chain, stop
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.level_parts import from_base, level_parts, powers
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transition import Transition
+
+STOPS = (stop("m1", 0.2), stop("m4", 0.1, 30.0, "soft"), stop("m2", 0.1, 20.0, "law"))
+LOADS = (
+    mp.HarmonicLoad("m3", 2.0, 0.3),
+    mp.StopMotion("stop", mp.Harmonic(0.1, 0.7)),
+    mp.StopMotion("soft", mp.Harmonic(0.2, 0.5)),
+)
+CLOSED = [(), ("stop",), ("soft",), ("stop", "soft"), ("law", "soft")]
+GIVEN = {closed: mp.LevelOverride([0.3, 0.9], [0.1, 0.05]) for closed in CLOSED}
+
+
+def model(overrides=None, modes=4, damping=None):
+    return mp.MultiPhiModel(chain(5, damping=damping, stiffness=10.0), STOPS, modes, overrides or {})
+
+
+def with_and_without(m, closed, loads=LOADS):
+    """A level under a static load alone, and under loads that vary as well."""
+    load = m.base.modes.shapes.T @ np.array([0.0, -1.0, 0.5, 0.0, 2.0])
+    alone = LoadedLevel.of(m.level(closed), load)
+    varying = Excitation.of(m, loads, 1.0)
+    return alone, alone.under(dataclasses.replace(varying, static=load))
+
+
+@pytest.mark.parametrize("overrides", [None, GIVEN], ids=["computed", "given"])
+@pytest.mark.parametrize("closed", CLOSED)
+class TestWhileNothingVaries:
+    def test_energies_are_those_without_channels(self, closed, overrides):
+        alone, level = with_and_without(model(overrides), closed)
+        eta = np.random.default_rng(1).normal(size=(level.modal.modes, 3))
+        xi = np.pad(eta, ((0, level.excitation.channels), (0, 0)))
+        rest = alone.asymptotic
+        expected = 0.5 * alone.level.squares @ eta**2 + (rest.load - rest.drive) @ eta + rest.strain
+        assert_allclose(alone.strain(eta), expected, rtol=1e-12)
+        assert_allclose(level.strain(xi), expected, rtol=1e-12)
+        assert_allclose(level.kinetic(xi), alone.kinetic(eta), rtol=1e-13)
+        assert_allclose(level.potential(xi[:, 0]), alone.potential(eta[:, 0]), rtol=1e-13)
+
+    def test_damping_takes_up_as_much(self, closed, overrides):
+        alone, level = with_and_without(model(overrides, damping=0.1 * np.eye(5)), closed)
+        r = level.modal.modes
+        assert_allclose(powers(level)[0][:r, :r], powers(alone)[0], atol=1e-14)
+
+    def test_the_maps_are_those_without_channels(self, closed, overrides):
+        m = model(overrides)
+        others = with_and_without(m, ("soft",))
+        for other, level in zip(others, with_and_without(m, closed), strict=True):
+            move, r, s = Transition(other, level), level.modal.modes, other.modal.modes
+            assert_allclose(move.matrix[:r, :s], level.modal.vectors.T @ other.modal.vectors, atol=1e-13)
+            assert_allclose(move.matrix[r:], np.eye(len(move.matrix) - r, len(move.matrix[0]), s), atol=0)
+            assert_allclose(from_base(level)[0][:r, : m.base.modes.count], level.modal.vectors.T)
+
+
+@pytest.mark.parametrize("modes", [2, "all"])
+@pytest.mark.parametrize("closed", CLOSED)
+def test_energies_in_xi_are_those_of_the_configuration(closed, modes):
+    """The strain energy of base and springs; less the loads at their present values it is the form the loop has."""
+    m = model(modes=modes)
+    _, level = with_and_without(m, closed)
+    xi = np.random.default_rng(2).normal(size=level.level.modes)
+    y, w = level.configuration(xi), level.split(xi)[1]
+    gaps = m.base.gaps - level.excitation.moved(w)
+    assert_allclose(level.strain(xi), m.base.strain(y, level.level.indices, gaps), rtol=1e-12)
+    assert_allclose(level.potential(xi), level.strain(xi) - level.excitation.load(w) @ y, rtol=1e-12, atol=1e-12)
+
+
+def test_the_strain_of_a_stop_that_moves_far_is_no_difference_of_large_energies():
+    m = mp.MultiPhiModel(chain(1, stiffness=1e-6), [stop("m0", 0.0, 1e8, "soft")], "all")
+    level = LoadedLevel.of(m.level(("soft",)), np.zeros(1)).under(
+        Excitation.of(m, [mp.StopMotion("soft", mp.Harmonic(1.0, 1.0))], 1.0)
+    )
+    vector, shown = level.level.vectors[0]
+    xi = np.array([(1.0 - 1e-4 - shown) / vector, 1.0])  # 0.1 mm inside a stop that has moved by 1 m
+    assert_allclose(level.strain(xi), 0.5 * 1e8 * 1e-8 + 0.5 * level.level.base.modes.omega[0] ** 2, rtol=1e-9)
+
+
+def test_levels_of_other_histories_share_what_is_kept():
+    m = model()
+    alone, level = with_and_without(m, ("soft",))
+    again = alone.under(dataclasses.replace(Excitation.of(m, LOADS, 2.0), static=level.excitation.static))
+    assert again.level is level.level
+    assert again.entries is level.entries
+    assert level_parts(again).keys() == level_parts(level).keys()

@@ -1,0 +1,209 @@
+"""A modal force that is held constant moves a body as a constant load moves the structure."""
+
+import math
+
+import numpy as np
+import pytest
+from small_structures import chain
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.events import level_arrays
+from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
+from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
+from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
+from multiphi_exudyn.exudyn_plugin.coupling.interface import _reactions
+from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting
+from multiphi_exudyn.time import chatter
+from multiphi_exudyn.time.loop import advance
+from multiphi_exudyn.time.simulate import Run
+
+T_END = 6.0
+STRUCTURE = chain(3, damping=mp.ModalDamping([0.02, 0.01, 0.03]), stiffness=10.0)
+LOOSE = mp.LinearStructure(
+    np.eye(2), np.array([[4.0, -4.0], [-4.0, 4.0]]), damping=mp.ModalDamping([0.0, 0.02]), points={"m1": 0, "m2": 1}
+)
+CASES = {
+    "compliant": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0)], -1.0, "m1"),
+    "viscous": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0, damping=0.5)], -1.0, "m1"),
+    "rigid": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1)], -1.0, "m1"),
+    "rigid, on what it holds": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1)], -1.0, "m2"),
+    "two rigid": (
+        STRUCTURE,
+        [mp.UnilateralContact("below", "m2", 0.1), mp.UnilateralContact("above", {"m0": -1.0}, 0.02)],
+        -1.0,
+        "m1",
+    ),
+    "without a support": (LOOSE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0)], -0.2, "m1"),
+}
+
+
+def held(model, row, force):
+    """What a force on a point is to the levels of a model."""
+    in_base = row[None, :] @ model.base.modes.shapes
+
+    def acting(closed):
+        level = model.level_at(closed)
+        rows = in_base @ level.vectors
+        return Acting(force * rows[0], force * _reactions(level, in_base, rows)[:, 0])
+
+    return acting
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_force_on_the_modes_of_every_level_is_a_load(case):
+    structure, contacts, force, at = CASES[case]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    velocity = np.linspace(-1.0, -0.5, structure.n)
+    native = mp.simulate(model, T_END, velocity=velocity, loads=[mp.ConstantLoad(at, force)])
+    motion = Run(model, T_END, None, velocity).begun()
+    exact = ExactMotion(motion, motion.levels, "body")
+    exact.begin(0.0)
+    exact.hold(held(model, structure.row(at), force), None)
+    found = exact.advance(motion.static_state, 0.0, T_END)
+    assert len(native.events) >= 3
+    assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
+    assert [e.time for e in found.events] == pytest.approx([e.time for e in native.events], rel=1e-10)
+    assert [e.impulse for e in found.events] == pytest.approx([e.impulse for e in native.events], rel=1e-9, abs=1e-12)
+    ours = model.base.modes.shapes @ found.state.level.configuration(found.state.displacement)
+    theirs = native.displacement(T_END)
+    assert np.max(np.abs(ours - theirs)) < 1e-10 * np.max(np.abs(theirs))
+
+
+@pytest.mark.parametrize("case", ["compliant", "two rigid"])
+def test_forces_may_change_on_the_way_and_a_trial_leaves_no_trace(case):
+    structure, contacts, force, at = CASES[case]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    velocity = np.linspace(-1.0, -0.5, structure.n)
+    loads = [mp.SampledLoad(at, [0.0, 3.0, np.nextafter(3.0, 4.0), T_END], [force, force, -force / 2, -force / 2])]
+    native = mp.simulate(model, T_END, velocity=velocity, loads=loads)
+    motion = Run(model, T_END, None, velocity).begun()
+    exact, row = ExactMotion(motion, motion.levels, "body"), structure.row(at)
+    exact.begin(0.0)
+    exact.hold(held(model, row, force), None)
+    exact.advance(motion.static_state, 0.0, 3.0, stop=True, trial=True)
+    first = exact.advance(motion.static_state, 0.0, 3.0)
+    exact.hold(held(model, row, -force / 2), None)
+    then = exact.advance(first.state, 3.0, T_END)
+    times = [event.time for event in (*first.events, *then.events)]
+    assert times == pytest.approx([event.time for event in native.events], rel=1e-8)
+    ours = model.base.modes.shapes @ then.state.level.configuration(then.state.displacement)
+    assert np.max(np.abs(ours - native.displacement(T_END))) < 1e-7 * np.max(np.abs(ours))
+
+
+def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
+    structure, contacts, force, at = CASES["rigid"]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
+    exact = ExactMotion(motion, motion.levels, "body")
+    exact.begin(0.0)
+    exact.hold(held(model, structure.row(at), force), None)
+    reached = exact.advance(motion.static_state, 0.0, T_END, stop=True)
+    assert reached.changed
+    assert {event.time for event in reached.events} == {reached.time}
+    level = model.level_at(())
+    assert level.gap_rows[0] @ reached.before[1] < 0
+    assert 0.1 + level.gap_rows[0] @ reached.before[0] == pytest.approx(0.0, abs=1e-12)
+    assert not math.isclose(reached.state.kinetic, 0.5 * reached.before[1] @ reached.before[1])
+
+
+def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
+    structure, contacts, force, at = CASES["two rigid"]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    found = []
+    for limit in (level_arrays.ARRAY_BYTES, 0):
+        monkeypatch.setattr(level_arrays, "ARRAY_BYTES", limit)
+        monkeypatch.setattr(level_arrays, "FEWEST_LEVELS", 0)
+        motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
+        exact, state, events = ExactMotion(motion, motion.levels, "body"), motion.static_state, []
+        exact.begin(0.0)
+        for k in range(6):
+            exact.hold(held(model, structure.row(at), force), None)
+            reached = exact.advance(state, float(k), float(k + 1))
+            state = reached.state
+            events += reached.events
+        found.append((state, events))
+    (one, before), (other, after) = found
+    assert [event.time for event in before] == [event.time for event in after]
+    np.testing.assert_array_equal(one.displacement, other.displacement)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bodies_that_take_turns_move_as_each_one_alone(case):
+    """They share arrays, with a third one that fails on the way; some have forces, some masses on their points."""
+    structure, contacts, force, at = CASES[case]
+    row = structure.row(at)
+
+    def body(model, size):
+        velocity = np.linspace(-1.0, -0.5, structure.n)
+        motion = Run(model, T_END, None, velocity).begun()
+        in_base = row[None, :] @ model.base.modes.shapes
+        attached = AttachedInertia(np.array([[0.7]]), np.eye(1))
+        inertia = PointInertia(attached, model.base, in_base, lambda closed: in_base @ model.level_at(closed).vectors)
+        exact, events, state = ExactMotion(motion, motion.levels, "body"), [], motion.static_state
+        exact.begin(0.0)
+        for k in range(30):
+            t = 0.2 * k
+            exact.hold(held(model, row, size * force * (1 - t / T_END)), inertia if size > 1 else None)
+            exact.advance(state, t, t + 0.2, trial=True)
+            reached = exact.advance(state, t, t + 0.2)
+            state = reached.state
+            events += reached.events
+            yield state.displacement, state.velocity, [event.time for event in events]
+
+    def model():
+        return mp.MultiPhiModel(structure, contacts, modes="all")
+
+    shared, sizes = model(), (0.5, 1.0, 1.5)
+    together = zip(*(body(shared, size) for size in sizes), strict=True)
+    apart = zip(*(body(model(), size) for size in sizes), strict=True)
+    broken = body(shared, math.nan)
+    for k, (found, expected) in enumerate(zip(together, apart, strict=True)):
+        for ours, theirs in zip(found, expected, strict=True):
+            assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+        if k == 3:
+            with pytest.raises(mp.MultiPhiError, match="not finite"):
+                next(broken)
+    assert all(len(events) >= 3 for *_, events in found)
+
+
+def test_chatter_is_that_of_one_body_alone(monkeypatch):
+    """The ring of the chatter check goes with the body."""
+    structure, contacts, force, at = CASES["rigid"]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    monkeypatch.setattr(chatter, "CHATTER_WINDOW", 4)
+    monkeypatch.setattr(chatter, "EVENTS_PER_PERIOD", 2)
+    bodies = []
+    for _ in range(3):
+        motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
+        bodies.append((ExactMotion(motion, motion.levels, "body"), motion.static_state))
+        bodies[-1][0].begin(0.0)
+    for exact, state in bodies:
+        exact.hold(held(model, structure.row(at), force), None)
+        assert len(exact.advance(state, 0.0, 2.0).events) == 2
+
+
+def test_a_failure_says_whose_it_is_and_when():
+    structure, contacts, _, at = CASES["rigid"]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
+    exact = ExactMotion(motion, motion.levels, "body 'beam'")
+    exact.begin(0.0)
+    exact.hold(held(model, structure.row(at), math.nan), None)
+    with pytest.raises(mp.MultiPhiError, match=r"body 'beam': at t = 0\.5 s: the motion is not finite"):
+        exact.advance(motion.static_state, 0.5, T_END)
+
+
+def test_plain_functions_do_the_same(monkeypatch):
+    structure, contacts, force, at = CASES["rigid"]
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    found = []
+    for plain in (False, True):
+        if plain:
+            monkeypatch.setattr(exact_motion, "carry", advance)
+        motion = Run(model, 2.0, None, np.full(structure.n, -1.0)).begun()
+        exact = ExactMotion(motion, motion.levels, "body")
+        exact.begin(0.0)
+        exact.hold(held(model, structure.row(at), force), None)
+        found.append(exact.advance(motion.static_state, 0.0, 2.0))
+    assert [event.time for event in found[0].events] == pytest.approx([event.time for event in found[1].events])
+    np.testing.assert_allclose(found[0].state.displacement, found[1].state.displacement, rtol=1e-12)

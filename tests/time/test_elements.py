@@ -1,0 +1,255 @@
+"""Elements given by their states alone run in the loop: dry friction, of which the package knows nothing.
+
+Exact answers: a block's free decay, the hysteresis loop of a Jenkins element, the period of a block on a belt, and the
+amplitude of J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931).
+"""
+
+import itertools
+import math
+import warnings
+
+import numpy as np
+import pytest
+import scipy.integrate
+from friction_elements import Slider
+from numpy.testing import assert_allclose
+from small_structures import chain, random_structure, stop
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth
+from reference_models.rig import rig_beam, rig_damping
+
+
+def block(*elements, stiffness=4.0):
+    structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
+    return mp.MultiPhiModel(structure, elements, modes="all")
+
+
+def friction(run, name, t):
+    """T (k,): less the force of the link, or less the push."""
+    i = run.model.index(name)
+    states = run.model.contacts[i].states
+    segments = [next(s for s in run.segments if s.start <= time <= s.end) for time in t]
+    pushes = np.array([states[segment.level.states[i]].push for segment in segments])
+    return -run.contact_force(name, t) - pushes
+
+
+def kinds(run):
+    return [event.kind for event in run.events]
+
+
+class TestFreeDecay:
+    """m 1, k 4, F .1 from x0 .33: 2 F/k are lost in each of 7 half cycles of pi/2, then it rests at .02."""
+
+    def test_of_a_block_with_a_coulomb_limit_is_exact(self):
+        run = mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[0.33])
+        assert run.status == "ok"
+        assert_allclose([e.time for e in run.events], math.pi / 2 * np.repeat(range(8), 2)[1:-1], rtol=0, atol=1e-13)
+        assert kinds(run) == [*itertools.islice(itertools.cycle(["slip", "stick"]), 14)]
+        turns = [0.33 - 0.05 * n for n in range(8)] * np.array([1, -1] * 4)
+        assert_allclose(run.at("m", math.pi / 2 * np.arange(8)), turns, rtol=0, atol=1e-14)
+        assert run.at("m", 20.0) == run.at("m", 11.0) == pytest.approx(0.02, abs=1e-15)
+        assert run.velocity(20.0) == 0.0
+
+    def test_of_a_mirrored_block_is_mirrored(self):
+        runs = [mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[x]) for x in (0.33, -0.33)]
+        assert [e.time for e in runs[0].events] == [e.time for e in runs[1].events]
+        t = np.linspace(0, 20, 101)
+        assert np.array_equal(runs[0].at("m", t), -runs[1].at("m", t))
+
+    def test_loses_the_limit_times_the_way_slipped(self):
+        run = mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[0.33])
+        way = sum(2 * (0.33 - 0.05 * n) - 0.05 for n in range(7))
+        assert run.ledger.initial - run.ledger.final == pytest.approx(0.1 * way, rel=1e-13)
+
+
+def test_below_its_limit_a_block_holds_for_ever():
+    run = mp.simulate(block(Slider("floor", "m", 0.1)), 1000.0, loads=[mp.HarmonicLoad("m", 0.0999, 1.0)])
+    assert not run.events
+    assert np.all(run.at("m", np.linspace(0, 1000.0, 101)) == 0.0)
+
+
+@pytest.mark.parametrize(("beta", "share", "expected"), [(0.7, 0.5, 1.744253936249), (0.5, 0.3, 1.333333333333)])
+def test_den_hartogs_amplitude_is_reached(beta, share, expected):
+    """m x'' + k x + F sign x' = k a cos, F = share k a: from the exact steady state at its turning point."""
+    v, u = 1 / (1 - beta**2), math.sin(math.pi / beta) / (beta * (1 + math.cos(math.pi / beta)))
+    amplitude = math.sqrt(v**2 - (share * u) ** 2)
+    assert amplitude == pytest.approx(expected, abs=1e-11)
+    phase = math.acos(amplitude / v)
+    model = block(Slider("floor", "m", share), stiffness=1.0)
+    run = mp.simulate(
+        model,
+        4 * math.pi / beta,
+        displacement=[amplitude],
+        loads=[mp.HarmonicLoad("m", 1.0, beta / (2 * math.pi), phase)],
+    )
+    turns = run.at("m", math.pi / beta * np.arange(5))
+    assert_allclose(turns, amplitude * np.array([1, -1, 1, -1, 1]), rtol=1e-12)
+
+
+class TestJenkinsElement:
+    """Moved to and fro by a rigid shaker, to which a load presses the block: x = X cos(W t)."""
+
+    reach, limit, stiffness, hertz = 0.3, 2.0, 25.0, 0.7
+
+    def run(self, periods):
+        element = Slider("ring", "m", self.limit, self.stiffness)
+        loads = [mp.ConstantLoad("m", -100.0), mp.StopMotion("shaker", Harmonic(self.reach, self.hertz))]
+        model = block(stop("m", 0.0, name="shaker"), element)
+        return mp.simulate(model, periods / self.hertz, displacement=[self.reach], loads=loads)
+
+    def test_has_the_exact_loop(self):
+        run, period, (nodes, weights) = self.run(3), 1 / self.hertz, np.polynomial.legendre.leggauss(20)
+        assert run.status == "ok"
+        assert kinds(run)[-4:] == ["stick", "slip", "stick", "slip"]
+        area = 0.0
+        for part in (s for s in run.segments if s.start >= 2 * period - 1e-9 and s.end > s.start):
+            t = part.start + (part.end - part.start) * (nodes + 1) / 2
+            assert_allclose(run.at("m", t), self.reach * np.cos(2 * math.pi * self.hertz * t), rtol=0, atol=1e-13)
+            power = friction(run, "ring", t) * np.array([run.velocity(time)[0] for time in t])
+            area += float(weights @ power) * (part.end - part.start) / 2
+        assert area == pytest.approx(4 * self.limit * (self.reach - self.limit / self.stiffness), rel=1e-12)
+
+    def test_slips_where_its_spring_has_given_way(self):
+        run, w = self.run(2), 2 * math.pi * self.hertz
+        first, way = self.limit / self.stiffness, 2 * self.limit / self.stiffness
+        starts = [
+            math.acos(1 - first / self.reach),
+            *(math.pi * n + math.acos(1 - way / self.reach) for n in (1, 2, 3)),
+        ]
+        assert_allclose([e.time for e in run.events if e.kind == "slip"], np.array(starts) / w, rtol=1e-12)
+        sticks = [e.time for e in run.events if e.kind == "stick"]
+        assert_allclose(sticks, np.arange(1, len(sticks) + 1) / 2 / self.hertz, rtol=1e-12)
+
+
+def test_a_block_on_a_belt_has_its_period():
+    """m 1, k 25, V .3, N 10, limits .2 and .35: stick-slip of 1.3424777960769378 s."""
+    floor = Slider("belt", "m", 2.0, static_limit=3.5)
+    run = mp.simulate(
+        block(floor, stiffness=25.0),
+        12.0,
+        loads=[mp.StopMotion("belt", Smooth(lambda t: 0.3 * t))],
+    )
+    slips = [e.time for e in run.events if e.kind == "slip"]
+    assert len(slips) == 9
+    assert_allclose(np.diff(slips), 1.3424777960769378, rtol=1e-11)
+
+
+class TestChain:
+    """Five masses, two Jenkins elements, a harmonic load: against an integrator that knows the law only."""
+
+    sliders = (Slider("left", "m1", 0.4, 30.0), Slider("right", {"m3": 1.0, "m2": -1.0}, 0.25, 12.0))
+
+    def model(self, modes="all"):
+        return mp.MultiPhiModel(chain(5, stiffness=9.0), self.sliders, modes=modes)
+
+    def test_moves_as_an_integrator_says(self):
+        load = mp.HarmonicLoad("m4", 1.3, 0.31)
+        run = mp.simulate(self.model(), 30.0, loads=[load])
+        assert run.status == "ok"
+        expected, turns = integrated(self.model(), self.sliders, lambda t: 1.3 * math.cos(2 * math.pi * 0.31 * t), 30.0)
+        assert len(run.events) == len(turns) > 20
+        assert_allclose([e.time for e in run.events], turns, rtol=0, atol=1e-9)
+        assert_allclose(run.displacement(30.0), expected[:5], rtol=0, atol=1e-10)
+
+
+class TestStiffSprings:
+    """Stick and slip are told apart by more than round-off, however stiff the spring beside the structure's."""
+
+    def run(self, seed, stiffness, t_end=5.0):
+        n, mass, springs, _, random = random_structure(seed)
+        structure = mp.LinearStructure(mass, springs, points={f"m{i}": i for i in range(n)})
+        places = random.permutation(n)
+        sliders = [
+            Slider("one", {f"m{places[0]}": 1.0}, 0.3, stiffness),
+            Slider("two", {f"m{places[1]}": 1.0, f"m{places[2]}": -1.0}, 0.1, stiffness),
+        ]
+        load = mp.HarmonicLoad(f"m{n - 1}", 2.0, 0.3)
+        return mp.simulate(mp.MultiPhiModel(structure, sliders, modes="all"), t_end, loads=[load])
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_tend_to_rigid_stick(self, seed):
+        t = np.linspace(0, 5, 201)
+        rigid, *sprung = (self.run(seed, k) for k in (math.inf, 1e5, 1e7, 1e9))
+        assert len(rigid.events) > 2
+        size = np.max(np.abs(rigid.displacement(t)))
+        errors = [np.max(np.abs(run.displacement(t) - rigid.displacement(t))) / size for run in sprung]
+        assert all(run.status == "ok" for run in (rigid, *sprung))
+        assert errors[0] < 1e-2
+        assert errors[2] < 0.02 * errors[0]
+
+
+class TestTruncatedBeam:
+    """The rig's beam with a friction ring: few modes of every state's own suffice."""
+
+    @pytest.mark.parametrize(("stiffness", "bounds"), [(1e5, (0.1, 0.01, 1e-3)), (math.inf, (1.0, 0.2, 0.05))])
+    def test_converges(self, stiffness, bounds):
+        beam = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
+        t, found = np.linspace(0, 0.3, 601), []
+        for modes in ("all", 6, 8, 12):
+            model = mp.MultiPhiModel(beam, [Slider("ring", "node2", 0.6, stiffness)], modes=modes)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                run = mp.simulate(model, 0.3, loads=[mp.HarmonicLoad("node3", 0.5, 10.0)])
+            assert run.status == "ok"
+            found.append(run.at("node3", t))
+        errors = [100 * np.linalg.norm(y - found[0]) / np.linalg.norm(found[0]) for y in found[1:]]
+        assert np.all(np.array(errors) < bounds)
+
+
+class TestModel:
+    def model(self):
+        return mp.MultiPhiModel(chain(3), [Slider("ring", "m1", 0.3), stop("m2")], modes="all")
+
+    def test_levels_are_named_by_states(self):
+        model = self.model()
+        assert model.level({"stop": "closed", "ring": "slip+"}) is model.level(("stop",))
+        assert model.level({"ring": "slip+"}) is model.level({"ring": "slip-"}) is model.level(())
+        assert model.level({}).closed == ("ring",)
+        assert model.levels_possible == 6
+        with pytest.raises(mp.MultiPhiValueError, match="state of 'ring': got 'open', need one of: stick, slip"):
+            model.level({"ring": "open"})
+
+    def test_what_knows_contacts_alone_refuses_other_elements(self):
+        load = mp.HarmonicLoad("m1", 1.0, 1.0)
+        for asked in (lambda m: m.static_equilibrium({"m1": 1.0}), lambda m: mp.steady_state(m, load)):
+            with pytest.raises(mp.MultiPhiValueError, match="got the elements ring, need contacts and force laws"):
+                asked(self.model())
+
+
+def integrated(model, sliders, force, t_end):
+    """State (x, x', T) at the end and the times of all changes, by DOP853 from event to event."""
+    structure = model.structure
+    mass, stiffness = np.asarray(structure.mass), np.asarray(structure.stiffness)
+    rows = np.array([structure.row(slider.direction) for slider in sliders])
+    n, slips, t = len(mass), [0] * len(sliders), 0.0
+    state, changes = np.zeros(2 * n + len(sliders)), []
+
+    def slope(t, z):
+        x, v, tension = z[:n], z[n : 2 * n], z[2 * n :]
+        load = np.zeros(n)
+        load[-1] = force(t)
+        rates = [0.0 if slip else s.stiffness * (row @ v) for s, slip, row in zip(sliders, slips, rows, strict=True)]
+        return np.concatenate([v, np.linalg.solve(mass, load - stiffness @ x - rows.T @ tension), rates])
+
+    def signal(e, slip, sign):
+        if slip:
+            return lambda t, z: slip * (rows[e] @ z[n : 2 * n])
+        return lambda t, z: sliders[e].limit - sign * z[2 * n + e]
+
+    while True:
+        watched = [(e, slip, sign) for e, slip in enumerate(slips) for sign in ((1,) if slip else (1, -1))]
+        events = [signal(*given) for given in watched]
+        for event in events:
+            event.terminal, event.direction = True, -1.0
+        found = scipy.integrate.solve_ivp(
+            slope, (t, t_end), state, "DOP853", events=events, rtol=1e-12, atol=1e-13, max_step=0.05
+        )
+        t, state = found.t[-1], found.y[:, -1]
+        if found.status == 0:
+            return state, changes
+        k = next(k for k, times in enumerate(found.t_events) if len(times))
+        e, slip, sign = watched[k]
+        slips[e] = 0 if slip else sign
+        state[2 * n + e] = slip * sliders[e].limit if slip else sign * sliders[e].limit
+        changes.append(t)

@@ -1,0 +1,171 @@
+"""States of many segments of a run at once: those that each segment has in closed form, whoever has the arrays."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from small_structures import chain
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.events import level_arrays
+from multiphi_exudyn.time import record, segment
+from multiphi_exudyn.time.simulate import Run
+
+STOPS = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
+START = np.array([0.1, 0.2, -0.3])
+LOADS = {
+    "no load": [],
+    "constant": [mp.ConstantLoad("m1", 0.5)],
+    "harmonic": [mp.HarmonicLoad("m1", 2.0, 0.3, 0.4)],
+    "samples": [mp.SampledLoad("m1", np.linspace(0.0, 4.0, 81), np.cos(np.linspace(0.0, 9.0, 81)))],
+    "moving stop": [mp.StopMotion("below", mp.Harmonic(0.05, 0.7))],
+    "two carriers": [mp.HarmonicLoad("m1", 2.0, 0.3, 0.4), mp.HarmonicLoad("m0", 1.0, 3.0)],
+}
+
+
+def model(damping=None, contacts=STOPS):
+    return mp.MultiPhiModel(chain(3, damping=damping, stiffness=10.0), contacts, modes="all")
+
+
+def each(run, places, after, derivative):
+    """xi or xi' (k, n) of single segments, by their closed form in NumPy."""
+    own = [run.segments[i] for i in places]
+    return [s.modal(s.start + t[None], derivative)[:, 0] for s, t in zip(own, after, strict=True)]
+
+
+def assert_states_of_segments(run):
+    """At the start, the end and five times between of every segment, segments in no order."""
+    own = segment.listed(run.segments)
+    places = np.random.default_rng(1).permutation(np.repeat(np.arange(len(own)), 7))
+    after = (own.ends - own.starts)[places] * np.random.default_rng(2).choice(np.linspace(0, 1, 7), len(places))
+    found = own.states(places, after)
+    for derivative in range(2):
+        for have, expected in zip(found[derivative], each(run, places, after, derivative), strict=True):
+            assert_allclose(have[: len(expected)], expected, rtol=0, atol=1e-12)
+            assert not np.any(have[len(expected) :])
+
+
+@pytest.mark.parametrize("damping", [None, mp.ModalDamping([0.02, 0.01, 0.03]), np.diag([0.1, 0.05, 0.2])])
+@pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
+def test_states_of_many_segments_together_are_those_of_each(loads, damping):
+    run = mp.simulate(model(damping), 5.0, displacement=START, loads=loads)
+    assert run.status == "ok"
+    assert len(run.events) > 2
+    assert_states_of_segments(run)
+
+
+def test_pieces_of_a_harmonic_so_short_that_it_is_a_polynomial_there():
+    """Its powers have shapes of their own."""
+    run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, loads=LOADS["harmonic"])
+    assert any(not each.basis.pure for each in run.segments)
+    assert_states_of_segments(run)
+
+
+def test_resonance():
+    omega = float(model(contacts=()).level(()).omega[1])
+    load = mp.HarmonicLoad("m1", 2.0, omega / (2 * math.pi))
+    assert_states_of_segments(mp.simulate(model(contacts=()), 20.0, loads=[load]))
+
+
+def test_rigid_stops():
+    stops = [mp.UnilateralContact("below", "m2", 0.1), mp.UnilateralContact("above", {"m0": -1.0}, 0.15)]
+    assert_states_of_segments(mp.simulate(model(contacts=stops), 5.0, loads=LOADS["harmonic"]))
+
+
+GRIDS = {
+    "even": np.linspace(0.0, 5.0, 4001),
+    "even, coarse": np.linspace(0.2, 4.9, 23),
+    "any": np.sort(np.random.default_rng(3).uniform(0.0, 5.0, 300)),
+    "in no order": np.random.default_rng(4).uniform(0.0, 5.0, 300),
+    "descending": np.linspace(5.0, 0.0, 301),
+    "one": np.array([2.5]),
+}
+
+
+@pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
+class TestPlacesGapsAndForces:
+    @pytest.fixture
+    def run(self, loads):
+        return mp.simulate(model(np.diag([0.1, 0.05, 0.2])), 5.0, displacement=START, loads=loads)
+
+    @pytest.mark.parametrize("times", GRIDS.values(), ids=GRIDS)
+    def test_are_those_of_each_segment(self, run, times):
+        own = segment.listed(run.segments)
+        places = own.owners(times)
+        expected = [(run.segments[i], np.array([t])) for i, t in zip(places, times, strict=True)]
+        vector = run.model.base.modes.shapes.T @ run.model.structure.row("m1")
+        for i, name in enumerate(("below", "above")):
+            assert_allclose(run.gap(name, times), [s.gaps(i, t)[0] for s, t in expected], rtol=0, atol=1e-12)
+            forces = [s.force(i, t)[0] for s, t in expected]
+            assert_allclose(run.contact_force(name, times), forces, rtol=0, atol=50 * 1e-12)
+        found = [vector @ s.level.configuration(s.modal(t))[:, 0] for s, t in expected]
+        assert_allclose(run.at("m1", times), found, rtol=0, atol=1e-12)
+
+    def test_at_an_event_are_those_of_either_side(self, run):
+        times = np.array([event.time for event in run.events])
+        right, left = (run.contact_force("below", times, side) for side in ("right", "left"))
+        for k, t in enumerate(times):
+            after = run.segments[int(np.flatnonzero(segment.listed(run.segments).starts <= t)[-1])]
+            before = run.segments[int(np.flatnonzero(segment.listed(run.segments).starts < t)[-1])]
+            assert right[k] == pytest.approx(after.force(0, times[k : k + 1])[0], abs=1e-10)
+            assert left[k] == pytest.approx(before.force(0, times[k : k + 1])[0], abs=1e-10)
+
+
+class TestWhateverHappensToTheArraysOfTheLoop:
+    @pytest.fixture(params=["constant", "harmonic", "samples"])
+    def loads(self, request):
+        return LOADS[request.param]
+
+    @staticmethod
+    def asked(run):
+        own = segment.listed(run.segments)
+        times = np.linspace(0.0, run.t_end, 50)
+        places = own.owners(times)
+        return own.states(places, times - own.starts[places])
+
+    def test_a_pickled_run_has_the_same_states(self, loads):
+        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
+        again = pickle.loads(pickle.dumps(run))
+        assert_array_equal(self.asked(again), self.asked(run))
+
+    def test_another_run_of_the_model_does_not_matter(self, loads):
+        own = model()
+        run = mp.simulate(own, 5.0, displacement=START, loads=loads)
+        expected = self.asked(run)
+        mp.simulate(own, 5.0, displacement=2 * START, loads=loads)
+        assert_array_equal(self.asked(run), expected)
+
+    def test_arrays_that_have_begun_anew_do_not_matter(self, loads):
+        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
+        expected = self.asked(run)
+        run.segments.arrays.forget()
+        assert_array_equal(self.asked(run), expected)
+
+    def test_levels_that_do_not_fit_together_are_packed_in_turn(self, loads, monkeypatch):
+        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
+        expected = self.asked(run)
+        for limit in ("ARRAY_BYTES", "FEWEST_LEVELS"):
+            monkeypatch.setattr(level_arrays, limit, 0)
+        assert_array_equal(self.asked(run), expected)
+        assert len(run.segments.levels) > len(run.segments.arrays.loaded)
+
+    def test_a_run_under_way_goes_on_as_if_nobody_had_asked(self, loads):
+        def motion():
+            return Run(model(), 5.0, START, None, loads).begun()
+
+        once, twice = motion(), motion()
+        once.advance(5.0)
+        for end in (1.3, 2.9, 5.0):
+            twice.advance(end)
+            self.asked(twice.trajectory(end))
+        assert_allclose(
+            [e.time for e in twice.trajectory(5.0).events], [e.time for e in once.trajectory(5.0).events], rtol=1e-12
+        )
+
+    def test_plain_python_gives_the_same(self, loads, monkeypatch):
+        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
+        expected = self.asked(run)
+        monkeypatch.setattr(record, "states_of", record.states_of.function)
+        assert_allclose(self.asked(run), expected, rtol=0, atol=1e-13)
