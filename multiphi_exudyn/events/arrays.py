@@ -115,7 +115,7 @@ MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
 MAP_SIZES = 4  # of a map from the base: |y| that a level's rest has, and for w = 1 its channels, (q + 1,)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 
-LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
+LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)
 STATE_INTS = 8
 
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves

@@ -151,7 +151,7 @@ def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         ints[ints[AGAIN] + i] = 0
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
         exit_ = exits + k * EXIT_INTS
-        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL) < 0:
+        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL, 0.0) < 0:
             ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
             asking = 1
     ints[CHANGE_COUNT] = 0

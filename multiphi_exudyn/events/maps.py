@@ -14,6 +14,7 @@ from multiphi_exudyn.events.arrays import (
     MAP_ENTRY,
     MAP_SLOTS,
     MAP_TERMS,
+    MAPPED,
     MAPS,
     MATRIX,
     MODES,
@@ -99,20 +100,19 @@ def find_map(ints: Ints, source: int, target: int) -> int:
 def move_part(
     ints: Ints, numbers: Numbers, way: int, rates: int, given: int, target: int, n: int, result: int, sizes: int
 ) -> None:
-    """xi (rates 0) or xi' (rates 1) of a level with n coordinates in level ``target``.
+    """xi (rates 0) or xi' (rates 1) of a level with n coordinates in level ``target``, and the sizes of its terms.
 
-    sizes: of their terms; a map that sets places knows the terms of which its numbers are sums.
+    A map that sets places knows the terms of which its own numbers are sums.
     """
     matrix, offset = ints[way + MATRIX], ints[way + OFFSET]
     if rates == 1:
         matrix, offset = ints[way + RATE_MATRIX], ints[way + RATE_OFFSET]
     for i in range(ints[target + MODES] + ints[CHANNELS]):
-        total = numbers[offset + i] if offset >= 0 else 0.0
-        row, terms, size = matrix + i * n, ints[way + MAP_TERMS] + i * (n + 1), abs(total)
+        total, row = numbers[offset + i] if offset >= 0 else 0.0, matrix + i * n
+        size, terms = abs(total), row
         if ints[way + MAP_TERMS] >= 0:
+            terms = ints[way + MAP_TERMS] + i * (n + 1)
             size = numbers[terms + n]
-        else:
-            terms = row
         for j in range(n):
             total += numbers[row + j] * numbers[given + j]
             size += abs(numbers[terms + j] * numbers[given + j])
@@ -124,7 +124,8 @@ def move_part(
 def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, result: int) -> int:
     """xi of the state ``places`` and xi' of ``speeds``, of the same instant, as a state of a level; OK or NEED.
 
-    The sizes of the map's terms belong to the scales: a mode that then hardly moves has the round-off of those that do.
+    The sizes of the map's terms are kept for the decisions of this instant: a mode that then hardly moves has the
+    round-off of those that did. Where the map sets places, they belong to the scales of the motion that follows too.
     """
     here, there = ints[places + LEVEL], ints[speeds + LEVEL]
     way = find_map(ints, here, level)
@@ -140,7 +141,10 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
     move_part(ints, numbers, way, 1, ints[speeds + SPEED], level, ints[there + MODES] + channels, v, slopes)
     ints[result + LEVEL] = level
     measure(ints, numbers, result)
+    sets_places = ints[way + MAP_TERMS] >= 0
     for i in range(ints[level + MODES]):
-        numbers[ints[result + REACH] + i] += numbers[sizes + i]
-        numbers[ints[result + SWING] + i] += numbers[slopes + i]
+        numbers[ints[result + MAPPED] + i] = numbers[sizes + i]
+        if sets_places:
+            numbers[ints[result + REACH] + i] += numbers[sizes + i]
+            numbers[ints[result + SWING] + i] += numbers[slopes + i]
     return 0

@@ -48,7 +48,7 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
 )
 from multiphi_exudyn.events.flow import expand, signal_sizes, signal_waves
-from multiphi_exudyn.events.signals import held_part, rate_sign, row_sign
+from multiphi_exudyn.events.signals import held_part, mapped_terms, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.zero_crossing import first_sign
 from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER
@@ -71,7 +71,7 @@ __all__ = [
 def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
     """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
     signal = exit_ + SIGNAL
-    value = row_sign(ints, numbers, state, signal)
+    value = row_sign(ints, numbers, state, signal, mapped_terms(ints, numbers, state, exit_))
     if value > 0:
         return ARMED
     rate = rate_sign(ints, numbers, state, signal)
@@ -180,7 +180,7 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
         element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
         back = ints[exit_ + FIRMNESS] == ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
         back = back and ints[phase] == REFUSED and ints[ints[KINDS] + element] != RIGID
-        if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL) == 0:
+        if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0:
             ints[phase] = ARMED
 
 

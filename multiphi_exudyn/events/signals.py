@@ -8,22 +8,26 @@ from __future__ import annotations
 from multiphi_exudyn.events.arrays import (
     ACCELERATION,
     CHANNELS,
+    FIRMNESS,
     GAPS,
     LEVEL,
+    MAPPED,
     MODES,
     PLACE,
     PRESCRIBED,
     RATED,
     REACH,
     ROW,
+    SIGNAL,
     SPEED,
     SWING,
 )
 from multiphi_exudyn.events.state_arrays import accelerate
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
 
-__all__ = ["gap", "held_part", "rate_sign", "row_sign", "sign_of"]
+__all__ = ["gap", "held_part", "mapped_terms", "rate_sign", "row_sign", "sign_of"]
 
 
 @compiled
@@ -35,21 +39,35 @@ def sign_of(value: float, size: float) -> int:
 
 
 @compiled
-def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
+def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float) -> int:
     """9. Sign of a signal, zero where it is round-off of its terms.
 
     At the root of a signal all displacements, or velocities, may be round-off of what they were before: |eta'| / omega
-    and omega |eta| count too.
+    and omega |eta| count too. terms: what else the signal is a sum of.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
     value = numbers[row + 2 * n]
-    size = abs(value)
+    size = abs(value) + terms
     for i in range(n):
         term = numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i]
         value += term
         size += abs(term) + abs(numbers[row + i]) * numbers[reach + i] + abs(numbers[row + n + i]) * numbers[swing + i]
     return sign_of(value, size)
+
+
+@compiled
+def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
+    """Of which terms the transition that has made a state has made an exit's signal, where it is a reaction, else zero.
+
+    The displacements of two levels may be large where what presses on a contact is small; a gap is the same in both.
+    """
+    if ints[exit_ + FIRMNESS] != ALWAYS_TAKEN:
+        return 0.0
+    row, mapped, total = ints[exit_ + SIGNAL + ROW], ints[state + MAPPED], 0.0
+    for i in range(ints[ints[state + LEVEL] + MODES]):
+        total += abs(numbers[row + i]) * numbers[mapped + i]
+    return total
 
 
 @compiled

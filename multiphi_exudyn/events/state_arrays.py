@@ -3,7 +3,8 @@
     eta'' = motion . (xi, xi', 1)                                                     (38.3)
 
 The scales of a state are how far its speeds carry the modes, |eta'| / omega, and how fast its displacements make them,
-omega |eta|: to them belongs the round-off of a motion.
+omega |eta|: to them belongs the round-off of a motion. A state that a transition has made has the round-off of the
+terms of the map as well, at that instant.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     EXIT_COUNT,
     FREQUENCIES,
     LEVEL,
+    MAPPED,
     MODES,
     MOTION,
     PERIODS,
@@ -60,6 +62,8 @@ def measure(ints: Ints, numbers: Numbers, state: int) -> None:
         numbers[reach + i] = abs(numbers[v + i]) * numbers[ints[level + PERIODS] + i]
         numbers[swing + i] = abs(numbers[x + i]) * numbers[ints[level + FREQUENCIES] + i]
     sizes = ints[DRIVE] + 3 * q
+    for i in range(r + ints[CHANNELS]):
+        numbers[ints[state + MAPPED] + i] = 0.0
     for k in range(ints[CHANNELS]):
         numbers[reach + r + k] = numbers[sizes + k] if k < q else 0.0
         numbers[swing + r + k] = numbers[sizes + q + k] if k < q else 0.0

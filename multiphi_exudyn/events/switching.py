@@ -121,7 +121,7 @@ def is_relaxing(ints: Ints, numbers: Numbers, waves: Waves, state: int, element:
     signal = entered_signal(ints, level, exit_)
     if signal < 0:
         return signal
-    sign = row_sign(ints, numbers, state, signal)
+    sign = row_sign(ints, numbers, state, signal, 0.0)
     if sign == 0:
         sign = becomes(ints, numbers, waves, state, signal, 0)
     return 1 if sign <= 0 else 0

@@ -49,11 +49,11 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.changes import NOBODY
 from multiphi_exudyn.events.flow import signal_waves
 from multiphi_exudyn.events.phases import entered_signal, is_end, mark_chains
-from multiphi_exudyn.events.signals import held_part
+from multiphi_exudyn.events.signals import held_part, mapped_terms
 from multiphi_exudyn.events.state_arrays import accelerate
 from multiphi_exudyn.mathematics.basis_arrays import differentiate
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.round_off import CLEAR
+from multiphi_exudyn.mathematics.round_off import CLEAR, ZERO
 from multiphi_exudyn.mathematics.zero_crossing import simultaneous
 
 __all__ = ["arm", "flag_again", "watch", "who_asks"]
@@ -104,7 +104,10 @@ def wait_for(
     rate: int,
     asks: int,
 ) -> int:
-    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1."""
+    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
+
+    A reaction that begins below zero by the round-off of the transition before begins at zero: so it was judged.
+    """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
     n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
@@ -118,9 +121,14 @@ def wait_for(
         accelerate(ints, numbers, CURRENT, ints[ACCELERATION])
         x, v, scale = ints[CURRENT + SPEED], ints[ACCELERATION], ints[CURRENT + SWING]
         constant, size = 0.0, 0.0
+    begins = sign * numbers[row + 2 * n]
     for i in range(n):
         size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
         size += abs(numbers[row + n + i]) * abs(numbers[v + i])
+        begins += sign * (numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i])
+    if rate == 0 and entered == 0 and begins < 0.0:
+        terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
+        constant -= begins if terms > 0.0 and abs(begins) <= ZERO * (size + terms) else 0.0
     if sign < 0.0:
         for j in range(p):
             waves[first + j] = -waves[first + j]
