@@ -14,7 +14,8 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
                                   the power of damping xi'.D xi', and of what varies (q, 4 n + 1), as in work.py;
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
-                                  that the element would have in the level entered alone, -1 while nobody needed it
+                                  that the element would have in the level entered alone, -1 while nobody needed it;
+                                  the speed on which the state asked for hangs, and the others
 signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
                                   are set, of which terms T and c are sums, (n_m, n_l + 1), else -1
@@ -22,7 +23,7 @@ state     ints[state ...]         level, where xi, xi' and their scales stand, t
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
           SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
-event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event)
+event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event), left
           EVENT_NUMBERS           time, five losses, impulse
 
 A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
@@ -105,10 +106,12 @@ ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
 DISSIPATION, POWER = 20, 21  # forms of the power of damping and of what varies, zero while nobody needed them
+STRETCHES, STRETCH_COUNT = 22, 23  # rows (s, n + 1) of stretches that go with the force of a link, and their number
 LEVEL_INTS = 24
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
-EXIT_INTS = 7
+TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then
+EXIT_INTS = 12
 ROW, WAVE, RATED = 0, 1, 2
 
 MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
@@ -119,10 +122,10 @@ LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
 STATE_INTS = 8
 
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
-CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
+CHANGE_WIDTH = 3  # ints: element, state entered or SHARED, state left
 SHARED = -1
 SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
-EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 7
 
 # ---------------------------------------------------------------------- answers
 

@@ -11,6 +11,7 @@ from multiphi_exudyn.events.arrays import (
     KINETIC,
     LEVEL,
     MODES,
+    OPEN,
     PATTERNS,
     PLACE,
     POTENTIAL,
@@ -18,6 +19,8 @@ from multiphi_exudyn.events.arrays import (
     STATES,
     STIFFNESSES,
     STRAIN,
+    STRETCH_COUNT,
+    STRETCHES,
     VISCOUS,
 )
 from multiphi_exudyn.events.signals import gap
@@ -62,6 +65,13 @@ def potential(ints: Ints, numbers: Numbers, state: int) -> float:
         for j in range(q):
             total += 0.5 * numbers[row + r + j] * numbers[x + r + j] * numbers[x + r + k]
         row += n
+    row = ints[level + STRETCHES]
+    for _ in range(ints[level + STRETCH_COUNT]):
+        stretch = numbers[row + n]
+        for i in range(n):
+            stretch += numbers[row + i] * numbers[x + i]
+        total += 0.5 * stretch * stretch
+        row += n + 1
     return total
 
 
@@ -89,10 +99,11 @@ def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float,
     relaxed = 0.0
     states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
-        if ints[ints[KINDS] + i] == VISCOUS and ints[states + i] != ints[later + i]:
+        opened, opens = ints[states + i] == OPEN, ints[later + i] == OPEN
+        if ints[ints[KINDS] + i] == VISCOUS and opened != opens:
             depth = gap(ints, numbers, before, i)
             stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
-            relaxed += stored if ints[states + i] > ints[later + i] else -stored
+            relaxed += stored if opens else -stored
     numbers[losses + KINETIC] += kinetic(ints, numbers, before) - kinetic(ints, numbers, after) - collided
     numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed
     numbers[losses + DAMPING] += relaxed

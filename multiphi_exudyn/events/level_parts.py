@@ -18,12 +18,14 @@ __all__ = ["base_parts", "from_base", "level_parts", "powers"]
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
     """Motion, gaps and energies of a level."""
     own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
-    motion = [-np.diag(modal.squares), channels.force, -modal.damping, channels.force_rate, level.asymptotic.drive]
+    stiffness, damping = np.diag(modal.squares) + modal.coupling, modal.damping_matrix
+    motion = [-stiffness, channels.force, -damping, channels.force_rate, level.asymptotic.drive]
     moved, patterns = channels.carried.T, level.excitation.patterns.T
     parts = {
         a.MOTION: np.column_stack(motion),
         a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
         a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
+        a.STRETCHES: form.stretches,
         a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
     }
     if own.speed_rows is not own.gap_rows:
@@ -64,7 +66,7 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
     springs = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
     held = springs * level.gap_constants[index]
-    worked = carried.T @ base.directions[:, index] - level.excitation.stops[index].T  # by their forces
+    worked = carried.T @ base.pushes[:, index] - level.excitation.stops[index].T  # by their forces
     placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
     placed[:, modal.modes :] -= carried.T @ patterns
     speed = worked @ drags + carried.T @ base.damping @ moved

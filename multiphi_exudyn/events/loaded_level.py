@@ -45,18 +45,24 @@ class StrainForm:
 
 @dataclass(frozen=True)
 class PotentialForm:
-    """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q)."""
+    """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q).
+
+    And 1/2 |stretches (xi, 1)|^2 (s, r + q + 1), of springs whose stretch goes with the force of a link.
+    """
 
     constant: float
     linear: np.ndarray
     squares: np.ndarray
     rows: np.ndarray
+    stretches: np.ndarray
 
     def __call__(self, xi: np.ndarray) -> float:
         r = len(self.squares)
         eta, w = xi[:r], xi[r:]
         mixed = w @ (self.rows[:, :r] @ eta + 0.5 * self.rows[:, r:] @ w)
-        return self.constant + float(self.linear @ xi + 0.5 * self.squares @ (eta * eta) + mixed)
+        stretched = self.stretches[:, :-1] @ xi + self.stretches[:, -1]
+        own = self.linear @ xi + 0.5 * self.squares @ (eta * eta) + 0.5 * stretched @ stretched
+        return self.constant + float(own + mixed)
 
 
 @dataclass(frozen=True)
@@ -169,8 +175,10 @@ class LoadedLevel:
         bent = np.linalg.qr(base.modes.omega[:, None] * motion, mode="r")
         gaps = np.column_stack([own.gap_rows[index], self.gap_constants[index]])
         given = np.flatnonzero(own.squares != own.computed)
-        rows = np.vstack([bent, gaps, np.eye(len(own.squares), motion.shape[1])[given]])
-        weights = [np.ones(len(bent)), base.stiffnesses[index], (own.squares - own.computed)[given]]
+        stretched = self.stretches
+        rows = np.vstack([bent, gaps, np.eye(len(own.squares), motion.shape[1])[given], stretched])
+        softer = (own.squares - own.computed)[given]
+        weights = [np.ones(len(bent)), base.stiffnesses[index], softer, np.ones(len(stretched))]
         linear = -(base.preload @ motion)
         constant = base.energy_offset + self.stored + float(linear[-1])
         return StrainForm(np.concatenate(weights), rows[:, :-1], rows[:, -1], linear[:-1], constant)
@@ -193,7 +201,26 @@ class LoadedLevel:
         load = base.modes.omega**2 * y - base.preload - static
         along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
         constant = rest.strain + self.stored - float(static @ y)
-        return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form)
+        return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form, self.stretches)
+
+    def stretch(self, element: int) -> tuple[np.ndarray, float]:
+        """What an element's held link keeps of its stretch [m] while it does not hold: row.xi + constant."""
+        own, given = self.level, self.level.base.contacts[element].states[self.states[element]]
+        if given.follows is None:
+            return np.zeros(own.modes), given.stretch
+        number, yielding = given.follows
+        k = own.indices.index(own.base.link_places[element][number])
+        return yielding * own.force_rows[k], given.stretch + yielding * float(self.asymptotic.forces[k])
+
+    @functools.cached_property
+    def stretches(self) -> np.ndarray:
+        """Rows (s, r + q + 1) of such stretches that go with the force of a link, times the root of their stiffness."""
+        rows, base = list[np.ndarray](), self.level.base
+        for i, (element, state) in enumerate(zip(base.contacts, self.states, strict=True)):
+            if element.states[state].follows is not None:
+                root = np.sqrt(next(link.stiffness for link in element.further if link.held))
+                rows.append(root * np.append(*self.stretch(i)))
+        return np.array(rows).reshape(-1, self.level.modes + 1)
 
     def configuration(self, displacement: np.ndarray) -> np.ndarray:
         """y (m, ...) in base coordinates."""

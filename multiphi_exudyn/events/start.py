@@ -18,7 +18,6 @@ from multiphi_exudyn.events.arrays import (
     ASKING,
     CHANGE_COUNT,
     CHANNELS,
-    CLOSE,
     COMPLIANT_KEY,
     COORDINATES,
     ELEMENTS,
@@ -154,7 +153,7 @@ def springs(ints: Ints, numbers: Numbers, state: int) -> float:
     """Strain energy [J] of the compliant contacts that are closed in the key of a state's level."""
     states, total = ints[ints[state + LEVEL] + STATES], 0.0
     for i in range(ints[ELEMENTS]):
-        if ints[states + i] == CLOSE:
+        if ints[states + i] != OPEN:
             depth = gap(ints, numbers, state, i)
             total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
     return total

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit, Link
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Friction"]
@@ -46,6 +46,7 @@ class Friction:
     gap: ClassVar[float] = 0.0
     damping: ClassVar[float] = 0.0
     held: ClassVar[bool] = True
+    further: ClassVar[tuple[Link, ...]] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -82,7 +83,7 @@ class Friction:
     def states(self) -> tuple[ElementState, ...]:
         """Stick, slip+ and slip- (element.py)."""
         exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")
-        return ElementState("stick", "stick", exits, holds=True), self._slip("+"), self._slip("-")
+        return ElementState("stick", "stick", exits, holds=(0,)), self._slip("+"), self._slip("-")
 
     def _slip(self, sign: str) -> ElementState:
         s = float(f"{sign}1")
@@ -90,7 +91,7 @@ class Friction:
         stretch = 0.0 if self.rigid else s * self.limit / self.stiffness
         return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
 
-    def first_state(self, q: float, rate: float) -> str:
+    def first_state(self, q: float, rate: float, *rates: float) -> str:
         """Stick, with a spring or at rest on its counter-surface; else slip, in the direction of its speed [m/s]."""
         if not self.rigid or rate == 0:
             return "stick"

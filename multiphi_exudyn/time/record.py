@@ -14,6 +14,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase
 from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mechanics.element import event_kind
 from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
@@ -123,13 +124,13 @@ class Record:
     stand (-1: all armed).
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
     coordinates: xi, xi' of every start.
-    phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
+    phases: of the starts at which some are not armed. kinds (m, 3): contact, state entered, or SHARED, state left.
     amounts (m, 7): time [s], five losses [J], impulse [N s]. arrays: those of the loop.
     """
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
         self._names, self.arrays = [contact.name for contact in contacts], arrays
-        self._events = [[state.event for state in contact.states] for contact in contacts]
+        self._states = [contact.states for contact in contacts]
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         empty, whole = np.empty(0), np.empty(0, np.int64)
@@ -306,7 +307,9 @@ class Record:
         before = int(self.places[i - 1]) + 1 if i else 0
         time, *lost, impulse = self.amounts[place].tolist()
         impact, kinetic, strain, stop_work, damping = lost
-        contact, entered = self.kinds[place].tolist()
+        contact, entered, left = self.kinds[place].tolist()
         shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, 6])) for k in range(before, place))
         loss = Loss(impact, kinetic, strain, stop_work, damping)
-        return Event(time, self._names[contact], self._events[contact][entered], loss, impulse, shared)
+        return Event(
+            time, self._names[contact], event_kind(self._states[contact], left, entered), loss, impulse, shared
+        )
