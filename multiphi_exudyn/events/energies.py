@@ -6,7 +6,12 @@ from multiphi_exudyn.events.arrays import (
     CARRIED,
     CHANNELS,
     DAMPING,
+    DROPS,
     ELEMENTS,
+    FOLLOW_COUNT,
+    FOLLOWS,
+    FRICTION,
+    HELD_LINKS,
     KINDS,
     KINETIC,
     LEVEL,
@@ -16,11 +21,11 @@ from multiphi_exudyn.events.arrays import (
     PLACE,
     POTENTIAL,
     SPEED,
+    SPRINGS,
     STATES,
+    STICKS,
     STIFFNESSES,
     STRAIN,
-    STRETCH_COUNT,
-    STRETCHES,
     VISCOUS,
 )
 from multiphi_exudyn.events.signals import gap
@@ -65,8 +70,8 @@ def potential(ints: Ints, numbers: Numbers, state: int) -> float:
         for j in range(q):
             total += 0.5 * numbers[row + r + j] * numbers[x + r + j] * numbers[x + r + k]
         row += n
-    row = ints[level + STRETCHES]
-    for _ in range(ints[level + STRETCH_COUNT]):
+    row = ints[level + FOLLOWS]
+    for _ in range(ints[level + FOLLOW_COUNT]):
         stretch = numbers[row + n]
         for i in range(n):
             stretch += numbers[row + i] * numbers[x + i]
@@ -92,11 +97,12 @@ def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float, losses: int) -> None:
-    """Add what is lost between two states of one instant to losses (5,), less the energy ``collided`` in an impact.
+    """Add what is lost between two states of one instant to losses (6,), less the energy ``collided`` in an impact.
 
     Viscous contacts that open inside their stop lose what their springs hold, those that close there bring it back.
+    A spring that begins to slip loses what it held more than it keeps: the drop from its static limit.
     """
-    relaxed = 0.0
+    relaxed, dropped = 0.0, 0.0
     states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
         opened, opens = ints[states + i] == OPEN, ints[later + i] == OPEN
@@ -104,6 +110,11 @@ def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float,
             depth = gap(ints, numbers, before, i)
             stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
             relaxed += stored if opens else -stored
+        sticks = ints[ints[STICKS] + i]
+        if sticks >= 0 and ints[states + i] == sticks and ints[later + i] != sticks:
+            stretch = gap(ints, numbers, before, ints[ints[HELD_LINKS] + i])
+            dropped += 0.5 * numbers[ints[SPRINGS] + i] * stretch * stretch * numbers[ints[DROPS] + i]
     numbers[losses + KINETIC] += kinetic(ints, numbers, before) - kinetic(ints, numbers, after) - collided
-    numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed
+    numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed - dropped
     numbers[losses + DAMPING] += relaxed
+    numbers[losses + FRICTION] += dropped

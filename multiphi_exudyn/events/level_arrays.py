@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.least_distance_arrays import least_distance_ints, least_distance_numbers
-from multiphi_exudyn.mechanics.element import Exit, Share
+from multiphi_exudyn.mechanics.element import Exit, Share, friction_spring
 
 __all__ = ["LevelArrays"]
 
@@ -226,9 +226,8 @@ class LevelArrays:
         take("numbers", a.RUN_NUMBERS)
         base, c = model.base, len(model.contacts)
         viscous = base.dampings > 0
-        striking = np.isinf(base.stiffnesses)
-        striking[list(model.held)] = False
-        kinds = np.where(striking, a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))[:c]
+        kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))[:c]
+        kinds[[i for i in model.held if i < c]] = a.SLIDING
         chains = np.full(c, -1)
         for number, chain in enumerate(model.chains):
             chains[list(chain)] = number
@@ -243,12 +242,25 @@ class LevelArrays:
             a.CHAIN_COUNT: len(model.chains),
             a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
             a.DIRECTIONS: put("numbers", units[:, :c].T),
+            **self._frictions(),
         }
         for slot, value in given.items():
             self.ints[slot] = value
         self.numbers[a.INDEPENDENCE] = INDEPENDENT
         self._rehash(SLOTS, SLOTS)
         self._reserve_sets(c, int(np.sum(kinds == a.RIGID)))
+
+    def _frictions(self) -> dict[int, int]:
+        """What the elements with a held link do with its spring."""
+        model, put = self.levels.model, self.buffers.put
+        found = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
+        places = [links[int(row[1])] for links, row in zip(model.link_places, found, strict=True)]
+        return {
+            a.STICKS: put("ints", found[:, 0]),
+            a.HELD_LINKS: put("ints", places),
+            a.SPRINGS: put("numbers", found[:, 2]),
+            a.DROPS: put("numbers", found[:, 3]),
+        }
 
     def _reserve_sets(self, c: int, rigid: int) -> None:
         """Scratch memory that depends on the number of elements alone."""
@@ -378,7 +390,7 @@ class LevelArrays:
             a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
             a.CARRIED: -1,
             a.MOBILITY: -1,
-            a.STRETCH_COUNT: len(parts[a.STRETCHES]),
+            a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
             **{slot: put("numbers", values) for slot, values in parts.items()},
         }
         given.setdefault(a.SPEEDS, given[a.GAPS])
@@ -396,11 +408,13 @@ class LevelArrays:
         self._enter_level(record)
 
     def add_powers(self, level: int) -> None:
-        """Pack the power of damping and of what varies in a level that stands in the ints."""
+        """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
-            damping, varying = powers(self.loaded[int(self.ints[level + a.NUMBER])])
+            damping, varying, rubbing, pairs = powers(self.loaded[int(self.ints[level + a.NUMBER])])
             self.ints[level + a.DISSIPATION] = self.buffers.put("numbers", (damping + damping.T) / 2)
             self.ints[level + a.POWER] = self.buffers.put("numbers", varying)
+            self.ints[level + a.RUBBING] = self.buffers.put("numbers", np.append(rubbing, pairs))
+            self.ints[level + a.RUBBINGS] = len(pairs)
 
     @property
     def most(self) -> tuple[int, int]:

@@ -41,8 +41,10 @@ from multiphi_exudyn.events.arrays import (
     REACHED,
     RIGID,
     SETTLED,
+    SLIDING,
     SLOWED,
     STATES,
+    STICKS,
     STIFFNESSES,
     STRAIN,
     STRIKING,
@@ -150,10 +152,11 @@ def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: i
 
 @compiled
 def springs(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level."""
+    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level, and of friction."""
     states, total = ints[ints[state + LEVEL] + STATES], 0.0
     for i in range(ints[ELEMENTS]):
-        if ints[states + i] != OPEN:
+        sliding = ints[ints[KINDS] + i] == SLIDING
+        if ints[states + i] == ints[ints[STICKS] + i] if sliding else ints[states + i] != OPEN:
             depth = gap(ints, numbers, state, i)
             total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
     return total

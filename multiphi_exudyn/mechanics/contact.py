@@ -38,7 +38,16 @@ from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit, Link, Share, Turn, contact_states
+from multiphi_exudyn.mechanics.element import (
+    ALWAYS_TAKEN,
+    TAKEN_ONCE,
+    ElementState,
+    Exit,
+    Link,
+    Share,
+    Turn,
+    contact_states,
+)
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["UnilateralContact"]
@@ -124,6 +133,11 @@ class UnilateralContact:
         """mu_s, up to which it sticks."""
         return self.friction if self.static_friction is None else self.static_friction
 
+    @property
+    def drop(self) -> float:
+        """Part of the tangential spring's energy that is lost where it begins to slip."""
+        return 1 - (self.friction / self.most) ** 2 if self.most else 0.0
+
     @functools.cached_property
     def further(self) -> tuple[Link, ...]:
         """Where there is friction: the tangential link, and the normal one with the friction of sliding to and fro."""
@@ -169,12 +183,11 @@ class UnilateralContact:
         share = Share(link, opening.gap, opening.rate, opening.force)
         opens = Exit("open", firmness=opening.firmness, further=(share,))
         if math.isinf(self.tangential_stiffness):
-            back, follows = Exit("stick", firmness=ALWAYS_TAKEN, further=(Share(1, rate=s),)), None
+            back = Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
         else:
             ratio = self.friction / self.tangential_stiffness
-            back = Exit("stick", rate=ratio * self.stiffness, firmness=ALWAYS_TAKEN, further=(Share(1, rate=s),))
-            follows = (link, s * ratio)
-        return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), follows=follows)
+            back = Exit("stick", rate=ratio * self.stiffness, firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
+        return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), rubs=(link, s * self.friction))
 
     def first_state(self, gap: float, rate: float, *rates: float) -> str:
         """The state in which a run starts that begins with a gap [m], zero where it is round-off, and its rate [m/s].

@@ -20,11 +20,12 @@ have changed (or a change in truncated modes), the exit says by its firmness wha
     MAY_RECOVER      while it rises the state stays, and the exit waits until it has risen to zero
     NEVER_RECOVERS   it does not wait for that
     ALWAYS_TAKEN     nor for whether the state it leads to admits it: it changes at once
+    TAKEN_ONCE       it waits while it rises; else it changes at once, but stays where it has just come from there
 
     contact          open: q;  closed: -q where compliant, lambda where rigid (always taken) or viscous (never recovers)
     friction |T| <= F, T = -lambda, rigid or by a spring in series
                      stick (the link holds, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
-                     exit s q', back into stick; all of them always taken
+                     exit s q', back into stick, taken once; those of stick always taken
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ __all__ = [
     "ALWAYS_TAKEN",
     "MAY_RECOVER",
     "NEVER_RECOVERS",
+    "TAKEN_ONCE",
     "AnyLink",
     "Element",
     "ElementState",
@@ -49,12 +51,13 @@ __all__ = [
     "Turn",
     "contact_states",
     "event_kind",
+    "friction_spring",
     "is_oblique",
     "link_places",
     "links_of",
 ]
 
-MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN = 0, 1, 2
+MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -124,8 +127,8 @@ class ElementState:
     """One state; see the module's docstring.
 
     event: kind of the event that enters it, "close" where it is left open. holds: numbers of the links that hold.
-    push: constant force [N] along +h. stretch: of the held link [m], kept for a state in which it holds; follows: a
-    link, and by how much [m/N] the stretch goes with its force.
+    push: constant force [N] along +h. stretch: of the held link [m], kept for a state in which it holds. rubs: a link,
+    and how much of its force friction T has against the held link; its stretch goes with T.
     """
 
     name: str
@@ -134,7 +137,7 @@ class ElementState:
     holds: tuple[int, ...] = ()
     push: float = 0.0
     stretch: float = 0.0
-    follows: tuple[int, float] | None = None
+    rubs: tuple[int, float] | None = None
 
 
 class AnyLink(Protocol):
@@ -162,11 +165,14 @@ class AnyLink(Protocol):
 class Element(AnyLink, Protocol):
     """An element by its links and its states; contacts and the springs of force laws are elements.
 
-    It is its own first link; further: the others.
+    It is its own first link; further: the others. drop: the part of the energy of its held link's spring that is lost
+    where the state in which it holds is left.
     """
 
     @property
     def further(self) -> tuple[Link, ...]: ...
+    @property
+    def drop(self) -> float: ...
     @property
     def states(self) -> tuple[ElementState, ...]: ...
     def first_state(self, q: float, rate: float, *rates: float) -> str:
@@ -198,6 +204,20 @@ def is_oblique(link: AnyLink) -> bool:
 def event_kind(states: Sequence[ElementState], left: int, entered: int) -> str:
     """Kind of the event that leads from one state to another: a contact that was open closes, whatever it enters."""
     return "close" if states[left].name == "open" != states[entered].name else states[entered].event
+
+
+def friction_spring(element: Element) -> tuple[int, int, float, float]:
+    """Of an element with a held link: the state in which that holds, its number, its spring [N/m], zero for none.
+
+    And what the spring loses of its energy where it begins to slip. (-1, 0, 0, 0) of other elements.
+    """
+    links: tuple[AnyLink, ...] = (element, *element.further)
+    held = next((number for number, link in enumerate(links) if link.held), None)
+    if held is None:
+        return -1, 0, 0.0, 0.0
+    state = next(k for k, state in enumerate(element.states) if held in state.holds)
+    spring = 0.0 if links[held].rigid else links[held].stiffness
+    return state, held, spring, element.drop
 
 
 def contact_states(rigid: bool, viscous: bool) -> tuple[ElementState, ...]:

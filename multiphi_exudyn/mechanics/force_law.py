@@ -238,6 +238,7 @@ class LawSpring:
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
     further: ClassVar[tuple[Link, ...]] = ()
+    drop: ClassVar[float] = 0.0
 
     @property
     def states(self) -> tuple[ElementState, ...]:

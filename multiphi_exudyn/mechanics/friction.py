@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit, Link
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE, ElementState, Exit, Link
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Friction"]
@@ -75,6 +75,11 @@ class Friction:
         return self.limit if self.static_limit is None else self.static_limit
 
     @property
+    def drop(self) -> float:
+        """Part of the spring's energy that is lost where it begins to slip."""
+        return 1 - (self.limit / self.most) ** 2
+
+    @property
     def rigid(self) -> bool:
         """True without a spring in series."""
         return math.isinf(self.stiffness)
@@ -87,7 +92,7 @@ class Friction:
 
     def _slip(self, sign: str) -> ElementState:
         s = float(f"{sign}1")
-        back = Exit("stick", rate=s, firmness=ALWAYS_TAKEN)
+        back = Exit("stick", rate=s, firmness=TAKEN_ONCE)
         stretch = 0.0 if self.rigid else s * self.limit / self.stiffness
         return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
 
