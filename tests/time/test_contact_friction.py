@@ -157,6 +157,31 @@ class TestLiftOff:
         assert kinds >= {"open", "close", "slip"}
         assert math.isfinite(spring) or "stick" in kinds
 
+    @pytest.mark.parametrize(
+        ("spring", "damped", "static"),
+        [(math.inf, True, 0.5), (math.inf, False, None), (150.0, True, None), (150.0, False, 0.5)],
+    )
+    def test_a_block_that_nothing_holds_slides_and_comes_to_rest(self, spring, damped, static):
+        """Zero frequency along the floor: the swinging pressure drives it, and it drives nothing."""
+        elastic = np.array([[0.0, 0.0, 0.0], [0.0, 30.0, -30.0], [0.0, -30.0, 30.0]])
+        damping = 0.01 * elastic + np.diag([0.2, 0.0, 0.0]) if damped else None
+        structure = mp.LinearStructure(
+            np.diag([1.0, 1.0, 0.5]), elastic, damping=damping, points={"x": 0, "y": 1, "z": 2}
+        )
+        floor = mp.UnilateralContact(
+            "floor", "y", 0.0, 200.0, friction=0.3, static_friction=static, tangential="x", tangential_stiffness=spring
+        )
+        weight = mp.ConstantLoad({"y": 1.0, "z": 0.5}, -9.81)
+
+        def force(t):
+            return np.array([6 * math.cos(0.8 * math.pi * t), -9.81, -0.5 * 9.81])
+
+        start = np.array([0.0, -0.03, -0.2]), np.array([1.0, 0.0, 0.5])
+        model = mp.MultiPhiModel(structure, [floor], modes="all")
+        loads = [weight, mp.HarmonicLoad("x", 6.0, 0.4)]
+        run = against_the_law(model, 5.0, *start, np.linspace(0, 5, 101), loads, force)
+        assert len(run.events) > 4
+
     def test_mirrored_is_mirrored(self):
         structure = chain(3, stiffness=9.0)
         runs = []
