@@ -44,7 +44,8 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> signals.row_sign, signals.rate_sign, phases.becomes
 10. A contact with friction that closes sticks where it hits; without a spring it slides in the direction in which it
    moves, and sticks where it does not. Whether it goes on sticking, or sliding, does not keep it from closing: what
-   is always taken is decided after it, at the same instant.
+   is always taken is decided after it, at the same instant. With a spring it sticks while its force, beyond the limit
+   by truncation, comes back to it. Where its pressure falls to zero it opens, and keeps no friction.
    -> changes.turn_wishes, phases.is_denied
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
