@@ -58,6 +58,7 @@ __all__ = [
     "entered_signal",
     "first_exit",
     "hold_back",
+    "is_denied",
     "is_end",
     "is_refused",
     "keep_entered",
@@ -79,7 +80,7 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
         rate = becomes(ints, numbers, waves, state, signal, 2)
     if value == 0 and rate >= 0:
         return ARMED
-    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] == TAKEN_ONCE
+    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] >= TAKEN_ONCE
     return RECOVERING if rate > 0 and recovers else REFUSED
 
 
@@ -143,6 +144,18 @@ def is_end(ints: Ints, level: int, exit_number: int) -> int:
     """1 where an exit is among those that are always looked at."""
     for e in range(ints[level + END_COUNT]):
         if ints[ints[level + ENDS] + e] == exit_number:
+            return 1
+    return 0
+
+
+@compiled
+def is_denied(ints: Ints, state: int, element: int) -> int:
+    """4, 10. 1 where an exit of an element is refused but for those that are always taken: they follow at once."""
+    level = ints[state + LEVEL]
+    first = ints[level + FIRST_EXITS] + element
+    for k in range(ints[first], ints[first + 1]):
+        firm = ints[ints[level + EXITS] + k * EXIT_INTS + FIRMNESS] >= ALWAYS_TAKEN
+        if ints[ints[state + PHASES] + k] == REFUSED and not firm:
             return 1
     return 0
 

@@ -93,7 +93,7 @@ def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
         (share, name, level.modes)
         for level in levels
         for name, share in level.static_shares.items()
-        if name not in {contact.name for contact in level.base.contacts if contact.held}
+        if name not in {link.name for link in level.base.links if link.held}
     ]
     share, name, modes = max(shares, default=(0.0, "", 0))
     if share >= CONTACT_SHARE:
@@ -109,9 +109,9 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
     """Of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
     found: dict[str, int] = {}
     for level in levels:
-        for contact in (level.base.contacts[i] for i in level.indices if level.modes < STICKING):
-            if contact.held and (contact.rigid or level.static_shares.get(contact.name, 0.0) >= CONTACT_SHARE):
-                found[contact.name] = min(level.modes, found.get(contact.name, STICKING))
+        for link in (level.base.links[i] for i in level.indices if level.modes < STICKING):
+            if link.held and (link.rigid or level.static_shares.get(link.name, 0.0) >= CONTACT_SHARE):
+                found[link.name] = min(level.modes, found.get(link.name, STICKING))
     if found:
         names = ", ".join(repr(name) for name in found)
         yield (
