@@ -20,10 +20,13 @@ class Growing:
         """Add a part, which is copied unless it is the first."""
         if not len(part):
             return
+        if not self.count:
+            self._blocks, self._used, self.count = [part], len(part), len(part)
+            return
         last = self._blocks[-1]
         if self._used + len(part) > len(last):
             self._blocks[-1] = last[: self._used]
-            last = part if self.count == 0 else np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
+            last = np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
             self._blocks.append(last)
             self._used = 0
         last[self._used : self._used + len(part)] = part

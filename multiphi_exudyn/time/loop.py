@@ -39,6 +39,9 @@ from multiphi_exudyn.events.arrays import (
     INSTANT_TIME,
     LAST_DECISION,
     LEVEL,
+    LOSSES,
+    LOST,
+    LOST_AT_START,
     MODES,
     NEED,
     NEED_PIECES,
@@ -73,6 +76,7 @@ from multiphi_exudyn.events.arrays import (
     WORK,
     WORKED,
 )
+from multiphi_exudyn.events.changes import clear
 from multiphi_exudyn.events.decision import decide, decide_jump
 from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_drive
 from multiphi_exudyn.events.energies import kinetic, pattern_work, potential
@@ -127,6 +131,8 @@ def set_out(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     if status < 0:
         return status
     ints[STARTING] = 0
+    for k in range(LOSSES):  # what no event carries
+        numbers[LOST_AT_START + k] = numbers[LOST + k] if ints[CHANGE_COUNT] == 0 else 0.0
     numbers[WORK] = pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, GIVEN)
     copy_state(ints, numbers, WORKED, CURRENT)
     ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
@@ -145,6 +151,7 @@ def go_on(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     if status < 0:
         return status
     ints[STARTING] = 0
+    clear(numbers, LOST_AT_START)
     if status == EVENT:
         copy_state(ints, numbers, WORKED, CURRENT)
         ints[TRANSITIONS] += ints[TRANSITIONS_NOW]

@@ -27,6 +27,15 @@ PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK)  # in t
 
 states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
 
+EMPTY = {
+    "rows": np.empty((0, a.SEGMENT_WIDTH), np.int64),
+    "spans": np.empty((0, a.SEGMENT_WIDTH_NUMBERS)),
+    "coordinates": np.empty(0),
+    "phases": np.empty(0, np.int64),
+    "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
+    "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
+}
+
 T = TypeVar("T")
 
 
@@ -65,9 +74,10 @@ class Recorded(Made[Segment], Segments):
     """The segments of a record."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record.segment, len(record.spans), {})
+        spans = record.spans
+        super().__init__(record.segment, len(spans), {})
         self._record = record
-        self.starts, self.ends = record.spans[:, :2].T
+        self.starts, self.ends = spans[:, 0], spans[:, 1]
         self.numbers, self.levels, self.arrays = record.rows[:, 0], record.levels, record.arrays
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -132,15 +142,7 @@ class Record:
         self._events = [[state.event for state in contact.states] for contact in contacts]
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
-        empty, whole = np.empty(0), np.empty(0, np.int64)
-        self.parts = {
-            "rows": Growing(whole.reshape(0, a.SEGMENT_WIDTH)),
-            "spans": Growing(empty.reshape(0, a.SEGMENT_WIDTH_NUMBERS)),
-            "coordinates": Growing(empty),
-            "phases": Growing(whole),
-            "kinds": Growing(whole.reshape(0, a.EVENT_WIDTH)),
-            "amounts": Growing(empty.reshape(0, a.EVENT_WIDTH_NUMBERS)),
-        }
+        self.parts = {name: Growing(empty) for name, empty in EMPTY.items()}
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
     phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
@@ -149,10 +151,13 @@ class Record:
         """Take over what the loop has written."""
         ints, numbers = self.arrays.ints, self.arrays.numbers
         n = int(ints[a.SEGMENT_COUNT])
+        if not n:
+            self.take_events()
+            return
         rows = _part(ints, a.SEGMENT_INTS, ints, n * a.SEGMENT_WIDTH).reshape(n, a.SEGMENT_WIDTH)
-        packed = rows[:, 0].copy()
-        for number in dict.fromkeys(packed.tolist()):
-            rows[packed == number, 0] = self._number(self.arrays.loaded[number])
+        packed = rows[:, 0].tolist()
+        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
+        rows[:, 0] = [known[number] for number in packed]
         rows[:, 2] += self.parts["kinds"].count
         rows[:, 3] += self.parts["coordinates"].count
         rows[rows[:, 4] >= 0, 4] += self.parts["phases"].count
@@ -166,9 +171,10 @@ class Record:
     def take_events(self) -> None:
         """Take over the events of what the loop has written, and forget the rest."""
         ints, numbers, m = self.arrays.ints, self.arrays.numbers, int(self.arrays.ints[a.EVENT_COUNT])
-        self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
-        amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
-        self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
+        if m:
+            self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
+            amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
+            self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
             ints[slot] = 0
 

@@ -70,9 +70,9 @@ def simulate(
         _check_going_on(run)
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
-    trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
-    issue(trajectory.warnings)
-    return trajectory
+    found = warnings_of(trajectory, tolerance)
+    issue(found)
+    return replace(trajectory, warnings=found) if found else trajectory
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,18 @@ class Run:
             return self._decided()
 
         def run(finer: float) -> Trajectory:
-            motion = self.begun(finer)
+            motion = self._motion(finer)
             motion.advance(self.t_end)
-            return motion.trajectory(self.t_end)
+            return motion.trajectory(self.t_end, self._again)
 
-        return replace(to_tolerance(run, self.loads), again=self._again)
+        return to_tolerance(run, self.loads)
 
-    def begun(self, finer: float = 1.0) -> Motion:
-        """A motion at its start; smooth courses of loads are taken to their tolerance / finer."""
+    def begun(self) -> Motion:
+        """A motion at its start."""
+        return self._motion().begin()
+
+    def _motion(self, finer: float = 1.0) -> Motion:
+        """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
         excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.segment import Segment, Segments, listed
 
-__all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
+__all__ = ["Again", "Ledger", "Start", "Statistics", "Trajectory"]
 
 NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
 INSTANTS = 1001  # at which a nudged run is compared, beside the events
+
+Again: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,7 @@ class Trajectory:
     load: np.ndarray
     stats: Statistics
     warnings: tuple[str, ...] = ()
-    again: Callable[[np.ndarray, np.ndarray], Trajectory] | None = field(default=None, repr=False, compare=False)
+    again: Again | None = field(default=None, repr=False, compare=False)
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
         """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""
