@@ -17,7 +17,8 @@ exit      ints[exit ...]          element, the state it asks for, whether it nev
                                   that the element would have in the level entered alone, -1 while nobody needed it
 signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
-                                  are set, of which terms T and c are sums, (n_m, n_l + 1), else -1
+                                  are set, of which terms T and c are sums, (n_m, n_l + 1), else -1; where levels leave
+                                  modes out, what a defect is read from (defect_sums.py), else -1
 state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
@@ -80,6 +81,8 @@ ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED
 HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
 
+JUDGED = 113  # whether levels leave modes out, so that defects are added up
+
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
@@ -92,7 +95,8 @@ INDEPENDENCE = 7  # of directions of length one: what is left beside others, bel
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
-RUN_NUMBERS = 42
+DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
+RUN_NUMBERS = 44
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, LOSSES = 0, 1, 2, 3, 4, 5
 
 # ---------------------------------------------------------------------- other records, ints
@@ -111,7 +115,7 @@ ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 EXIT_INTS = 7
 ROW, WAVE, RATED = 0, 1, 2
 
-MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
+MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS, MAP_DEFECT = 0, 1, 2, 3, 5, 6
 MAP_SIZES = 4  # of a map from the base: |y| that a level's rest has, and for w = 1 its channels, (q + 1,)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 

@@ -30,6 +30,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.ELEMENTS: c,
         a.COORDINATES: base.modes.count,
         a.WHOLE: int(model.whole),
+        a.JUDGED: int(not model.whole),
         a.KINDS: put("ints", np.where(striking, a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))),
         a.CHAINS: put("ints", chains),
         a.CHAIN_COUNT: len(model.chains),

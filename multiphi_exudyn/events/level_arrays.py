@@ -10,6 +10,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.channel_arrays import ChannelArrays
+from multiphi_exudyn.events.defect_forms import defect_form
 from multiphi_exudyn.events.element_arrays import describe_elements
 from multiphi_exudyn.events.exits import after, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
@@ -116,10 +117,14 @@ class LevelArrays:
         states = int(self.ints[self._base + a.STATES])
         self.ints[states : states + len(key)] = key
         self.ints[a.GIVEN + a.LEVEL], self.ints[a.STARTING] = self._base, a.FRESH
-        drive = self.numbers[self.ints[a.DRIVE] :][: 2 * q].reshape(2, q)
-        for part, *values in ((a.PLACE, displacement, drive[0], held), (a.SPEED, velocity, drive[1], 0 * held)):
+        numbers, drive = self.numbers, int(self.ints[a.DRIVE])
+        for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
             start = int(self.ints[a.GIVEN + part])
-            self.numbers[start : start + m + q + len(held)] = np.concatenate(values)
+            numbers[start : start + m] = values
+            if q:
+                numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
+            if len(held):
+                numbers[start + m + q : start + m + q + len(held)] = placed
 
     def set_state(
         self, level: int, place: np.ndarray, speed: np.ndarray, phases: Sequence[int], measured: Measure = measure
@@ -248,4 +253,12 @@ class LevelArrays:
         at = put("numbers", matrix)
         rates = at if np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
         known = -1 if terms is None else put("numbers", terms)
-        return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known])
+        defect = put("numbers", self._defect(source, level)) if self.ints[a.JUDGED] else -1
+        return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known, defect])
+
+    def _defect(self, source: int, level: LoadedLevel) -> np.ndarray:
+        """What a defect is read from on the way from a level, or from the base, into a level (defect_sums.py)."""
+        if source == self._base:
+            return np.column_stack([level.level.vectors, level.asymptotic.configuration]).ravel()
+        form = defect_form(self.loaded[int(self.ints[source + a.NUMBER])], level, ())
+        return np.concatenate([form.displaced.ravel(), form.moving.ravel()])

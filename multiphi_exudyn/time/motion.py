@@ -31,6 +31,8 @@ __all__ = ["NUMBERS", "Motion", "carry", "measured"]
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 
+SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
+
 carry, measured = entry(advance), entry(measure)
 
 
@@ -39,7 +41,8 @@ class _Kept:
     """What a run keeps while another one has the arrays.
 
     last_decision [s], decisions, ring: of the chatter check, the last ones. piece, age: which of the channels, and
-    since when [s] it lasts. work [J]: of what varies in time since the last segment ended.
+    since when [s] it lasts. work [J]: of what varies in time since the last segment ended. defects, truncated: sums so
+    far, see Segments.
     """
 
     last_decision: float
@@ -48,6 +51,8 @@ class _Kept:
     piece: int = 0
     age: float = 0.0
     work: float = 0.0
+    defects: float = 0.0
+    truncated: float = 0.0
 
 
 class Motion:
@@ -87,7 +92,7 @@ class Motion:
         self._state, self.time, self.message, self.start_loss = state, time, "", Loss()
         self._starting = False
         self.record = Record(self.model.contacts, self.arrays)
-        self._kept = replace(self._kept, last_decision=time, decisions=0, ring=[])
+        self._kept = replace(self._kept, last_decision=time, decisions=0, ring=[], defects=math.nan)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
@@ -107,7 +112,7 @@ class Motion:
 
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
-        segments, events = self.record.segments(), self.record.events()
+        segments, events = self.record.segments(self._kept.defects, self._kept.truncated), self.record.events()
         return Trajectory(
             model=self.model,
             segments=segments,
@@ -194,8 +199,8 @@ class Motion:
         ints, numbers = self.arrays.ints, self.arrays.numbers
         decisions, start = int(ints[a.DECISIONS]), int(ints[a.RING])
         ring = numbers[start : start + 2 * min(decisions, self._window + 1)].tolist()
-        last, age, work = (float(numbers[place]) for place in (a.LAST_DECISION, a.AGE, a.WORK))
-        self._kept = _Kept(last, decisions, ring, int(ints[a.PIECE]), age, work)
+        last, age, *sums = (float(numbers[place]) for place in (a.LAST_DECISION, a.AGE, *SUMS))
+        self._kept = _Kept(last, decisions, ring, int(ints[a.PIECE]), age, *sums)
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
@@ -210,6 +215,7 @@ class Motion:
         numbers = arrays.numbers
         numbers[ring : ring + len(kept.ring)] = kept.ring
         numbers[a.TIME], numbers[a.LAST_DECISION], numbers[a.WORK] = self.time, kept.last_decision, kept.work
+        numbers[a.DEFECTS], numbers[a.TRUNCATED] = kept.defects, kept.truncated
         numbers[a.ALLOWED], numbers[int(arrays.ints[a.FOUND]) + 1] = self._allowed, 0.0
         if state is None:
             start = self.start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Generic, TypeVar, overload
 
@@ -73,12 +74,13 @@ class Made(Sequence[T], Generic[T]):
 class Recorded(Made[Segment], Segments):
     """The segments of a record."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Record, defects: float, truncated: float) -> None:
         spans = record.spans
         super().__init__(record.segment, len(spans), {})
         self._record = record
         self.starts, self.ends = spans[:, 0], spans[:, 1]
         self.numbers, self.levels, self.arrays = record.rows[:, 0], record.levels, record.arrays
+        self.defects, self.truncated = defects, truncated
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
@@ -138,8 +140,7 @@ class Record:
     """
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
-        self._names, self.arrays = [contact.name for contact in contacts], arrays
-        self._events = [[state.event for state in contact.states] for contact in contacts]
+        self._contacts, self.arrays = contacts, arrays
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         self.parts = {name: Growing(empty) for name, empty in EMPTY.items()}
@@ -192,13 +193,18 @@ class Record:
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
+        return np.flatnonzero(self.kinds[:, 1] != a.SHARED) if self.parts["kinds"].count else EMPTY["phases"]
+
+    @functools.cached_property
+    def _told(self) -> list[tuple[str, list[str]]]:
+        """The name of every contact, and of the events by which its states are entered."""
+        return [(contact.name, [state.event for state in contact.states]) for contact in self._contacts]
 
     # ------------------------------------------------------------------ objects
 
-    def segments(self) -> Recorded:
+    def segments(self, defects: float = math.nan, truncated: float = math.nan) -> Recorded:
         """All segments so far."""
-        return Recorded(self)
+        return Recorded(self, defects, truncated)
 
     def events(self) -> Events:
         """All events so far."""
@@ -293,9 +299,9 @@ class Record:
 
     def standings(self) -> np.ndarray:
         """The phases (n, c), in numbers, at the start of every segment."""
-        numbers, starts = np.zeros((len(self.rows), len(self._names)), np.int64), self.rows[:, 4]
+        numbers, starts = np.zeros((len(self.rows), len(self._contacts)), np.int64), self.rows[:, 4]
         unsettled = starts >= 0
-        numbers[unsettled] = self.phases[starts[unsettled][:, None] + np.arange(len(self._names))]
+        numbers[unsettled] = self.phases[starts[unsettled][:, None] + np.arange(len(self._contacts))]
         return numbers
 
     def segment(self, i: int) -> Segment:
@@ -314,6 +320,7 @@ class Record:
         time, *lost, impulse = self.amounts[place].tolist()
         impact, kinetic, strain, stop_work, damping = lost
         contact, entered = self.kinds[place].tolist()
-        shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, 6])) for k in range(before, place))
+        shared = tuple((self._told[self.kinds[k, 0]][0], float(self.amounts[k, 6])) for k in range(before, place))
         loss = Loss(impact, kinetic, strain, stop_work, damping)
-        return Event(time, self._names[contact], self._events[contact][entered], loss, impulse, shared)
+        name, kinds = self._told[contact]
+        return Event(time, name, kinds[entered], loss, impulse, shared)

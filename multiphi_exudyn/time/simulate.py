@@ -21,7 +21,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.loads import Load, unchanging
 from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.refinement import to_tolerance
@@ -105,12 +105,20 @@ class Run:
 
     def _motion(self, finer: float = 1.0) -> Motion:
         """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
-        excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        levels = levels_of(self.model, excitation, self.start.t_end if self.start else 0.0, self.t_end)
-        start = _start(self, excitation) if self.start is None else going_on(self.start, levels)
+        levels = self._levels(finer)
+        start = _start(self, levels) if self.start is None else going_on(self.start, levels)
         return motion_of(levels, start, self.compiled)
+
+    def _levels(self, finer: float) -> LoadedLevels:
+        """The levels under the loads, which the model keeps where nobody can change what the loads are."""
+        model, loads, time = self.model, unchanging(self.loads), self.start.t_end if self.start else 0.0
+
+        def made() -> LoadedLevels:
+            return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
+
+        return made() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), made)
 
     def _decided(self) -> Trajectory:
         """The answer of a model whose number of modes the first run decides."""
@@ -131,10 +139,8 @@ class Run:
 
 def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
     """The run in these levels."""
-    arrays = levels.arrays or LevelArrays(levels)
-    if levels.alone is levels:
-        levels.arrays = arrays
-    return Motion(arrays, start, compiled)
+    levels.arrays = levels.arrays or LevelArrays(levels)
+    return Motion(levels.arrays, start, compiled)
 
 
 def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
@@ -147,19 +153,49 @@ def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: fl
     return LoadedLevels(model, excitation, time, end, alone) if excitation.channels else alone
 
 
-def _start(run: Run, excitation: Excitation) -> Start:
+@dataclass(frozen=True)
+class _Scales:
+    """What the gaps (c,) of a start are judged by; moved, speeds: of the stops.
+
+    touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
+    moves a mode at most, (m,) [s].
+    """
+
+    moved: np.ndarray
+    speeds: np.ndarray
+    touching: np.ndarray
+    sizes: np.ndarray
+    times: np.ndarray
+
+    @classmethod
+    def of(cls, levels: LoadedLevels, end: float) -> _Scales:
+        """Under the loads until the end [s] of a run."""
+        base, excitation = levels.model.base, levels.excitation
+        omega, sizes = base.modes.omega, np.linalg.norm(base.directions, axis=0)
+        times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
+        ways = base.magnitudes[1] + excitation.stop_ways
+        gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
+        lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + float(np.max(gaps, initial=0.0))
+        moved, speeds = map(excitation.moved, levels.drive.values[:2])
+        return cls(moved, speeds, TOUCHING * ways + UNSEEN * lengths * sizes, sizes, times)
+
+    def near(self, terms: np.ndarray, y: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Gaps (c,) [m] below which a contact is in touch: by the terms (c,) of h.y, by where y' takes the modes."""
+        moving = v * self.times
+        length = math.sqrt(float(y @ y)) + math.sqrt(float(moving @ moving))
+        return np.asarray(TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching)
+
+
+def _start(run: Run, levels: LoadedLevels) -> Start:
     """The start as the contacts see it."""
     model, base = run.model, run.model.base
     y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
-    still = np.zeros(len(model.contacts))
-    moved, speeds = map(excitation.moved, excitation.drive(0.0).values[:2]) if excitation.prescribed else (still, still)
-    gaps = (y @ base.directions + base.gaps - moved).tolist()
-    directions, initial = base.magnitudes
-    ways = initial + excitation.stop_ways
-    unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, run.t_end)
-    scales = (TOUCHING * (ways + np.abs(y) @ directions) + unseen).tolist()
+    scales: _Scales = levels.starts.get_or_build(run.t_end, lambda: _Scales.of(levels, run.t_end))
+    stops, directions = base.gaps - scales.moved, base.magnitudes[0]
+    gaps = (y @ base.directions + stops).tolist()
+    near = scales.near(np.abs(y) @ directions, y, v).tolist()
     penetrating, touching = list[int](), list[int]()
-    for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
+    for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, near, strict=True)):
         if contact.held:
             continue
         if contact.rigid and gap < -scale:
@@ -173,10 +209,11 @@ def _start(run: Run, excitation: Excitation) -> Start:
             penetrating.append(i)
     states = np.zeros(len(model.contacts), int)
     if model.held:
-        states = _first_states(model, v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds))
+        sizes = np.abs(v) @ directions + np.abs(scales.speeds)
+        states = _first_states(model, v @ base.directions - scales.speeds, sizes)
     states[penetrating + touching] = 1
     held = np.array([gaps[i] for i in model.held])  # where it starts a link has no stretch
-    return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved, tuple(states.tolist()), held)
+    return Start(y, v, tuple(penetrating), tuple(touching), stops, tuple(states.tolist()), held)
 
 
 def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -201,18 +238,6 @@ def _check_going_on(run: Run) -> None:
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
     if not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
-
-
-def _lengths(
-    model: MultiPhiModel, y: np.ndarray, v: np.ndarray, load: np.ndarray, ways: np.ndarray, end: float
-) -> np.ndarray:
-    """What gaps (c,) [m] could become: by y, by where v and a load (m,) take the modes, by ways (c,) of all gaps."""
-    omega = model.base.modes.omega
-    times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
-    sizes = np.linalg.norm(model.base.directions, axis=0)
-    gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
-    motion = np.linalg.norm(y) + np.linalg.norm(v * times) + np.linalg.norm(load * times**2)
-    return np.asarray(sizes * (motion + np.max(gaps, initial=0.0)))
 
 
 def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:
