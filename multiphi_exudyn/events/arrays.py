@@ -11,7 +11,8 @@ element   ints[ints[KINDS] + i]   COMPLIANT, RIGID or VISCOUS; chain, stiffness,
 level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
-                                  the power of damping xi'.D xi', and of what varies (q, 4 n + 1), as in work.py;
+                                  the power of damping xi'.D xi', and of what varies (q, 4 n + 1), as in work.py, and
+                                  a primitive of that of damping in the free response's coefficients (2 p, 2 p), or -1;
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it
@@ -109,6 +110,7 @@ ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
 DISSIPATION, POWER = 20, 21  # forms of the power of damping and of what varies, zero while nobody needed them
+DISSIPATED = 22  # form of what damping takes from the free response, -1 where there is none
 LEVEL_INTS = 24
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6

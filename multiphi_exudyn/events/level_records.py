@@ -10,7 +10,7 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exits import after, exits_of, signal_row
-from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers
+from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.levels.level import Level
@@ -60,8 +60,11 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequen
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     """Give the record of a level the power of damping and of what varies."""
     damping, varying = powers(level)
-    places = buffers.put("numbers", (damping + damping.T) / 2), buffers.put("numbers", varying)
-    buffers.ints[record + a.DISSIPATION], buffers.ints[record + a.POWER] = places
+    dissipated = primitive(level.modal, damping)
+    places = [buffers.put("numbers", values) for values in ((damping + damping.T) / 2, varying)]
+    places.append(-1 if dissipated is None else buffers.put("numbers", dissipated))
+    for slot, place in zip((a.DISSIPATION, a.POWER, a.DISSIPATED), places, strict=True):
+        buffers.ints[record + slot] = place
 
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
