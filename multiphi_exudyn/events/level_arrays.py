@@ -23,7 +23,7 @@ from multiphi_exudyn.events.state_arrays import measure
 
 __all__ = ["LevelArrays"]
 
-ARRAY_BYTES = 2**29  # of a model's arrays under one load: half of what a model may keep (model.py)
+ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (model.py)
 FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
 ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
 
@@ -73,8 +73,20 @@ class LevelArrays:
 
     @property
     def full(self) -> bool:
-        """Whether the arrays have become too large."""
+        """Whether the arrays are too large; those that their model keeps beside them go first."""
+        self._let_others_go()
         return self.buffers.size > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
+
+    def _let_others_go(self) -> None:
+        """Of all that a model keeps the least recently used goes, until there is room."""
+        loaded = dict.fromkeys(levels for _, levels in self.levels.model.loaded.items())  # some by two keys
+        others = [(levels, arrays) for levels in loaded for arrays in levels.kept_arrays if arrays is not self]
+        total = self.buffers.size + sum(arrays.buffers.size for _, arrays in others)
+        for levels, arrays in others:
+            if total <= ARRAY_BYTES:
+                return
+            total -= arrays.buffers.size
+            levels.let_go(arrays)
 
     def forget(self) -> None:
         """Begin anew, without any level."""
@@ -161,6 +173,7 @@ class LevelArrays:
             }
             for slot, (name, count) in wanted.items():
                 self.ints[slot] = self.buffers.take(name, count)
+            self._let_others_go()
         self._recorded = n, exits
         self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):

@@ -79,6 +79,18 @@ class LoadedLevels:
         self.drive, self.until = self.excitation.drive(time), until
 
     @property
+    def kept_arrays(self) -> list[Any]:
+        """Those that are kept, under held forces too."""
+        return [arrays for arrays in (self.arrays, getattr(self.held, "arrays", None)) if arrays is not None]
+
+    def let_go(self, arrays: Any) -> None:
+        """Keep these arrays no longer; who works on them has them still."""
+        if self.arrays is arrays:
+            self.arrays = None
+        else:
+            self.held = None
+
+    @property
     def load(self) -> np.ndarray:
         """The static load (m,)."""
         return self.excitation.static

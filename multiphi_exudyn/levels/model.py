@@ -26,7 +26,7 @@ __all__ = ["MultiPhiModel"]
 
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
-LOADS = 8  # loads for which a model keeps what simulations have made of its levels
+LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
 @dataclass(frozen=True)

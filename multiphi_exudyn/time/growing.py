@@ -34,6 +34,11 @@ class Growing:
         self.count += len(part)
 
     @property
+    def bytes(self) -> int:
+        """What its blocks take."""
+        return sum(block.nbytes for block in self._blocks)
+
+    @property
     def whole(self) -> np.ndarray:
         """All parts."""
         if len(self._blocks) > 1:

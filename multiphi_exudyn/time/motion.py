@@ -31,6 +31,7 @@ __all__ = ["NUMBERS", "Motion", "carry", "measured"]
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 
+RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
 SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
 
 carry, measured = entry(advance), entry(measure)
@@ -132,6 +133,8 @@ class Motion:
                 events=len(events),
                 segments=len(segments),
                 function_evaluations=self._evaluations,
+                record_bytes=self.record.bytes,
+                array_bytes=self.arrays.buffers.size,
             ),
             again=again,
         )
@@ -163,10 +166,21 @@ class Motion:
             answer = int(self._loop(*self.arrays.buffers.all, end))
             if answer == a.FULL:
                 self.record.take()
+                self._check_record()
             elif answer == a.NEED:
                 self._supply()
             else:
                 return answer
+
+    def _check_record(self) -> None:
+        """End the run before its record takes the machine."""
+        taken, segments = self.record.bytes, self.record.parts["rows"].count
+        if taken > RECORD_BYTES:
+            self._leave()
+            raise NumericalFailure(
+                f"record: got {taken / 1e9:.2g} GB of {segments} segments, need at most {RECORD_BYTES / 1e9:.2g} GB: "
+                "a shorter run, from whose end others go on (start=), or fewer events or samples of loads"
+            )
 
     def _supply(self) -> None:
         """Pack what the loop needs, in arrays that begin anew where they have become too large."""

@@ -10,6 +10,7 @@ from typing import Generic, TypeVar, overload
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.excitation import Drive
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
@@ -36,6 +37,8 @@ EMPTY = {
     "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
     "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
 }
+
+STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 T = TypeVar("T")
 
@@ -143,6 +146,7 @@ class Record:
         self._contacts, self.arrays = contacts, arrays
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
+        self._armed: dict[int, tuple[Phase, ...]] = {}  # phases of a level while all its exits are armed
         self.parts = {name: Growing(empty) for name, empty in EMPTY.items()}
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
@@ -178,6 +182,11 @@ class Record:
             self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
             ints[slot] = 0
+
+    @property
+    def bytes(self) -> int:
+        """What it takes of memory."""
+        return sum(part.bytes for part in self.parts.values())
 
     def _add(self, name: str, part: np.ndarray) -> None:
         self.parts[name].add(part)
@@ -294,8 +303,11 @@ class Record:
 
     def standing(self, i: int) -> tuple[Phase, ...]:
         """The phases at the start of the i-th segment."""
-        c, start = len(exits_of(self.level(i))), self.rows[i, 4]
-        return (Phase.ARMED,) * c if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + c])
+        number, start = int(self.rows[i, 0]), self.rows[i, 4]
+        if number not in self._armed:
+            self._armed[number] = (Phase.ARMED,) * len(exits_of(self.levels[number]))
+        armed = self._armed[number]
+        return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:
         """The phases (n, c), in numbers, at the start of every segment."""
@@ -309,8 +321,8 @@ class Record:
         level, (start, end, armed_at, horizon, work, age) = self.level(i), self.spans[i].tolist()
         xi, xi_t = self.state(i)
         held = xi[level.modal.modes + level.excitation.prescribed :]
-        drive = self.arrays.channels.drive(self.rows[i, 1]).after(age).beside(held)
-        flow = Flow.of(level, xi, xi_t, drive, horizon)
+        drive = self.arrays.channels.drive(self.rows[i, 1]).after(age) if level.excitation.prescribed else STILL
+        flow = Flow.of(level, xi, xi_t, drive.beside(held), horizon)
         return Segment(start, end, level, flow, self.standing(i), armed_at, work)
 
     def event(self, i: int) -> Event:

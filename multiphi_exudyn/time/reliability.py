@@ -41,9 +41,9 @@ RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator 
 PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
-MANY_PIECES = 2**16  # of loads in a run: half a minute of computing and 200 MB
-PIECE_SECONDS = 5e-4  # that a piece of a load takes in a small model
-PIECE_BYTES = 3000  # that it takes there
+MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
+PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
+PIECE_BYTES = 500  # that it takes there, its segment included
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:

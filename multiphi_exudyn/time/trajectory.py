@@ -53,7 +53,11 @@ class Start:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Work of a run; function_evaluations counts samples of event signals."""
+    """Work of a run; function_evaluations counts samples of event signals.
+
+    record_bytes: what its segments and events take; array_bytes: the levels, maps and loads of the loop, which runs of
+    one model under the same loads share.
+    """
 
     levels_built: int
     levels_possible: int
@@ -61,6 +65,8 @@ class Statistics:
     events: int
     segments: int
     function_evaluations: int
+    record_bytes: int = 0
+    array_bytes: int = 0
 
 
 @dataclass(frozen=True)
