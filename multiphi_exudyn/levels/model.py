@@ -146,7 +146,7 @@ class MultiPhiModel:
         given = zip(self.contacts, states, strict=True)
         return np.asarray(self.base.directions @ [contact.states[state].push for contact, state in given])
 
-    @property
+    @functools.cached_property
     def levels_possible(self) -> int:
         """Number of levels: 2 for every contact times the segments of every law."""
         single = (len(c.states) for c in self.contacts if not isinstance(c, LawSpring))

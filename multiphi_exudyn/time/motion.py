@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -142,7 +141,8 @@ class Motion:
     # ------------------------------------------------------------------ the loop
 
     def _carry(self, end: float, to_change: bool = False) -> None:
-        with self._failing():
+        """A failure ends the run, with its instant and its cause."""
+        try:
             self._take_over()
             self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
             with np.errstate(all="ignore"):  # as compiled: what is not finite is found, and told
@@ -150,12 +150,6 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-
-    @contextmanager
-    def _failing(self) -> Iterator[None]:
-        """A failure ends the run, with its instant and its cause."""
-        try:
-            yield
         except (MultiPhiError, np.linalg.LinAlgError) as failure:
             singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
             self.message = f"at t = {self.time:.9g} s: {singular}{failure}"

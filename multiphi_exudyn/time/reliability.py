@@ -111,9 +111,9 @@ def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
             f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
             f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
         )
-    if len(listed) and np.max(listed) >= PER_CENT:
+    if (largest := max(listed, default=0.0)) >= PER_CENT:
         yield (
-            f"damping ratios: {np.max(listed):g} is {100 * np.max(listed):g} % of critical damping, which looks like a "
+            f"damping ratios: {largest:g} is {100 * largest:g} % of critical damping, which looks like a "
             "ratio in per cent; write 0.01 for 1 %"
         )
 
