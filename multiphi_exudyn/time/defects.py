@@ -34,7 +34,7 @@ __all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_
 Sample: TypeAlias = tuple[LoadedLevel, np.ndarray, np.ndarray]
 
 SAMPLES = 100  # of the motion, for its mean square
-FEWER = (33, 9)  # so many steps between samples that may be enough: 4 and 11 of them
+FEWER = 9  # from one sample to the next of those that may be enough, 12 of them
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,9 @@ class Samples:
         least = SAMPLES * limit**2
         if first > 0 and first**2 > least:
             return True
-        few = (self._states(self._times[::step]) for step in FEWER)
-        return any(self._sum(samples) > least for samples in few) or self.amplitude > limit
+        if "_all" not in vars(self) and self._sum(self._states(self._times[::FEWER])) > least:
+            return True
+        return self.amplitude > limit
 
     @property
     def largest_energy(self) -> float:
