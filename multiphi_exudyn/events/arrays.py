@@ -13,14 +13,16 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
                                   the power of damping xi'.D xi', of what varies (q, 4 n + 1), and of friction
-                                  f.xi', as in work.py;
+                                  f.xi', as in work.py, and a primitive of that of damping in the free response's
+                                  coefficients (2 p, 2 p), or -1;
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it;
                                   the speed on which the state asked for hangs, and the others
 signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
-                                  are set, of which terms T and c are sums, (n_m, n_l + 1), else -1
+                                  are set, of which terms T and c are sums, (n_m, n_l + 1), else -1; where levels leave
+                                  modes out, what a defect is read from (defect_sums.py), else -1
 state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
@@ -89,6 +91,8 @@ ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED
 HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
 
+JUDGED = 113  # whether levels leave modes out, so that defects are added up
+
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
@@ -101,7 +105,8 @@ INDEPENDENCE = 7  # of directions of length one: what is left beside others, bel
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
-RUN_NUMBERS = 42
+DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
+RUN_NUMBERS = 44
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
 # ---------------------------------------------------------------------- other records, ints
@@ -116,14 +121,15 @@ FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHES
 DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
 RUBBINGS = 23  # how many forces of friction go with others in the last of them
 FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
-LEVEL_INTS = 26
+DISSIPATED = 26  # form of what damping takes from the free response, -1 where there is none
+LEVEL_INTS = 27
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then
 EXIT_INTS = 12
 ROW, WAVE, RATED = 0, 1, 2
 
-MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
+MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS, MAP_DEFECT = 0, 1, 2, 3, 5, 6
 MAP_SIZES = 4  # of a map from the base: |y| that a level's rest has, and for w = 1 its channels, (q + 1,)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 

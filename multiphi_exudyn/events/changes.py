@@ -58,7 +58,7 @@ def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
         if ints[exit_ + TURN] >= 0 and ints[asking + element] == ints[exit_ + ASKED]:
-            sign = row_sign(ints, numbers, WORKED, exit_ + TURN)
+            sign = row_sign(ints, numbers, WORKED, exit_ + TURN, 0.0)
             if sign != 0:
                 ints[asking + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
 

@@ -29,7 +29,7 @@ __all__ = ["Drive", "Excitation", "columns", "static_load"]
 
 
 CARRIER_EFFORT = 10  # pieces of a polynomial for which one of a sweep stands: each of these has its own exponentials
-MOST_EFFORT = 2**20  # pieces in a run, of 3 kB and half a millisecond or more each
+MOST_EFFORT = 2**21  # pieces in a run, of half a kB and ten microseconds or more each
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,11 @@ class Drive:
 
     def beside(self, held: np.ndarray) -> Drive:
         """The same with constant channels (h,) behind."""
+        if not len(held):
+            return self
         terms = [(rate, np.pad(given, ((0, 0), (0, len(held))))) for rate, given in self.terms]
         constant = np.concatenate([np.zeros(self.channels), held])[None, :].astype(complex)
-        return replace(self, terms=(*terms, (0j, constant))) if len(held) else self
+        return replace(self, terms=(*terms, (0j, constant)))
 
     @functools.cached_property
     def values(self) -> np.ndarray:

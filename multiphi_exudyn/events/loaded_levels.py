@@ -21,6 +21,7 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
 __all__ = ["LoadedLevels"]
 
+STARTS = 4  # ends of runs for which it is kept what starts are judged by
 FURTHER = 8  # of a level: of two steps of a solver, with what is attached at two places
 
 T = TypeVar("T")
@@ -44,7 +45,7 @@ class LoadedLevels:
 
     alone: those under its static loads alone, which outlast a run; these where there are no channels.
     arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
-    for a step (modal_force.py).
+    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py).
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class LoadedLevels:
         self.set_out(time, until)
         self.arrays: Any = None
         self.held: Any = None
+        self.starts = BoundedCache[float, Any](STARTS)
         self._all = tuple(range(len(model.contacts)))
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
 
@@ -75,6 +77,18 @@ class LoadedLevels:
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""
         self.drive, self.until = self.excitation.drive(time), until
+
+    @property
+    def kept_arrays(self) -> list[Any]:
+        """Those that are kept, under held forces too."""
+        return [arrays for arrays in (self.arrays, getattr(self.held, "arrays", None)) if arrays is not None]
+
+    def let_go(self, arrays: Any) -> None:
+        """Keep these arrays no longer; who works on them has them still."""
+        if self.arrays is arrays:
+            self.arrays = None
+        else:
+            self.held = None
 
     @property
     def load(self) -> np.ndarray:

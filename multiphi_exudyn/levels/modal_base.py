@@ -61,8 +61,18 @@ class ModalBase:
 
         Of a mode that alone moves a contact it would give one at rest a speed.
         """
+        if self.complete:
+            onto, sizes = self._projection
+            return drop_round_off(onto @ x, sizes @ np.abs(x))
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
+
+    @functools.cached_property
+    def _projection(self) -> tuple[np.ndarray, np.ndarray]:
+        """Phi^T M and |Phi|^T |M|, (m, n), of a complete base, where they are no larger than its modes."""
+        shapes = self.modes.shapes
+        onto, sizes = (self.mass @ shapes).T, (abs(self.mass) @ np.abs(shapes)).T
+        return np.ascontiguousarray(onto), np.ascontiguousarray(sizes)
 
     def modal_load(self, load: np.ndarray) -> np.ndarray:
         """Phi^T f (m,) of a load (n,), zero where it is round-off: a weight bends no body that falls freely."""
@@ -156,11 +166,19 @@ class ModalBase:
 
         gaps: (c,) of all contacts, None for their own.
         """
+        constant = float(self._omega_squares @ (configuration * configuration)) / 2 + self.energy_offset
+        if self.laws:
+            constant -= float(self.preload @ configuration)
+        if not len(closed):
+            return constant
         index = list(closed)
         closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
         springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
-        bent = 0.5 * float(np.sum((self.modes.omega * configuration) ** 2) + np.sum(springs * closing**2))
-        return bent - float(self.preload @ configuration) + self.energy_offset
+        return constant + 0.5 * float(np.sum(springs * closing**2))
+
+    @functools.cached_property
+    def _omega_squares(self) -> np.ndarray:
+        return self.modes.omega**2
 
     def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
         """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""

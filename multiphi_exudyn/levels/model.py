@@ -27,7 +27,7 @@ __all__ = ["MultiPhiModel"]
 
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
-LOADS = 8  # static loads for which a model keeps what simulations have made of its levels
+LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class MultiPhiModel:
     overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
     validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
     hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
-    loaded: levels under static loads, kept by load for later simulations, at most ``LOADS``.
+    loaded: levels under loads, kept for later simulations, at most ``LOADS``.
 
     Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
     asked for, to the bit. Where a number of modes, or a cut-off, would part modes of one frequency, a level keeps all
@@ -57,7 +57,7 @@ class MultiPhiModel:
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-    loaded: BoundedCache[bytes, Any] = field(
+    loaded: BoundedCache[Any, Any] = field(
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
     )
     _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
@@ -163,7 +163,7 @@ class MultiPhiModel:
         pushes = [contact.states[state].push for contact, state in given]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
 
-    @property
+    @functools.cached_property
     def levels_possible(self) -> int:
         """Number of levels: 2 for every contact times the segments of every law."""
         single = (len(c.states) for c in self.contacts if not isinstance(c, LawSpring))
@@ -229,11 +229,6 @@ class MultiPhiModel:
     def highest_frequency(self) -> float:
         """The highest frequency [Hz] of the levels that are kept."""
         return max((level.highest_frequency for _, level in self._levels.items()), default=0.0)
-
-    @property
-    def keeps_clusters(self) -> bool:
-        """Whether one of the levels that are kept has modes beyond those asked for."""
-        return any(level.kept_beyond for _, level in self._levels.items())
 
     @functools.cached_property
     def most_levels(self) -> int:

@@ -14,6 +14,7 @@ A constant load belongs to the asymptotic configuration of every level, so that 
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -45,6 +46,7 @@ __all__ = [
     "StopMotion",
     "SweepLoad",
     "VaryingLoad",
+    "unchanging",
 ]
 
 
@@ -128,11 +130,11 @@ class SampledLoad(VaryingLoad):
     force: np.ndarray
 
     def __post_init__(self) -> None:
-        course = Sampled(self.time, self.force)
+        course = self.course
         object.__setattr__(self, "time", course.time)
         object.__setattr__(self, "force", course.values)
 
-    @property
+    @functools.cached_property
     def course(self) -> Sampled:
         """u(t)."""
         return Sampled(self.time, self.force)
@@ -201,6 +203,21 @@ class BaseMotion:
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
         _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
+
+
+def unchanging(loads: Any) -> tuple[Any, ...] | None:
+    """Loads as they are known by where nobody can change what they are; None where somebody can.
+
+    A function may give another value tomorrow, a row or a mapping other numbers.
+    """
+    return tuple(loads) if isinstance(loads, (tuple, list)) and all(map(_unchanging, loads)) else None
+
+
+def _unchanging(load: Any) -> bool:
+    if isinstance(load, StopMotion):
+        return isinstance(load.course, (Harmonic, Sampled, Sweep))
+    place = load.direction if isinstance(load, Gravity) else getattr(load, "at", None)
+    return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(place, str)
 
 
 StaticLoad: TypeAlias = "ConstantLoad | Gravity"

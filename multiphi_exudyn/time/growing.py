@@ -10,22 +10,29 @@ BLOCK = 2**15  # rows of a block: some megabytes, that go back to the system whe
 
 
 class Growing:
-    """An array to which parts are added, in blocks that are joined when somebody looks at it."""
+    """An array to which parts are added, in blocks that are joined when somebody looks at it.
+
+    count: rows so far. bytes: what the blocks take.
+    """
 
     def __init__(self, empty: np.ndarray) -> None:
         self._blocks, self._used = [empty], 0  # of the last block
-        self.count = 0
+        self.count = self.bytes = 0
 
     def add(self, part: np.ndarray) -> None:
         """Add a part, which is copied unless it is the first."""
         if not len(part):
             return
+        if not self.count:
+            self._blocks, self._used, self.count, self.bytes = [part], len(part), len(part), part.nbytes
+            return
         last = self._blocks[-1]
         if self._used + len(part) > len(last):
             self._blocks[-1] = last[: self._used]
-            last = part if self.count == 0 else np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
+            last = np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
             self._blocks.append(last)
             self._used = 0
+            self.bytes += last.nbytes
         last[self._used : self._used + len(part)] = part
         self._used += len(part)
         self.count += len(part)
@@ -40,5 +47,5 @@ class Growing:
                 start = end - len(self._blocks[-1])
                 whole[start:end] = self._blocks.pop()
                 end = start
-            self._blocks, self._used = [whole], self.count
+            self._blocks, self._used, self.bytes = [whole], self.count, whole.nbytes
         return self._blocks[0]

@@ -8,6 +8,8 @@ is made again from its start.
 
 from __future__ import annotations
 
+import math
+
 from multiphi_exudyn.events.arrays import (
     AGE,
     CARRIED,
@@ -18,6 +20,7 @@ from multiphi_exudyn.events.arrays import (
     CONSTANTS,
     CURRENT,
     DECISIONS,
+    DEFECTS,
     DRIVE,
     DRIVE_NEXT,
     DRIVE_WAVES,
@@ -37,8 +40,12 @@ from multiphi_exudyn.events.arrays import (
     HIGHEST_FREQUENCY,
     HORIZON,
     INSTANT_TIME,
+    JUDGED,
     LAST_DECISION,
     LEVEL,
+    LOSSES,
+    LOST,
+    LOST_AT_START,
     MODES,
     NEED,
     NEED_PIECES,
@@ -73,10 +80,13 @@ from multiphi_exudyn.events.arrays import (
     WORK,
     WORKED,
 )
+from multiphi_exudyn.events.changes import clear
 from multiphi_exudyn.events.decision import decide, decide_jump
+from multiphi_exudyn.events.defect_sums import add_defect, add_start_defect
 from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_drive
 from multiphi_exudyn.events.energies import kinetic, pattern_work, potential
 from multiphi_exudyn.events.flow import expand, state_at
+from multiphi_exudyn.events.maps import find_map
 from multiphi_exudyn.events.start import begin
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.waiting import arm, flag_again, watch, who_asks
@@ -124,11 +134,16 @@ def set_out(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     status = given_up(ints, begin(ints, numbers, waves))
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED], status = NEED_ROOM, NEED
+    if status >= 0 and ints[JUDGED] == 1 and find_map(ints, ints[GIVEN + LEVEL], ints[WORKED + LEVEL]) < 0:
+        status = given_up(ints, NEED)
     if status < 0:
         return status
     ints[STARTING] = 0
+    for k in range(LOSSES):  # what no event carries
+        numbers[LOST_AT_START + k] = numbers[LOST + k] if ints[CHANGE_COUNT] == 0 else 0.0
     numbers[WORK] = pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, GIVEN)
     copy_state(ints, numbers, WORKED, CURRENT)
+    add_start_defect(ints, numbers)
     ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
     keep_events(ints, numbers)
     return OK
@@ -145,8 +160,10 @@ def go_on(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     if status < 0:
         return status
     ints[STARTING] = 0
+    clear(numbers, LOST_AT_START)
     if status == EVENT:
         copy_state(ints, numbers, WORKED, CURRENT)
+        numbers[DEFECTS] = math.nan
         ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
         keep_events(ints, numbers)
     return OK
@@ -191,6 +208,7 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     copy_state(ints, numbers, after, CURRENT)
     numbers[AGE] = 0.0
     if status == EVENT:
+        add_defect(ints, numbers, REACHED, WORKED)
         ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
         keep_events(ints, numbers)
     return OK if status >= 0 else status
@@ -278,6 +296,7 @@ def carry_on(ints: Ints, numbers: Numbers, level: int, status: int) -> int:
     if ints[PRESCRIBED] > 0:
         numbers[WORK] += pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, REACHED)
     copy_state(ints, numbers, WORKED, CURRENT)
+    add_defect(ints, numbers, REACHED, WORKED)
     keep_events(ints, numbers)
     if is_chatter(ints, numbers) == 1:
         ints[CAUSE] = CHATTER

@@ -21,6 +21,7 @@ from multiphi_exudyn.events.arrays import (
     EVENT_WIDTH_NUMBERS,
     EXIT_COUNT,
     INSTANT_TIME,
+    KINETIC,
     LEVEL,
     LOSSES,
     LOST,
@@ -40,8 +41,10 @@ from multiphi_exudyn.events.arrays import (
     SETTLED,
     SHARED,
     SPEED,
+    STRAIN,
     TIME,
     TOLD,
+    TRUNCATED,
     WINDOW,
     WORK,
 )
@@ -99,6 +102,7 @@ def keep_events(ints: Ints, numbers: Numbers) -> None:
             numbers[given + 1 + part] = numbers[LOST + part] if first == 1 and entered != SHARED else 0.0
         numbers[given + 1 + LOSSES] = numbers[ints[CHANGE_IMPULSES] + k]
         if entered != SHARED:
+            numbers[TRUNCATED] += abs(numbers[LOST + KINETIC] + numbers[LOST + STRAIN]) if first == 1 else 0.0
             first = 0
     ints[EVENT_COUNT] += ints[CHANGE_COUNT]
 

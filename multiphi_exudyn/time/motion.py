@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,15 @@ from multiphi_exudyn.time.chatter import allowed, window
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.loop_record import ACCUMULATED
 from multiphi_exudyn.time.record import PHASES, Record
-from multiphi_exudyn.time.trajectory import Start, Statistics, Trajectory
+from multiphi_exudyn.time.trajectory import Again, Start, Statistics, Trajectory
 
 __all__ = ["NUMBERS", "Motion", "carry", "measured"]
 
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
+
+
+RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
+SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
 
 carry, measured = entry(advance), entry(measure)
 
@@ -37,23 +40,26 @@ carry, measured = entry(advance), entry(measure)
 class _Kept:
     """What a run keeps while another one has the arrays.
 
-    ring: of the chatter check, with what it is about. piece, age: which of the channels, and since when [s] it lasts.
-    work [J]: of what varies in time since the last segment ended.
+    last_decision [s], decisions, ring: of the chatter check, the last ones. piece, age: which of the channels, and
+    since when [s] it lasts. work [J]: of what varies in time since the last segment ended. defects, truncated: sums so
+    far, see Segments.
     """
 
-    ring: np.ndarray
+    last_decision: float
     decisions: int = 0
-    last_decision: float = 0.0
+    ring: list[float] = field(default_factory=list)
     piece: int = 0
     age: float = 0.0
     work: float = 0.0
+    defects: float = 0.0
+    truncated: float = 0.0
 
 
 class Motion:
     """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
 
     compiled: False for the loop as plain Python. time [s]: how far it is. message: why it goes no further, or "".
-    start_loss: at a start without events.
+    start_loss: at a start without events. Nothing has happened before ``begin``, or ``advance``, is called.
     """
 
     def __init__(self, arrays: LevelArrays, start: Start, compiled: bool | None = None) -> None:
@@ -66,10 +72,14 @@ class Motion:
         self._state: State | None = start.state
         self._starting = True
         self._window, self._allowed = window(self.model), allowed(self.model)
-        self._kept = _Kept(np.zeros(2 * (self._window + 1)), last_decision=start.time)
+        self._kept = _Kept(start.time)
         self._evaluations = self._transitions = 0
         self._unavailable: Exception | None = None
+
+    def begin(self) -> Motion:
+        """Itself, after whatever happens at the start."""
         self._carry(self.time)
+        return self
 
     @property
     def state(self) -> State:
@@ -81,8 +91,8 @@ class Motion:
         """Forget what has been collected, and go on from a state and a time [s]."""
         self._state, self.time, self.message, self.start_loss = state, time, "", Loss()
         self._starting = False
-        self.record, kept = Record(self.model.contacts, self.arrays), self._kept
-        self._kept = _Kept(np.zeros(len(kept.ring)), 0, time, kept.piece, kept.age, kept.work)
+        self.record = Record(self.model.contacts, self.arrays)
+        self._kept = replace(self._kept, last_decision=time, decisions=0, ring=[], defects=math.nan)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
@@ -100,9 +110,9 @@ class Motion:
         if not self.message and self.time < end:
             self._carry(end, to_change)
 
-    def trajectory(self, end: float) -> Trajectory:
-        """What has been collected."""
-        segments, events = self.record.segments(), self.record.events()
+    def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
+        """What has been collected; again: see Trajectory."""
+        segments, events = self.record.segments(self._kept.defects, self._kept.truncated), self.record.events()
         return Trajectory(
             model=self.model,
             segments=segments,
@@ -122,29 +132,24 @@ class Motion:
                 events=len(events),
                 segments=len(segments),
                 function_evaluations=self._evaluations,
+                record_bytes=self.record.bytes,
+                array_bytes=self.arrays.buffers.size,
             ),
+            again=again,
         )
 
     # ------------------------------------------------------------------ the loop
 
     def _carry(self, end: float, to_change: bool = False) -> None:
-        starting = self._starting
-        with self._failing():
+        """A failure ends the run, with its instant and its cause."""
+        try:
             self._take_over()
             self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
             with np.errstate(all="ignore"):  # as compiled: what is not finite is found, and told
                 answer = self._run(end)
             self._leave()
-            if starting and answer != a.FAILED and self.arrays.ints[a.CHANGE_COUNT] == 0:
-                self.start_loss = Loss(*self.arrays.numbers[a.LOST : a.LOST + a.LOSSES].tolist())
             if answer == a.FAILED:
                 raise self.failure()
-
-    @contextmanager
-    def _failing(self) -> Iterator[None]:
-        """A failure ends the run, with its instant and its cause."""
-        try:
-            yield
         except (MultiPhiError, np.linalg.LinAlgError) as failure:
             singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
             self.message = f"at t = {self.time:.9g} s: {singular}{failure}"
@@ -155,10 +160,21 @@ class Motion:
             answer = int(self._loop(*self.arrays.buffers.all, end))
             if answer == a.FULL:
                 self.record.take()
+                self._check_record()
             elif answer == a.NEED:
                 self._supply()
             else:
                 return answer
+
+    def _check_record(self) -> None:
+        """End the run before its record takes the machine."""
+        taken, segments = self.record.bytes, self.record.parts["rows"].count
+        if taken > RECORD_BYTES:
+            self._leave()
+            raise NumericalFailure(
+                f"record: got {taken / 1e9:.2g} GB of {segments} segments, need at most {RECORD_BYTES / 1e9:.2g} GB: "
+                "a shorter run, from whose end others go on (start=), or fewer events or samples of loads"
+            )
 
     def _supply(self) -> None:
         """Pack what the loop needs, in arrays that begin anew where they have become too large."""
@@ -189,10 +205,10 @@ class Motion:
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
         ints, numbers = self.arrays.ints, self.arrays.numbers
-        ring = numbers[ints[a.RING] :][: len(self._kept.ring)].copy()
-        places = (a.LAST_DECISION, a.AGE, a.WORK)
-        last, age, work = (float(numbers[place]) for place in places)
-        self._kept = _Kept(ring, int(ints[a.DECISIONS]), last, int(ints[a.PIECE]), age, work)
+        decisions, start = int(ints[a.DECISIONS]), int(ints[a.RING])
+        ring = numbers[start : start + 2 * min(decisions, self._window + 1)].tolist()
+        last, age, *sums = (float(numbers[place]) for place in (a.LAST_DECISION, a.AGE, *SUMS))
+        self._kept = _Kept(last, decisions, ring, int(ints[a.PIECE]), age, *sums)
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
@@ -200,13 +216,14 @@ class Motion:
         arrays.channels.set(arrays.buffers, kept.piece, kept.age, self.time)
         level = 0 if state is None else arrays.level(state.level.states)
         arrays.begin_record()
-        ring = arrays.ring(len(kept.ring))
+        ring = arrays.ring(2 * (self._window + 1))
         arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = self._window, kept.decisions
         for slot in (a.TRANSITIONS, a.GIVEN_UP):
             arrays.ints[slot] = 0
         numbers = arrays.numbers
         numbers[ring : ring + len(kept.ring)] = kept.ring
         numbers[a.TIME], numbers[a.LAST_DECISION], numbers[a.WORK] = self.time, kept.last_decision, kept.work
+        numbers[a.DEFECTS], numbers[a.TRUNCATED] = kept.defects, kept.truncated
         numbers[a.ALLOWED], numbers[int(arrays.ints[a.FOUND]) + 1] = self._allowed, 0.0
         if state is None:
             start = self.start
@@ -223,6 +240,8 @@ class Motion:
         self.give_up_arrays()
         self.time = float(numbers[a.TIME])
         if not ints[a.STARTING]:
+            if self._starting:
+                self.start_loss = Loss(*numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
             self._state, self._starting = self._state_reached(), False
         samples = int(ints[a.FOUND]) + 1
         self._evaluations += int(numbers[samples])

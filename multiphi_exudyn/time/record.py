@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Generic, TypeVar, overload
 
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.excitation import Drive
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase
 from multiphi_exudyn.mathematics.compiled import entry
-from multiphi_exudyn.mechanics.element import event_kind
+from multiphi_exudyn.mechanics.element import ElementState, event_kind
 from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
@@ -27,6 +29,17 @@ __all__ = ["PHASES", "Record"]
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK)  # in the order of their numbers
 
 states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
+
+EMPTY = {
+    "rows": np.empty((0, a.SEGMENT_WIDTH), np.int64),
+    "spans": np.empty((0, a.SEGMENT_WIDTH_NUMBERS)),
+    "coordinates": np.empty(0),
+    "phases": np.empty(0, np.int64),
+    "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
+    "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
+}
+
+STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 T = TypeVar("T")
 
@@ -65,11 +78,13 @@ class Made(Sequence[T], Generic[T]):
 class Recorded(Made[Segment], Segments):
     """The segments of a record."""
 
-    def __init__(self, record: Record) -> None:
-        super().__init__(record.segment, len(record.spans), {})
+    def __init__(self, record: Record, defects: float, truncated: float) -> None:
+        spans = record.spans
+        super().__init__(record.segment, len(spans), {})
         self._record = record
-        self.starts, self.ends = record.spans[:, :2].T
+        self.starts, self.ends = spans[:, 0], spans[:, 1]
         self.numbers, self.levels, self.arrays = record.rows[:, 0], record.levels, record.arrays
+        self.defects, self.truncated = defects, truncated
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
@@ -128,19 +143,11 @@ class Record:
     """
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
-        self._names, self.arrays = [contact.name for contact in contacts], arrays
-        self._states = [contact.states for contact in contacts]
+        self._contacts, self.arrays = contacts, arrays
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
-        empty, whole = np.empty(0), np.empty(0, np.int64)
-        self.parts = {
-            "rows": Growing(whole.reshape(0, a.SEGMENT_WIDTH)),
-            "spans": Growing(empty.reshape(0, a.SEGMENT_WIDTH_NUMBERS)),
-            "coordinates": Growing(empty),
-            "phases": Growing(whole),
-            "kinds": Growing(whole.reshape(0, a.EVENT_WIDTH)),
-            "amounts": Growing(empty.reshape(0, a.EVENT_WIDTH_NUMBERS)),
-        }
+        self._armed: dict[int, tuple[Phase, ...]] = {}  # phases of a level while all its exits are armed
+        self.parts = {name: Growing(empty) for name, empty in EMPTY.items()}
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
     phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
@@ -149,10 +156,13 @@ class Record:
         """Take over what the loop has written."""
         ints, numbers = self.arrays.ints, self.arrays.numbers
         n = int(ints[a.SEGMENT_COUNT])
+        if not n:
+            self.take_events()
+            return
         rows = _part(ints, a.SEGMENT_INTS, ints, n * a.SEGMENT_WIDTH).reshape(n, a.SEGMENT_WIDTH)
-        packed = rows[:, 0].copy()
-        for number in dict.fromkeys(packed.tolist()):
-            rows[packed == number, 0] = self._number(self.arrays.loaded[number])
+        packed = rows[:, 0].tolist()
+        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
+        rows[:, 0] = [known[number] for number in packed]
         rows[:, 2] += self.parts["kinds"].count
         rows[:, 3] += self.parts["coordinates"].count
         rows[rows[:, 4] >= 0, 4] += self.parts["phases"].count
@@ -166,11 +176,17 @@ class Record:
     def take_events(self) -> None:
         """Take over the events of what the loop has written, and forget the rest."""
         ints, numbers, m = self.arrays.ints, self.arrays.numbers, int(self.arrays.ints[a.EVENT_COUNT])
-        self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
-        amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
-        self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
+        if m:
+            self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
+            amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
+            self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
             ints[slot] = 0
+
+    @property
+    def bytes(self) -> int:
+        """What it takes of memory."""
+        return sum(part.bytes for part in self.parts.values())
 
     def _add(self, name: str, part: np.ndarray) -> None:
         self.parts[name].add(part)
@@ -186,13 +202,18 @@ class Record:
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
+        return np.flatnonzero(self.kinds[:, 1] != a.SHARED) if self.parts["kinds"].count else EMPTY["phases"]
+
+    @functools.cached_property
+    def _told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
+        """The name of every contact, and its states."""
+        return [(contact.name, contact.states) for contact in self._contacts]
 
     # ------------------------------------------------------------------ objects
 
-    def segments(self) -> Recorded:
+    def segments(self, defects: float = math.nan, truncated: float = math.nan) -> Recorded:
         """All segments so far."""
-        return Recorded(self)
+        return Recorded(self, defects, truncated)
 
     def events(self) -> Events:
         """All events so far."""
@@ -262,8 +283,9 @@ class Record:
 
     def _scratch(self) -> np.ndarray:
         """Memory for the work of a segment."""
-        pairs = sum(any(state.rubs for state in states) for states in self._states)
-        return np.empty(work_waves(*self.arrays.most, int(self.arrays.ints[a.CHANNELS]), pairs), complex)
+        pairs = sum(any(state.rubs for state in contact.states) for contact in self._contacts)
+        room, q = self.arrays.scratch, int(self.arrays.ints[a.CHANNELS])
+        return np.empty(work_waves(room.coordinates, room.exponentials, q, pairs), complex)
 
     def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
         """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""
@@ -294,14 +316,17 @@ class Record:
 
     def standing(self, i: int) -> tuple[Phase, ...]:
         """The phases at the start of the i-th segment."""
-        c, start = len(exits_of(self.level(i))), self.rows[i, 4]
-        return (Phase.ARMED,) * c if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + c])
+        number, start = int(self.rows[i, 0]), self.rows[i, 4]
+        if number not in self._armed:
+            self._armed[number] = (Phase.ARMED,) * len(exits_of(self.levels[number]))
+        armed = self._armed[number]
+        return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:
         """The phases (n, c), in numbers, at the start of every segment."""
-        numbers, starts = np.zeros((len(self.rows), len(self._names)), np.int64), self.rows[:, 4]
+        numbers, starts = np.zeros((len(self.rows), len(self._contacts)), np.int64), self.rows[:, 4]
         unsettled = starts >= 0
-        numbers[unsettled] = self.phases[starts[unsettled][:, None] + np.arange(len(self._names))]
+        numbers[unsettled] = self.phases[starts[unsettled][:, None] + np.arange(len(self._contacts))]
         return numbers
 
     def segment(self, i: int) -> Segment:
@@ -309,8 +334,8 @@ class Record:
         level, (start, end, armed_at, horizon, work, age) = self.level(i), self.spans[i].tolist()
         xi, xi_t = self.state(i)
         held = xi[level.modal.modes + level.excitation.prescribed :]
-        drive = self.arrays.channels.drive(self.rows[i, 1]).after(age).beside(held)
-        flow = Flow.of(level, xi, xi_t, drive, horizon)
+        drive = self.arrays.channels.drive(self.rows[i, 1]).after(age) if level.excitation.prescribed else STILL
+        flow = Flow.of(level, xi, xi_t, drive.beside(held), horizon)
         return Segment(start, end, level, flow, self.standing(i), armed_at, work)
 
     def event(self, i: int) -> Event:
@@ -319,6 +344,6 @@ class Record:
         before = int(self.places[i - 1]) + 1 if i else 0
         time, *lost, impulse = self.amounts[place].tolist()
         contact, entered, left = self.kinds[place].tolist()
-        shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, -1])) for k in range(before, place))
-        kind = event_kind(self._states[contact], left, entered)
-        return Event(time, self._names[contact], kind, Loss(*lost), impulse, shared)
+        shared = tuple((self._told[self.kinds[k, 0]][0], float(self.amounts[k, -1])) for k in range(before, place))
+        name, states = self._told[contact]
+        return Event(time, name, event_kind(states, left, entered), Loss(*lost), impulse, shared)

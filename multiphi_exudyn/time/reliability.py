@@ -19,17 +19,19 @@ tests/campaign/truncation_study.py.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.damping import ModalDamping
-from multiphi_exudyn.time.defects import DefectHistory
-from multiphi_exudyn.time.segment import listed
+from multiphi_exudyn.time.defects import Samples, indicator, total_defect
+from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
@@ -41,9 +43,9 @@ PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critic
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
 STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
-MANY_PIECES = 2**16  # of loads in a run: half a minute of computing and 200 MB
-PIECE_SECONDS = 5e-4  # that a piece of a load takes in a small model
-PIECE_BYTES = 3000  # that it takes there
+MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
+PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
+PIECE_BYTES = 500  # that it takes there, its segment included
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
@@ -53,10 +55,11 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     model = trajectory.model
     found = list(damping_warnings(model))
     if not model.whole:
-        history = DefectHistory.of(trajectory)
-        found.extend(static_warnings([level.level for level in history.segments.levels]))
-        found.extend(_lost_energy(trajectory, history))
-        found.extend(_truncation(trajectory, history, tolerance))
+        segments = listed(trajectory.segments)
+        samples = Samples(segments, trajectory.t_end)
+        found.extend(static_warnings([level.level for level in segments.levels]))
+        found.extend(_lost_energy(trajectory, segments, samples))
+        found.extend(_truncation(trajectory, samples, tolerance))
     found.extend(_clusters(trajectory))
     if model.validity is not None:
         found.extend(model.validity(trajectory))
@@ -131,23 +134,26 @@ def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
             f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
             f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
         )
-    if len(listed) and np.max(listed) >= PER_CENT:
+    if (largest := max(listed, default=0.0)) >= PER_CENT:
         yield (
-            f"damping ratios: {np.max(listed):g} is {100 * np.max(listed):g} % of critical damping, which looks like a "
+            f"damping ratios: {largest:g} is {100 * largest:g} % of critical damping, which looks like a "
             "ratio in per cent; write 0.01 for 1 %"
         )
 
 
-def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str]:
+def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -> Iterator[str]:
     """Of the energy that truncation took, whatever its sign at an instant."""
     start, base = trajectory.start, trajectory.model.base
     at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
-    lost = abs(at_start) + float(np.sum(np.abs(history.table[:, 3])))
+    at_events = segments.truncated
+    if math.isnan(at_events):
+        at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
+    lost = abs(at_start) + at_events
     given = 0.5 * float(start.velocity @ start.velocity)
     given += base.strain(start.displacement, start.penetrating, start.gaps)
     if lost <= ENERGY_SHARE * abs(given):
         return
-    yield from _energy_warning(lost, max(history.largest_energy, abs(given)))
+    yield from _energy_warning(lost, max(samples.largest_energy, abs(given)))
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
@@ -157,9 +163,14 @@ def _energy_warning(lost: float, largest: float) -> Iterator[str]:
         yield f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}"
 
 
-def _truncation(trajectory: Trajectory, history: DefectHistory, tolerance: Tolerance | None) -> Iterator[str]:
+def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance | None) -> Iterator[str]:
     """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
-    rigid, error = bool(np.any(history.table[:, 2] > 0)), history.indicator(trajectory.t_end)
+    lost, least = total_defect(trajectory), min(INDICATOR, tolerance.error if tolerance else INDICATOR)
+    y, defect = trajectory.start.displacement, math.sqrt(lost)
+    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(float(y @ y)) - defect):
+        return
+    impulses, error = event_table(trajectory.events, trajectory.model.index)[:, 2], indicator(lost, samples)
+    rigid = bool(np.any(impulses > 0))
     if tolerance is not None and error > tolerance.error:
         kept = trajectory.model.level_at(()).modes
         yield (
@@ -177,10 +188,7 @@ def _per_cent(share: float) -> str:
 
 def _clusters(trajectory: Trajectory) -> list[str]:
     """One sentence where levels of the run keep modes beyond those asked for."""
-    if not trajectory.model.keeps_clusters:
-        return []  # without a look at segments, which a run makes only when they are asked for
-    visited = (level.level.indices for level in listed(trajectory.segments).levels)
-    levels = [trajectory.model.level_at(indices) for indices in visited]
+    levels = [level.modal for level in listed(trajectory.segments).levels]
     kept = [level for level in levels if level.kept_beyond]
     if not kept:
         return []
@@ -196,7 +204,7 @@ def _clusters(trajectory: Trajectory) -> list[str]:
 def _load_pieces(trajectory: Trajectory) -> list[str]:
     """Whether the loads have so many pieces that they set the time and memory of the run."""
     level = trajectory.final.level if trajectory.final is not None else None
-    if level is None or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
+    if level is None or not level.excitation.histories or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
         return []
     pieces = level.excitation.pieces(trajectory.t_end)
     each = 1e3 * PIECE_SECONDS * level.excitation.effort(trajectory.t_end) / pieces

@@ -108,8 +108,13 @@ class Segment:
 class Segments(Sequence[Segment], ABC):
     """The segments of a run, in order, and in arrays what many of them are asked for together.
 
-    starts, ends: (n,) [s]. numbers: (n,) of their levels in ``levels``, each of which is there once.
+    starts, ends: (n,) [s]. numbers: (n,) of their levels in ``levels``, each of which is there once. defects: sum of
+    |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their signs [J]; nan
+    where the loop has not summed them.
     """
+
+    defects = math.nan
+    truncated = math.nan
 
     starts: np.ndarray
     ends: np.ndarray

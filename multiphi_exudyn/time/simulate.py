@@ -23,7 +23,7 @@ from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.loads import Load, unchanging
 from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.refinement import to_tolerance
@@ -77,9 +77,9 @@ def simulate(
         run = replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
-    trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
-    issue(trajectory.warnings)
-    return trajectory
+    found = warnings_of(trajectory, tolerance)
+    issue(found)
+    return replace(trajectory, warnings=found) if found else trajectory
 
 
 @dataclass(frozen=True)
@@ -101,21 +101,34 @@ class Run:
             return self._decided()
 
         def run(finer: float) -> Trajectory:
-            motion = self.begun(finer)
+            motion = self._motion(finer)
             motion.advance(self.t_end)
-            return motion.trajectory(self.t_end)
+            return motion.trajectory(self.t_end, self._again)
 
-        return replace(to_tolerance(run, self.loads), again=self._again)
+        return to_tolerance(run, self.loads)
 
-    def begun(self, finer: float = 1.0) -> Motion:
-        """A motion at its start; smooth courses of loads are taken to their tolerance / finer."""
-        excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
+    def begun(self) -> Motion:
+        """A motion at its start."""
+        return self._motion().begin()
+
+    def _motion(self, finer: float = 1.0) -> Motion:
+        """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before = self.start if isinstance(self.start, Trajectory) else None
-        levels = levels_of(self.model, excitation, before.t_end if before else 0.0, self.t_end)
-        start = _start(self, excitation) if before is None else going_on(before, levels)
+        levels = self._levels(finer)
+        start = _start(self, levels) if before is None else going_on(before, levels)
         return motion_of(levels, start, self.compiled)
+
+    def _levels(self, finer: float) -> LoadedLevels:
+        """The levels under the loads, which the model keeps where nobody can change what the loads are."""
+        model, loads = self.model, unchanging(self.loads)
+        time = self.start.t_end if isinstance(self.start, Trajectory) else 0.0
+
+        def made() -> LoadedLevels:
+            return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
+
+        return made() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), made)
 
     def _decided(self) -> Trajectory:
         """The answer of a model whose number of modes the first run decides."""
@@ -136,10 +149,8 @@ class Run:
 
 def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
     """The run in these levels."""
-    arrays = levels.arrays or LevelArrays(levels)
-    if levels.alone is levels:
-        levels.arrays = arrays
-    return Motion(arrays, start, compiled)
+    levels.arrays = levels.arrays or LevelArrays(levels)
+    return Motion(levels.arrays, start, compiled)
 
 
 def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
@@ -152,36 +163,66 @@ def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: fl
     return LoadedLevels(model, excitation, time, end, alone) if excitation.channels else alone
 
 
-def _start(run: Run, excitation: Excitation) -> Start:
+@dataclass(frozen=True)
+class _Scales:
+    """What the gaps (c,) of a start are judged by; moved, speeds: of the stops.
+
+    touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
+    moves a mode at most, (m,) [s].
+    """
+
+    moved: np.ndarray
+    speeds: np.ndarray
+    touching: np.ndarray
+    sizes: np.ndarray
+    times: np.ndarray
+
+    @classmethod
+    def of(cls, levels: LoadedLevels, end: float) -> _Scales:
+        """Under the loads until the end [s] of a run."""
+        base, excitation = levels.model.base, levels.excitation
+        omega, sizes = base.modes.omega, np.linalg.norm(base.directions, axis=0)
+        times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
+        ways = base.magnitudes[1] + excitation.stop_ways
+        gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
+        lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + float(np.max(gaps, initial=0.0))
+        moved, speeds = map(excitation.moved, levels.drive.values[:2])
+        return cls(moved, speeds, TOUCHING * ways + UNSEEN * lengths * sizes, sizes, times)
+
+    def near(self, terms: np.ndarray, y: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Gaps (c,) [m] below which a contact is in touch: by the terms (c,) of h.y, by where y' takes the modes."""
+        moving = v * self.times
+        length = math.sqrt(float(y @ y)) + math.sqrt(float(moving @ moving))
+        return np.asarray(TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching)
+
+
+def _start(run: Run, levels: LoadedLevels) -> Start:
     """The start as the contacts see it."""
     model, base = run.model, run.model.base
     y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
-    still = np.zeros(len(model.links))
-    moved, speeds = map(excitation.moved, excitation.drive(0.0).values[:2]) if excitation.prescribed else (still, still)
-    gaps = (y @ base.directions + base.gaps - moved).tolist()
-    directions, initial = base.magnitudes
-    ways = initial + excitation.stop_ways
-    unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, run.t_end)
-    scales = (TOUCHING * (ways + np.abs(y) @ directions) + unseen).tolist()
-    rates, terms = v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds)
+    scales: _Scales = levels.starts.get_or_build(run.t_end, lambda: _Scales.of(levels, run.t_end))
+    stops, directions = base.gaps - scales.moved, base.magnitudes[0]
+    gaps = (y @ base.directions + stops).tolist()
+    near = scales.near(np.abs(y) @ directions, y, v).tolist()
+    rates, terms = v @ base.directions - scales.speeds, np.abs(v) @ directions + np.abs(scales.speeds)
     rates = drop_round_off(rates, terms)
     states = np.zeros(len(model.contacts), int)
     for i, contact in enumerate(model.contacts):
-        if contact.rigid and not contact.held and gaps[i] < -scales[i]:
+        if contact.rigid and not contact.held and gaps[i] < -near[i]:
             raise MultiPhiValueError(
                 f"displacement: lies {-gaps[i]:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
                 "(static_equilibrium gives an admissible start)"
             )
-        depth = gaps[i] if gaps[i] < -scales[i] and not contact.held else 0.0
+        depth = gaps[i] if gaps[i] < -near[i] and not contact.held else 0.0
         named = contact.first_state(depth, *rates[list(model.link_places[i])].tolist())
         states[i] = [state.name for state in contact.states].index(named)
-        if contact.rigid and not contact.held and gaps[i] <= scales[i]:
+        if contact.rigid and not contact.held and gaps[i] <= near[i]:
             states[i] = CLOSE
     closed = [i for i, contact in enumerate(model.contacts) if states[i] != OPEN and not contact.held]
     touching = tuple(i for i in closed if model.contacts[i].rigid)
     stretches = run.stretches or {}
     held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
-    left = base.gaps - moved
+    left = stops.copy()
     left[list(model.held)] -= held
     stuck = [i for i, contact in enumerate(model.contacts) if contact.held and states[i] == 0]
     sprung = tuple(sorted([*(i for i in closed if i not in touching), *stuck]))
@@ -218,18 +259,6 @@ def _check_start(run: Run) -> None:
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
     if not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
-
-
-def _lengths(
-    model: MultiPhiModel, y: np.ndarray, v: np.ndarray, load: np.ndarray, ways: np.ndarray, end: float
-) -> np.ndarray:
-    """What gaps (c,) [m] could become: by y, by where v and a load (m,) take the modes, by ways (c,) of all gaps."""
-    omega = model.base.modes.omega
-    times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
-    sizes = np.linalg.norm(model.base.directions, axis=0)
-    gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
-    motion = np.linalg.norm(y) + np.linalg.norm(v * times) + np.linalg.norm(load * times**2)
-    return np.asarray(sizes * (motion + np.max(gaps, initial=0.0)))
 
 
 def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:

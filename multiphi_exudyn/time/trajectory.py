@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,10 +26,12 @@ from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.friction_rows import force_row, patch_row, pressing_row
 from multiphi_exudyn.time.segment import Segment, Segments, listed
 
-__all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
+__all__ = ["Again", "Ledger", "Start", "Statistics", "Trajectory"]
 
 NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
 INSTANTS = 1001  # at which a nudged run is compared, beside the events
+
+Again: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,11 @@ class Start:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Work of a run; function_evaluations counts samples of event signals."""
+    """Work of a run; function_evaluations counts samples of event signals.
+
+    record_bytes: what its segments and events take; array_bytes: the levels, maps and loads of the loop, which runs of
+    one model under the same loads share.
+    """
 
     levels_built: int
     levels_possible: int
@@ -62,6 +69,8 @@ class Statistics:
     events: int
     segments: int
     function_evaluations: int
+    record_bytes: int = 0
+    array_bytes: int = 0
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,7 @@ class Trajectory:
     load: np.ndarray
     stats: Statistics
     warnings: tuple[str, ...] = ()
-    again: Callable[[np.ndarray, np.ndarray], Trajectory] | None = field(default=None, repr=False, compare=False)
+    again: Again | None = field(default=None, repr=False, compare=False)
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
         """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""

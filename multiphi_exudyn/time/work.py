@@ -8,8 +8,9 @@ f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so th
 
     f g = 1/2 Re sum_jk F_j G_k phi_j phi_k + F_j conj(G_k phi_k) phi_j
 
-and needs no exponentials but those at the end. A chain is a rate with its powers of time: the products of two chains
-are (t/T)^d exp(s t), s the sum of their rates, and d goes up to the sum of their degrees.
+and needs no exponentials but those at the end. Where no power of time is in the free response, its own share of damping
+is what a form that its level keeps has changed by (level_parts.primitive). A chain is a rate with its powers of time:
+the products of two chains are (t/T)^d exp(s t), s the sum of their rates, and d goes up to the sum of their degrees.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import math
 from multiphi_exudyn.events.arrays import (
     AFTER,
     CHANNELS,
+    DISSIPATED,
     DISSIPATION,
     FLOW_BASIS,
     FLOW_COUNT,
@@ -78,19 +80,26 @@ def integrate_works(
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
         place, sums = 0, 4 * n * p + 2 * q * p + 2 * ints[level + RUBBINGS] * p
-        list_terms(ints, numbers, waves, scratch)
-        weigh_terms(ints, numbers, scratch)
         exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
+        for part in range(3):
+            works[3 * i + part] = 0.0
+        apart = 0  # terms whose products need no integral
+        if ints[level + DISSIPATED] >= 0 and ints[level + RUBBINGS] == 0:
+            apart = ints[FLOW_FREE]
+        if apart > 0:
+            works[3 * i] = dissipated(ints, numbers, waves, scratch)
+        if apart == p and q == 0:
+            continue
+        list_terms(ints, numbers, waves, scratch)
+        weigh_terms(ints, numbers, scratch, apart)
         raised = sums + 12 * p  # powers of t / T at the end
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
-        for part in range(3):
-            works[3 * i + part] = 0.0
         add_constants(ints, numbers, waves, scratch, works, 3 * i + 1)
         add_friction(ints, numbers, waves, scratch, works, 3 * i + 2)
         while place < p:
-            other, length = place, chain(ints, place)
+            other, length = max(place, apart), chain(ints, place)
             while other < p:
                 further = chain(ints, other)
                 if multiply(ints, scratch, n, place, length, other, further, sums) == 1:
@@ -136,12 +145,34 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> No
 
 
 @compiled
-def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves) -> None:
-    """Coefficients of D xi' (p, n), of what w_k, w_k' are multiplied by (p, 2 q), but e_k, and of T_e, s_e.xi'."""
+def dissipated(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> float:
+    """(u + u_0).F (u - u_0) / 2 of the free response at the end u and at the start u_0 of the flow."""
+    p, c, phi, total = ints[FLOW_FREE], ints[FLOW_WAVES], ints[WORK_WAVES], 0.0
+    row = ints[ints[AFTER + LEVEL] + DISSIPATED]
+    for j in range(p):
+        end = waves[c + j] * waves[phi + j]
+        scratch[j] = end - waves[c + j]
+        scratch[p + j] = end + waves[c + j]
+    for part in range(2):
+        for j in range(p):
+            value = 0.0
+            for k in range(p):
+                value += numbers[row + k] * scratch[k].real + numbers[row + p + k] * scratch[k].imag
+            total += value * (scratch[p + j].real if part == 0 else scratch[p + j].imag)
+            row += 2 * p
+    return 0.5 * total
+
+
+@compiled
+def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves, apart: int) -> None:
+    """Coefficients of D xi' (p, n), of what w_k, w_k' are multiplied by (p, 2 q), but e_k, and of T_e, s_e.xi'.
+
+    apart: the first terms, whose D xi' nobody needs.
+    """
     level, p, q = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS]
     n = ints[level + MODES] + q
     for j in range(p):
-        for i in range(n):
+        for i in range(n if j >= apart else 0):
             row, total = ints[level + DISSIPATION] + i * n, 0j
             for k in range(n):
                 total += numbers[row + k] * scratch[(p + j) * n + k]

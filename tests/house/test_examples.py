@@ -192,3 +192,13 @@ def test_body_speed(capsys):
     assert rows["body, 12 modes, 5020 steps"].error < 5e-4
     assert all(0 < row.median < math.inf for row in rows.values())
     assert capsys.readouterr().out.count("at most") == 7
+
+
+def test_run_cost(capsys):
+    """Times are not asserted: a record takes what its numbers take."""
+    costs = load("run_cost").main(rounds=1)
+    assert costs["6 modes, free"].event_bytes == pytest.approx(260, rel=0.1)
+    assert all(
+        0 < time < math.inf for cost in costs.values() for time in (cost.short, cost.run, cost.bare, cost.ledger)
+    )
+    assert capsys.readouterr().out.count("of which warnings") == 6

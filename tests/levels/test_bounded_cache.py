@@ -2,16 +2,18 @@
 
 import gc
 import math
+import re
 import tracemalloc
 
 import numpy as np
 import pytest
-from small_structures import bed
+from small_structures import bed, chain, stop
 
-from multiphi_exudyn import HarmonicLoad, simulate
+from multiphi_exudyn import ConstantLoad, HarmonicLoad, MultiPhiModel, simulate
 from multiphi_exudyn.events import level_arrays
 from multiphi_exudyn.levels import model as model_module
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.time import motion
 
 TIMES = np.linspace(0.0, 0.04, 40)
 
@@ -65,6 +67,34 @@ def test_a_tiny_bound_gives_the_same_run_to_the_bit_and_is_kept(monkeypatch, mos
     assert tight.levels_kept == most
     assert tight.levels_built > plenty.levels_built
     assert all(loaded.levels_kept <= most for _, loaded in tight.loaded.items())
+
+
+def test_arrays_under_many_loads_share_one_bound(monkeypatch):
+    """Those of the loads used last are kept; who still has the others is none the wiser."""
+    monkeypatch.setattr(level_arrays, "ARRAY_BYTES", 2_500_000)
+    model, runs = bed(1e7, n=60, stops=8, modes=8), []
+    velocity = model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
+    for load in (ConstantLoad("p3", 1.0), HarmonicLoad("p3", 1e3, 200.0), ConstantLoad("p3", 2.0)) * 2:
+        runs.append(simulate(model, float(TIMES[-1]), velocity=velocity, loads=[load]))
+        kept = {arrays for _, levels in model.loaded.items() for arrays in levels.kept_arrays}
+        assert runs[-1].segments.arrays in kept
+        assert 500_000 < runs[-1].stats.array_bytes <= sum(arrays.buffers.size for arrays in kept) <= 2_500_000
+    for first, second in zip(runs[:3], runs[3:], strict=True):
+        assert told(first) == told(second)
+
+
+def test_a_record_that_becomes_too_large_ends_the_run(monkeypatch):
+    model = MultiPhiModel(chain(2), [stop("m1", 0.0, 50.0)], modes="all")
+    whole = simulate(model, 1e4, velocity=[1.0, 0.3])
+    assert whole.stats.record_bytes > 8 * 2 * 2 * len(whole.segments) > 1e5
+    monkeypatch.setattr(motion, "RECORD_BYTES", whole.stats.record_bytes // 2)
+    run = simulate(model, 1e4, velocity=[1.0, 0.3])
+    assert run.status == "failed"
+    assert re.search(
+        r"at t = \d+\.\d+ s: record: got .* GB of \d+ segments, need at most .* a shorter run", run.message
+    )
+    assert 1e3 < run.t_end < 1e4
+    np.testing.assert_allclose(run.displacement(run.t_end), whole.displacement(run.t_end), atol=1e-10)
 
 
 def test_what_is_kept_takes_no_more_bytes_than_the_bound(monkeypatch):

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 import scipy.optimize
-from flat_records import as_they_are, flat_distance
+from buffer_records import as_they_are, distance_in_buffers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -35,7 +35,7 @@ def directions(random, kind, k, r, angle):
     return rows
 
 
-both = pytest.mark.parametrize("solve", [least_distance, flat_distance], ids=["numpy", "flat"])
+both = pytest.mark.parametrize("solve", [least_distance, distance_in_buffers], ids=["numpy", "buffers"])
 
 
 def nearest_admissible(solve, rows, vector, free=None):
@@ -176,7 +176,7 @@ def test_a_contact_that_no_mode_moves_is_left_alone_unless_its_stop_moves_into_i
 def test_says_where_it_does_not_settle(monkeypatch):
     for module in ("least_distance", "least_distance_arrays"):
         monkeypatch.setattr(f"multiphi_exudyn.mathematics.{module}.SETS", 0)
-    for solve in (least_distance, functools.partial(flat_distance, run=as_they_are)):
+    for solve in (least_distance, functools.partial(distance_in_buffers, run=as_they_are)):
         with pytest.raises(NumericalFailure, match="round-off decides"):
             solve(np.eye(2), np.ones(2), np.ones(2))
 

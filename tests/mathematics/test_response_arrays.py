@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from buffer_records import Buffers, fast
 from carriers import CARRIERS
-from flat_records import Buffers, fast
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.mathematics import compiled, response_arrays

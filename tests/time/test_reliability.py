@@ -8,9 +8,13 @@ import warnings
 
 import numpy as np
 import pytest
-from small_structures import chain, stop
+from numpy.testing import assert_allclose
+from small_structures import chain, random_model, stop
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.state import event_table
+from multiphi_exudyn.time import chatter
+from multiphi_exudyn.time.defects import defects
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
@@ -293,3 +297,32 @@ class TestHorizon:
         model = mp.MultiPhiModel(chain(3), [stop("m0", 0.1, 30.0)], modes="all")
         run = mp.simulate(model, 30.0, loads=[mp.ConstantLoad("m2", -1.0)])
         assert pickle.loads(pickle.dumps(run)).horizon(1e-3) == run.horizon(1e-3)
+
+
+@pytest.mark.parametrize("kind", ["compliant", "mixed"])
+def test_what_the_loop_adds_up_of_defects_is_the_sum_of_them(kind):
+    known = 0
+    for seed in range(30):
+        model, random = random_model(seed, kind=kind)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = mp.simulate(model, 10.0, velocity=random.normal(size=model.structure.n))
+        sums, rows = run.segments, event_table(run.events, model.index)
+        assert_allclose(sums.truncated, np.sum(np.abs(rows[:, 3])), rtol=1e-12, atol=1e-300)
+        if not (model.whole or math.isnan(sums.defects)):
+            exact = sum(defect.size**2 for defect in defects(run))
+            assert_allclose(sums.defects, exact, rtol=1e-6, atol=1e-24)
+            known += len(run.events) > 1
+    assert known > 8
+
+
+def test_a_run_that_ends_with_an_event_has_its_warnings(monkeypatch):
+    monkeypatch.setattr(chatter, "EVENTS_PER_PERIOD", 0.01)
+    monkeypatch.setattr(chatter, "CHATTER_WINDOW", 3)
+    model = mp.MultiPhiModel(chain(8), [mp.UnilateralContact("stop", "m7", 0.0)], modes=3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = mp.simulate(model, 50.0, velocity=-np.ones(8))
+    assert "chatter" in run.message
+    assert run.events[-1].time == run.t_end
+    assert all(": " in warning for warning in run.warnings)

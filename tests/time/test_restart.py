@@ -140,3 +140,12 @@ def assert_goes_on(whole, first, rest, tolerance):
     t = np.linspace(first.t_end, rest.t_end, 21)
     size = np.max(np.abs(whole.displacement(np.linspace(0, rest.t_end, 101))))
     assert_allclose(rest.displacement(t), whole.displacement(t), rtol=0, atol=tolerance * size)
+
+
+def test_the_ledger_of_a_truncated_run_that_goes_on_knows_nothing_of_what_was_lost_before():
+    model = MultiPhiModel(chain(8), [UnilateralContact("stop", "m7", 0.01, 1e4)], modes=3)
+    first = simulate(model, 2.0, velocity=-np.ones(8))
+    assert any(event.loss.truncation_kinetic for event in first.events)
+    again = simulate(model, 4.0, start=first)
+    assert again.start_loss.total == 0
+    assert_allclose(again.ledger.residual, 0, atol=1e-12 * again.ledger.initial)

@@ -330,7 +330,7 @@ class MultiPhiBody:
 
     def _set_out(self, mbs: Any, step: float, end: float) -> None:
         """Compute the motion ahead, from the present state and time on."""
-        alone = motion_of(self._own.loaded, self._motion.start)
+        alone = motion_of(self._own.loaded, self._motion.start).begin()
         motion, here = KnownMotion(alone, self._state, self.time), self.coordinates
         here.enter(mbs, here.stepped, here.stepped.drive)
         self._step = math.nan

@@ -1,4 +1,4 @@
-"""Flat buffers filled from the objects whose meaning the flat functions share, to compare the two."""
+"""Buffers filled from the objects whose meaning the functions on them share, to compare the two."""
 
 import functools
 from typing import NamedTuple
@@ -146,8 +146,8 @@ class Search:
         )  # fmt: skip
 
 
-def flat_distance(rows, least, sizes, run=fast):
-    """``least_distance`` on flat buffers, with its failures."""
+def distance_in_buffers(rows, least, sizes, run=fast):
+    """``least_distance`` in buffers, with its failures."""
     (k, r), buffers = rows.shape, Buffers()
     given = [buffers.put_numbers(values) for values in (rows, least, sizes)]
     x, p = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))

@@ -1,0 +1,78 @@
+"""Forms of defects: what a level cannot hold of the motion that comes into it from another one, or from the base.
+
+    d = P (y - Psi eta - y_inf),   w = Q (v - Psi eta')
+
+as in time/defects.py; d and w / Omega are linear in the states before and after, of these maps triangular factors are
+kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.modal_base import ModalBase
+
+__all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
+
+
+@dataclass(frozen=True)
+class DefectForm:
+    """The maps to defects from level to level: (eta, eta_after, 1) to d, (eta', eta'_after) to w / Omega.
+
+    modes: of either level.
+    """
+
+    displaced: np.ndarray
+    moving: np.ndarray
+    modes: tuple[int, int]
+
+    def squares(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """|defect|^2 (k,) between states (2, k, >= r) at an instant."""
+        r, s = self.modes
+        states = np.concatenate([before[:, :, :r], after[:, :, :s]], axis=2)
+        d = states[0] @ self.displaced[:, :-1].T + self.displaced[:, -1]
+        w = states[1] @ self.moving.T
+        return np.asarray(np.sum(d * d, axis=1) + np.sum(w * w, axis=1))
+
+
+def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...]) -> DefectForm:
+    """The maps into a level, which keeps them: under one load a level has one neighbour with given states."""
+    key = before.states, stopped
+    if key not in after.entries:
+        base, source, target = after.level.base, before.level.vectors, after.level.vectors
+        jump = before.asymptotic.configuration - after.asymptotic.configuration
+        held = held_rigidly(after)
+        displaced = allowed(base, held, np.column_stack([source, -target, jump]))
+        moving = over_omega(base, allowed(base, held | set(stopped), np.column_stack([source, -target])))
+        modes = source.shape[1], target.shape[1]
+        after.entries[key] = DefectForm(factor(displaced), factor(moving), modes)
+    way: DefectForm = after.entries[key]
+    return way
+
+
+def factor(rows: np.ndarray) -> np.ndarray:
+    """R with |R z| = |rows z|."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def held_rigidly(level: LoadedLevel) -> set[int]:
+    """The closed rigid contacts."""
+    return {i for i in level.level.indices if level.level.base.links[i].rigid}
+
+
+def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
+    """The part of motions (m, ...) that rigid contacts allow."""
+    if not held:
+        return motion
+    directions = base.directions[:, sorted(held)]
+    return motion - directions @ np.linalg.lstsq(directions, motion, rcond=None)[0]
+
+
+def over_omega(base: ModalBase, motion: np.ndarray) -> np.ndarray:
+    """Motions (m, ...) over Omega, zero where that is zero."""
+    omega = base.modes.omega
+    weights = np.divide(1.0, omega, out=np.zeros_like(omega), where=omega > 0)
+    return np.asarray((motion.T * weights).T)

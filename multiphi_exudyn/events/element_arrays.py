@@ -1,0 +1,56 @@
+"""The run record, and what is known of the elements of a model, in new buffers (arrays.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
+from multiphi_exudyn.mechanics.element import friction_spring
+
+__all__ = ["describe_elements"]
+
+
+def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
+    """Kinds, chains, stiffnesses, directions and springs of all elements, behind the run record."""
+    put = buffers.put
+    buffers.take("ints", a.RUN_INTS)
+    buffers.take("numbers", a.RUN_NUMBERS)
+    base, c = model.base, len(model.contacts)
+    viscous = base.dampings > 0
+    kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))[:c]
+    kinds[[i for i in model.held if i < c]] = a.SLIDING
+    chains = np.full(c, -1)
+    for number, chain in enumerate(model.chains):
+        chains[list(chain)] = number
+    lengths = np.linalg.norm(base.directions, axis=0)
+    units = base.directions / np.where(lengths > 0, lengths, 1.0)
+    given = {
+        a.ELEMENTS: c,
+        a.COORDINATES: base.modes.count,
+        a.WHOLE: int(model.whole),
+        a.JUDGED: int(not model.whole),
+        a.KINDS: put("ints", kinds),
+        a.CHAINS: put("ints", chains),
+        a.CHAIN_COUNT: len(model.chains),
+        a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
+        a.DIRECTIONS: put("numbers", units[:, :c].T),
+        **_frictions(buffers, model),
+    }
+    for slot, value in given.items():
+        buffers.ints[slot] = value
+    buffers.numbers[a.INDEPENDENCE] = INDEPENDENT
+
+
+def _frictions(buffers: Buffers, model: MultiPhiModel) -> dict[int, int]:
+    """What the elements with a held link do with its spring."""
+    found = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
+    places = [links[int(row[1])] for links, row in zip(model.link_places, found, strict=True)]
+    return {
+        a.STICKS: buffers.put("ints", found[:, 0]),
+        a.HELD_LINKS: buffers.put("ints", places),
+        a.SPRINGS: buffers.put("numbers", found[:, 2]),
+        a.DROPS: buffers.put("numbers", found[:, 3]),
+    }
