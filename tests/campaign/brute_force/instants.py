@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 
 from brute_force.levels import STEP
+from brute_force.sliding import SIGNS
 from brute_force.system import NoAnswer
 
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
@@ -29,20 +30,22 @@ class Instants:
         y = self._struck(y, w, touching, answer)
         resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
         best, worst = None, np.inf
-        for count in range(len(resting) + 1):
-            for held in itertools.combinations(resting, count):
-                if worst <= ZERO or not self._independent(held):
-                    continue
-                state = self._compliant(before, held, y, t)
-                violation = self._violation(state, resting, y, t)
-                if violation < worst:
-                    best, worst = state, violation
+        for slides in self.levels.sliding.choices(before, y, w, self.speed):
+            for count in range(len(resting) + 1):
+                for held in itertools.combinations(resting, count):
+                    if worst <= ZERO or not self._independent(held, slides):
+                        continue
+                    state = self._compliant(before, held, slides, y, t)
+                    after = self.levels.sliding.entered(before, state, y, w)
+                    violation = self._violation(before, state, resting, after, t)
+                    if violation < worst:
+                        best, worst = (state, after), violation
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
-        for i, (old, new) in enumerate(zip(before, best, strict=True)):
-            if old != new:
+        for i, (old, new) in enumerate(zip(before, best[0], strict=True)):
+            if old != new and (i < self.levels.c or t > 0):
                 answer.events.append((t, i, new))
-        return best, y
+        return best
 
     def at_rest(self, y, t):
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
@@ -84,10 +87,13 @@ class Instants:
             0.0 if self.levels.speeds[i] is None else w[self.levels.speeds[i]]
         )
 
-    def _independent(self, held):
-        if not held:
+    def _independent(self, held, slides=()):
+        sliding = self.levels.sliding
+        rows = [self.rows[i] for i in held]
+        rows += [sliding.all[e].row for e, state in enumerate(slides) if state == "stick" and sliding.rigid(e)]
+        if not rows:
             return True
-        values = np.linalg.eigvalsh(self.rows[list(held)] @ self.inverse @ self.rows[list(held)].T)
+        values = np.linalg.eigvalsh(np.array(rows) @ self.inverse @ np.array(rows).T)
         return values[0] > DEPENDENT * values[-1]
 
     def _struck(self, y, w, touching, answer):
@@ -126,14 +132,21 @@ class Instants:
             * float(np.clip(100 * (self.levels.nodes[k] - t) * self.levels.rate_of_all, 0.02, 1))
         )
 
-    def _compliant(self, before, held, y, t):
-        """The state with these rigid contacts closed: the others by where they are, or will be a moment later."""
-        state = list(before)
+    def _compliant(self, before, held, slides, y, t):
+        """The state with these rigid contacts closed: the others by where they are, or will be a moment later.
+
+        slides: states of the sliders, of those whose contacts are closed.
+        """
+        state, sliding, w = list(before), self.levels.sliding, self.levels.inputs(np.array([t]))[0]
+        state[sliding.first :] = slides
         for i in self.levels.rigid:
             state[i] = "closed" if i in held else "open"
         for _ in range(6):
-            level, tau = self.levels.level(tuple(state)), self.moment(t)
-            later, known = self.levels.inside(level, y, t)(tau), tuple(state)
+            for e, slider in enumerate(sliding.all):
+                shut = slider.contact is None or state[slider.contact] == "closed"
+                state[sliding.first + e] = slides[e] if shut else "off"
+            level, tau, known = self.levels.level(tuple(state)), self.moment(t), tuple(state)
+            later = self.levels.inside(level, sliding.entered(before, known, y, w), t)(tau)
             now, then = self.levels.inputs(np.array([t, t + tau]))
             for i, stop in enumerate(self.levels.system.stops):
                 if i not in self.levels.rigid:
@@ -165,9 +178,10 @@ class Instants:
             force = -stop.stiffness * gap(later) - stop.damping * self._rate(i, *later)
         return "closed" if force > 0 else "inside"
 
-    def _violation(self, state, resting, y, t):
+    def _violation(self, before, state, resting, y, t):
         """By how much the motion of a state leaves what is admissible a moment later, of what it could."""
-        if not resting:
+        first = self.levels.sliding.first
+        if not resting and len(state) == first:
             return 0.0
         level, tau = self.levels.level(state), self.moment(t)
         at = self.levels.inside(level, y, t)
@@ -177,10 +191,13 @@ class Instants:
             w = self.levels.inputs(np.array([t + share * tau]))[0]
             s = level.signals @ later + level.signal_inputs @ w
             for value, i, row, row_w in zip(s, level.turns, level.signals, level.signal_inputs, strict=True):
-                if i in resting:
+                if i in resting or i >= first:
                     size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2
+                    if state[i] in SIGNS:
+                        value = value if abs(value) > ROUND_OFF * size else 0.0
+                        size = self.speed * self.levels.rate_of_all * share * tau
                     worst = max(worst, -value / size if size else 0.0)
         return worst
