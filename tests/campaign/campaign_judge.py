@@ -29,6 +29,7 @@ OTHERWISE = (  # brute force is tried so where it and the run differ: another to
     {"finer": 8},
 )
 IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated load misses more than motion
+RUBBED = 1e-6  # of the energy: what friction takes
 BODY_STEPS = 400  # of the Exudyn body, each of which ends exactly
 BODY_NUDGE = 1e-9  # of the start and of the stiffness: what Newton's iterations leave of a state
 BODY_SHARE = 16  # one scene in so many runs in the body too
@@ -37,6 +38,8 @@ BODY_SHARE = 16  # one scene in so many runs in the body too
 @dataclass(frozen=True)
 class Motion:
     """x, x' (n, k) in the scene's own numbers up to where the run came, its events, and the impulse of its contacts.
+
+    rubbed: energy [J] that friction has lost.
 
     scale: a length [m] and a speed [m/s] of the scene; motion below a millionth of them counts as none.
     """
@@ -49,6 +52,7 @@ class Motion:
     impulse: np.ndarray | None
     runs: tuple
     scale: tuple[float, float] = (0.0, 0.0)
+    rubbed: float = 0.0
 
 
 def instants(scene):
@@ -83,7 +87,14 @@ def native(scene):
     n = len(x)
     places, speeds = (np.hstack([c[k] for c in columns]) if columns else np.zeros((n, 0)) for k in (0, 1))
     events = sum(len(run.events) for run in runs)
-    return Motion(runs[-1].status, runs[-1].message, places, speeds, events, _impulse(scene, runs), tuple(runs))
+    motion = Motion(runs[-1].status, runs[-1].message, places, speeds, events, _impulse(scene, runs), tuple(runs))
+    return replace(motion, rubbed=_rubbed(scene, runs))
+
+
+def _rubbed(scene, runs):
+    time, length, mass = (2.0**power for power in scene.units)
+    joule = mass * (length / time) ** 2
+    return sum(run.ledger.friction for run in runs if run.segments) / joule
 
 
 def _impulse(scene, runs):
@@ -175,7 +186,8 @@ def motion_of(scene, answer):
     places, speeds = answer.displacement[:, :-1], answer.velocity[:, :-1]
     if scene.frame is not None:
         places, speeds = scene.frame @ places, scene.frame @ speeds
-    return Motion("ok", "", places, speeds, len(answer.events), impulse, (), (answer.length, answer.speed))
+    scale = answer.length, answer.speed
+    return Motion("ok", "", places, speeds, len(answer.events), impulse, (), scale, answer.rubbed)
 
 
 def _difference(scene, motion, expected, kind, comparable):
@@ -192,7 +204,18 @@ def _difference(scene, motion, expected, kind, comparable):
         missing = float(np.max(np.abs(motion.impulse - expected.impulse))) / size
     if missing > IMPULSE:
         return [("failure: impulse", f"off by {missing:.3g} of the largest momentum")]
+    if abs(motion.rubbed - expected.rubbed) > RUBBED * max(expected.rubbed, _energy(scene, expected)):
+        return [("failure: friction", f"takes {motion.rubbed:.9g} J, {expected.rubbed:.9g}")]
     return []
+
+
+def _energy(scene, motion):
+    """The largest kinetic one [J], or that of the slowest motion that counts."""
+    if scene.frame is not None or scene.system is None:
+        return 0.0
+    speed, mass = motion.velocity, scene.system.mass
+    kinetic = 0.5 * np.max(np.sum(speed * (mass @ speed), axis=0), initial=0.0)
+    return max(float(kinetic), NO_MOTION * motion.scale[1] ** 2 * float(np.trace(mass)))
 
 
 def _momentum(scene, motion):

@@ -37,10 +37,7 @@ def complaints(run, samples=24.0, most=60, *, joule=1.0, metre=1.0, varying=Fals
         return [complaint for complaint in (status(run),) if complaint]
     looked_at = [*run.segments[: most // 2], *run.segments[max(most // 2, len(run.segments) - most // 2) :]]
     scale = largest_energy(run, looked_at, joule)
-    sliding = any(isinstance(element, mp.Friction) for element in run.model.contacts)
-    checks = [status(run), missed(run, looked_at, samples, metre)]
-    if not sliding:
-        checks.append(ledger(run, scale))
+    checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre)]
     if not varying:
         checks.append(energy(run, looked_at, scale))
     return [complaint for complaint in checks if complaint]
@@ -74,13 +71,14 @@ def _potential(segment):
 
 
 def ledger(run, scale):
-    """It closes; impact, damping and kinetic truncation take energy; without truncation no strain is lost.
+    """It closes; impact, damping, friction and kinetic truncation take energy; without truncation no strain is lost.
 
     The strain row alone may be negative, and only in a truncated basis: an instant that leaves a gap which is not
     zero can stretch the spring of the level that it enters.
     """
     found = run.ledger
     rows = {"impact": found.impact, "truncation_kinetic": found.truncation_kinetic, "damping": found.damping}
+    rows["friction"] = found.friction
     for name, value in rows.items():
         if not value >= -CLOSES * scale:
             return f"ledger: {name} {value:g} of {scale:g} J"

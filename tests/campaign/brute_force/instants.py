@@ -42,6 +42,7 @@ class Instants:
                         best, worst = (state, after), violation
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
+        answer.rubbed += self.levels.sliding.let_go(before, best[0], y, w)
         for i, (old, new) in enumerate(zip(before, best[0], strict=True)):
             if old != new and (i < self.levels.c or t > 0):
                 answer.events.append((t, i, new))

@@ -75,6 +75,11 @@ class _Integration:
             )
         answer.impulse = y[2 * self.n : 2 * self.n + self.levels.c]
         answer.slipped = y[self.levels.sliding.way :]
+        answer.rubbed += sum(
+            s.limit * way
+            for s, way in zip(self.levels.system.sliders, answer.slipped, strict=True)
+            if s.contact is None
+        )
         return answer
 
     def _piece(self, level, y, t, k, block):

@@ -122,6 +122,15 @@ class Sliding:
         tight = [sign for sign, s in SIGNS.items() if s * tension >= most * (1 - ZERO)]
         return ["stick", *tight], bool(tight)
 
+    def let_go(self, before, state, y, w):
+        """Energy [J] that springs lose where their sliders begin to slip, from a static limit to a smaller one."""
+        known, lost = self.levels.level(before), 0.0
+        for e, slider in enumerate(self.all):
+            if before[self.first + e] == "stick" and state[self.first + e] in SIGNS and slider.contact is None:
+                tension = known.tensions[0][e] @ y + known.tensions[1][e] @ w
+                lost += 0.0 if self.rigid(e) else (tension**2 - slider.limit**2) / (2 * slider.stiffness)
+        return lost
+
     def entered(self, before, state, y, w):
         """y where sliders have changed: a spring keeps its tension, what sticks has no speed left of round-off."""
         y, known = y.copy(), self.levels.level(before)

@@ -78,6 +78,7 @@ class Answer:
     """x, x' (n, k) at the times asked for, events [(time, item, state)], impulses (c,), energy lost by impacts.
 
     Items are contacts, laws and sliders, in this order. slipped: way that every slider has slid [m], (f,).
+    rubbed: energy that those of constant limits have lost [J].
     length, speed: of the scene, what its gaps, start, stops and loads make [m, m/s].
     """
 
@@ -86,6 +87,7 @@ class Answer:
     events: list = field(default_factory=list)
     impulse: np.ndarray | None = None
     slipped: np.ndarray | None = None
+    rubbed: float = 0.0
     impact: float = 0.0
     length: float = 0.0
     speed: float = 0.0
