@@ -10,6 +10,7 @@ from brute_force.system import NoAnswer
 
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
+SOONER = (1e-5, 1e-7)  # the same where no set is admissible: a slip may be over before
 SLOW = 1e-7  # of the scene's speeds: what endless impacts end with
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
@@ -29,17 +30,10 @@ class Instants:
         y = self._without_drift(y, w, touching)
         y = self._struck(y, w, touching, answer)
         resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
-        best, worst = None, np.inf
-        for slides in self.levels.sliding.choices(before, y, w, self.speed):
-            for count in range(len(resting) + 1):
-                for held in itertools.combinations(resting, count):
-                    if worst <= ZERO or not self._independent(held, slides):
-                        continue
-                    state = self._compliant(before, held, slides, y, t)
-                    after = self.levels.sliding.entered(before, state, y, w)
-                    violation = self._violation(before, state, resting, after, t)
-                    if violation < worst:
-                        best, worst = (state, after), violation
+        for moment in (MOMENT, *SOONER) if self.levels.system.sliders else (MOMENT,):
+            best, worst = self._least_violating(before, resting, y, t, moment)
+            if worst <= ZERO:
+                break
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
         answer.rubbed += self.levels.sliding.let_go(before, best[0], y, w)
@@ -47,6 +41,21 @@ class Instants:
             if old != new and (i < self.levels.c or t > 0):
                 answer.events.append((t, i, new))
         return best
+
+    def _least_violating(self, before, resting, y, t, moment):
+        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not."""
+        w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
+        for slides in self.levels.sliding.choices(before, y, w, self.speed):
+            for count in range(len(resting) + 1):
+                for held in itertools.combinations(resting, count):
+                    if worst <= ZERO or not self._independent(held, slides):
+                        continue
+                    state = self._compliant(before, held, slides, y, t)
+                    after = self.levels.sliding.entered(before, state, y, w)
+                    violation = self._violation(state, resting, after, t, moment)
+                    if violation < worst:
+                        best, worst = (state, after), violation
+        return best, worst
 
     def at_rest(self, y, t):
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
@@ -123,11 +132,11 @@ class Instants:
         y[2 * self.n :][touching] += best[1]
         return y
 
-    def moment(self, t):
+    def moment(self, t, share=MOMENT):
         """A short time [s]: of the fastest motion, less where loads change within a step."""
         k = min(int(np.searchsorted(self.levels.nodes, t, side="right")), len(self.levels.nodes) - 1)
         return (
-            MOMENT
+            share
             * STEP
             / self.levels.rate_of_all
             * float(np.clip(100 * (self.levels.nodes[k] - t) * self.levels.rate_of_all, 0.02, 1))
@@ -179,20 +188,23 @@ class Instants:
             force = -stop.stiffness * gap(later) - stop.damping * self._rate(i, *later)
         return "closed" if force > 0 else "inside"
 
-    def _violation(self, before, state, resting, y, t):
-        """By how much the motion of a state leaves what is admissible a moment later, of what it could."""
+    def _violation(self, state, resting, y, t, moment):
+        """By how much the motion of a state leaves what is admissible a moment later, of what it could.
+
+        Of what sticks at once, too: it may be within its limit again a moment later.
+        """
         first = self.levels.sliding.first
         if not resting and len(state) == first:
             return 0.0
-        level, tau = self.levels.level(state), self.moment(t)
+        level, tau = self.levels.level(state), self.moment(t, moment)
         at = self.levels.inside(level, y, t)
         worst = 0.0
-        for share in (0.5, 1.0):
+        for share in (0.0, 0.5, 1.0):
             later = at(share * tau)
             w = self.levels.inputs(np.array([t + share * tau]))[0]
             s = level.signals @ later + level.signal_inputs @ w
             for value, i, row, row_w in zip(s, level.turns, level.signals, level.signal_inputs, strict=True):
-                if i in resting or i >= first:
+                if (i in resting and share > 0) or (i >= first and (share > 0 or state[i] == "stick")):
                     size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0

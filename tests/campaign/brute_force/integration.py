@@ -114,8 +114,13 @@ class _Integration:
         inputs = self.levels.inputs(times)
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
         allowed = ZERO * (np.abs(states) @ np.abs(level.signals).T + np.abs(inputs) @ np.abs(level.signal_inputs).T)
-        others = self.levels.size - 2 * self.n
-        largest = np.repeat([self.length, self.speed, 0.0], [self.n, self.n, others])
+        largest = np.concatenate(
+            [
+                np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.levels.c]),
+                self.levels.sliding.largest_tensions(self.length),
+                np.zeros(len(self.levels.system.sliders)),
+            ]
+        )
         allowed = np.maximum.accumulate(allowed + self.touch * (np.abs(level.signals) @ largest), axis=0)
         below = s[1:] < -allowed[1:]
         curved, bends = np.zeros_like(below), np.zeros((1, s.shape[1]))

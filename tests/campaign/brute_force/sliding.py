@@ -25,6 +25,12 @@ class Sliding:
     def rigid(self, e):
         return bool(np.isinf(self.all[e].stiffness))
 
+    def largest_tensions(self, length):
+        """(f,) [N]: of springs, whose sliders may hang on contacts."""
+        limited = [np.inf if slider.contact is not None else slider.static_limit for slider in self.all]
+        sprung = [0.0 if self.rigid(e) else slider.stiffness * length for e, slider in enumerate(self.all)]
+        return np.minimum(limited, sprung)
+
     def rate(self, e):
         """Rows (y,) and (w,) of the speed h.x' - v of a slider's end on the structure."""
         slider, levels = self.all[e], self.levels
