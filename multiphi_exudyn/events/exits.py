@@ -37,15 +37,15 @@ def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
 
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
-    """s of an element's exit in a level."""
+    """s of an element's exit in a level; a load that is a limit leaves no round-off of both."""
     own = level.level
     position, rate = exit_.gap * own.gap_rows[element], exit_.rate * own.gap_rows[element]
-    constant = exit_.constant + exit_.gap * float(level.gap_constants[element])
+    terms = [exit_.constant, exit_.gap * float(level.gap_constants[element])]
     if exit_.force:
         k = own.indices.index(element)
         position, rate = position + exit_.force * own.force_rows[k], rate + exit_.force * own.force_rate_rows[k]
-        constant += exit_.force * float(level.asymptotic.forces[k])
-    return Row(position, rate, constant)
+        terms.append(exit_.force * float(level.asymptotic.forces[k]))
+    return Row(position, rate, float(drop_round_off(np.sum(terms), np.sum(np.abs(terms)))))
 
 
 def signal_rows(level: LoadedLevel) -> list[Row]:

@@ -203,9 +203,9 @@ class Instants:
             later = at(share * tau)
             w = self.levels.inputs(np.array([t + share * tau]))[0]
             s = level.signals @ later + level.signal_inputs @ w
-            for value, i, row, row_w in zip(s, level.turns, level.signals, level.signal_inputs, strict=True):
+            sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
+            for value, i, size in zip(s, level.turns, sizes, strict=True):
                 if (i in resting and share > 0) or (i >= first and (share > 0 or state[i] == "stick")):
-                    size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2

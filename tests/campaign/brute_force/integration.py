@@ -50,7 +50,9 @@ class _Integration:
         self.speed = self.length * self.levels.rate_of_all
         y, t, k = np.concatenate([displacement, velocity, np.zeros(self.levels.size - 2 * self.n)]), 0.0, 0
         instants = Instants(self.levels, self.length, self.speed, self.touch)
-        answer = Answer(*np.zeros((2, self.n, len(self.times))), length=self.length, speed=self.speed)
+        length = max(self.length, self.levels.sliding.largest_stretch())
+        size = {"length": length, "speed": length * self.levels.rate_of_all}
+        answer = Answer(*np.zeros((2, self.n, len(self.times))), **size)
         state, y = instants.settled(self.levels.lowest(), y, 0.0, answer)
         shown, count, block, rocking, before = 0, 0, LEAST, 0, 0.0
         while k < len(self.levels.nodes) - 1:
@@ -113,7 +115,7 @@ class _Integration:
             return None
         inputs = self.levels.inputs(times)
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
-        allowed = ZERO * (np.abs(states) @ np.abs(level.signals).T + np.abs(inputs) @ np.abs(level.signal_inputs).T)
+        allowed = ZERO * (np.abs(states) @ level.sizes[0].T + np.abs(inputs) @ level.sizes[1].T)
         largest = np.concatenate(
             [
                 np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.levels.c]),

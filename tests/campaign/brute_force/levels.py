@@ -18,6 +18,7 @@ TERMS = 16  # of the exponential's series inside a step
 class Level:
     """y' = A y + W w(t); signals s = S y + T w(t) >= 0, each of the item that then turns.
 
+    sizes: rows (s, y) and (s, w) of what round-off of s is measured against.
     tensions, limits, slips: rows of the sliders' forces, of their static limits, and of their own speeds.
     """
 
@@ -25,6 +26,7 @@ class Level:
     inputs: np.ndarray
     signals: np.ndarray
     signal_inputs: np.ndarray
+    sizes: tuple
     turns: list
     tensions: tuple
     limits: tuple
@@ -162,10 +164,9 @@ class Levels:
             total_w = total_w - np.outer(sliding.all[e].row, tension_w[e])
         held = [i for i in closed if i in self.rigid]
         if held or stuck:
-            pushes, reaction, reaction_w = self._reactions(held, stuck, {e: slides[e] for e in pulled}, total, total_w)
-            total, total_w = total + pushes @ reaction, total_w + pushes @ reaction_w
-            force[held], force_w[held] = reaction[: len(held)], reaction_w[: len(held)]
-            tension[stuck], tension_w[stuck] = reaction[len(held) :], reaction_w[len(held) :]
+            (total, total_w), reactions = self._reactions(held, stuck, {e: slides[e] for e in pulled}, total, total_w)
+            for of, pull, found in zip(forces, tensions, reactions, strict=True):
+                of[held], pull[stuck] = found[: len(held)], found[len(held) :]
         for e in pulled:
             tension[e], tension_w[e] = sliding.known(e, slides[e], forces)
         matrix, inputs = np.zeros((self.size, self.size)), np.zeros((self.size, w))
@@ -178,12 +179,15 @@ class Levels:
         found += sliding.signals(slides, tensions, limits, slips)
         signals = np.array([row for row, _, _ in found]).reshape(-1, self.size)
         signal_inputs = np.array([row for _, row, _ in found]).reshape(-1, w)
-        return Level(matrix, inputs, signals, signal_inputs, [turn for _, _, turn in found], tensions, limits, slips)
+        turns = [turn for _, _, turn in found]
+        sizes = sliding.sizes(state, (signals, signal_inputs), turns, limits, tensions)
+        return Level(matrix, inputs, signals, signal_inputs, sizes, turns, tensions, limits, slips)
 
     def _reactions(self, held, stuck, pulled, total, total_w):
-        """Columns (n, u) along which reactions push, and rows (u, y), (u, w) of them: of contacts, of what sticks.
+        """Forces with reactions, and the reactions, of contacts and of what sticks: each a pair of rows (y,) and (w,).
 
-        pulled: states of the sliders whose limits are a share of the contacts' reactions.
+        pulled: states of the sliders whose limits are a share of the contacts' reactions. What they hold keeps no
+        acceleration but round-off of itself.
         """
         sliders, wanted = self.system.sliders, np.zeros((len(held) + len(stuck), len(self.functions)))
         rows = np.array([self.rows[i] for i in held] + [sliders[e].row for e in stuck])
@@ -195,11 +199,15 @@ class Levels:
             if course is not None:
                 wanted[k, course] = 1
         flexibility = rows @ self.inverse @ pushes
-        return (
-            pushes,
-            np.linalg.solve(flexibility, -rows @ self.inverse @ total),
-            np.linalg.solve(flexibility, wanted - rows @ self.inverse @ total_w),
-        )
+        totals, reactions = [], []
+        for given, asked in ((total, 0.0 * rows @ total), (total_w, wanted)):
+            reaction, reached = np.zeros_like(asked), given
+            for _ in range(2):
+                more = np.linalg.solve(flexibility, asked - rows @ self.inverse @ reached)
+                reaction, reached = reaction + more, reached + pushes @ more
+            totals.append(reached)
+            reactions.append(reaction)
+        return totals, reactions
 
     def smooth_forces(self, state):
         """Of structure, loads and laws: rows (n, y) and (n, w)."""

@@ -31,6 +31,13 @@ class Sliding:
         sprung = [0.0 if self.rigid(e) else slider.stiffness * length for e, slider in enumerate(self.all)]
         return np.minimum(limited, sprung)
 
+    def largest_stretch(self):
+        """[m] of the structure under static limits that do not hang on contacts."""
+        system = self.levels.system
+        flexibility = np.linalg.pinv(system.stiffness, rcond=1e-9, hermitian=True)
+        pulls = [slider.static_limit * flexibility @ slider.row for slider in self.all if slider.contact is None]
+        return float(np.max(np.abs(pulls), initial=0.0))
+
     def rate(self, e):
         """Rows (y,) and (w,) of the speed h.x' - v of a slider's end on the structure."""
         slider, levels = self.all[e], self.levels
@@ -90,6 +97,15 @@ class Sliding:
                 yield limits[0][e] - s * tensions[0][e], limits[1][e] - s * tensions[1][e], self.first + e
             if state in SIGNS:
                 yield SIGNS[state] * slips[0][e], SIGNS[state] * slips[1][e], self.first + e
+
+    def sizes(self, state, signals, turns, limits, tensions):
+        """Rows of what round-off of signals is measured against: a limit less a tension, each with its own terms."""
+        sizes = tuple(np.abs(rows) for rows in signals)
+        for k, i in enumerate(turns):
+            if i >= self.first and state[i] == "stick":
+                for size, limit, tension in zip(sizes, limits, tensions, strict=True):
+                    size[k] = np.abs(limit[i - self.first]) + np.abs(tension[i - self.first])
+        return sizes
 
     def choices(self, before, y, w, speed):
         """All that the sliders may do after an instant, as tuples of their states, those that follow first."""
