@@ -122,7 +122,7 @@ class Sliding:
         def order(states):
             changed = [states[e] != before[self.first + e] for e in range(len(states))]
             idle = sum(c and not a for c, a in zip(changed, asking, strict=True))
-            return idle, sum(changed), sum(state != "stick" for state in states)
+            return idle, sum(state != "stick" for state in states), sum(changed)
 
         return sorted(itertools.product(*options), key=order)
 
