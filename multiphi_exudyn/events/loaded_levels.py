@@ -70,7 +70,7 @@ class LoadedLevels:
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray) -> LoadedLevels:
         """Levels under a static ``load`` (m,) in base coordinates alone."""
-        return cls(model, Excitation.constant(load, len(model.contacts)))
+        return cls(model, Excitation.constant(load, len(model.links)))
 
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""

@@ -27,6 +27,7 @@ LIGHT = dict.fromkeys(KINDS, (3, 4)) | {
     "friction loads": (1, 11),
     "friction contacts": (2, 6),
     "friction impacts": (0, 1),
+    "contact friction": (1, 2),
     "friction limits": (1, 4),
     "friction free": (1, 5),
     "friction units": (5, 9),

@@ -88,6 +88,13 @@ class Parts:
         self.frictions.append(mp.Friction(name, row, limit, static_limit, stiffness, velocity))
         self.sliders.append(bf.Slider(row, limit, static_limit, stiffness, velocity))
 
+    def rub(self, i, row, friction, static_friction, stiffness=math.inf, velocity=0.0):
+        """Friction of the contact number i along a row."""
+        row, spring = np.asarray(row, float), {"tangential_stiffness": stiffness, "tangential_velocity": velocity}
+        coefficients = {"friction": friction, "static_friction": static_friction}
+        self.contacts[i] = replace(self.contacts[i], tangential=row, **coefficients, **spring)
+        self.sliders.append(bf.Slider(row, friction, static_friction, stiffness, velocity, contact=i))
+
     def load(self, row, made, course):
         self.loads.append(made)
         self.forces.append((np.asarray(row, float), course))

@@ -99,6 +99,29 @@ def _impacts(random):
     return _struck(parts, str(random.choice(["mixed", "rigid"])))
 
 
+def _pressed(random):
+    """Contacts that give way and rub in proportion to their forces, blocks and springs in series."""
+    parts = random_parts(random, int(random.integers(2, 7)))
+    law = str(random.choice(["compliant", "compliant", "viscous"]))
+    add_contacts(parts, law, int(random.integers(1, min(3, parts.n) + 1)), gap=(-0.1, 0.2))
+    rows = [stop.row for stop in parts.stops]
+    for i in range(len(parts.contacts)):
+        row = next(
+            (r for r in random_rows(parts, parts.n) if np.linalg.matrix_rank([*rows, r], tol=0.01) > len(rows)), None
+        )
+        if row is None or (i > 0 and random.random() < 0.4):
+            continue
+        rows.append(row)
+        friction = float(10.0 ** random.uniform(-1.3, 0.3))
+        static = friction * float(random.uniform(1.05, 2)) if random.random() < 0.3 else friction
+        sprung = law == "compliant" and random.random() < 0.5
+        stiffness = float(10.0 ** random.uniform(1, 3.5)) if sprung else np.inf
+        parts.rub(i, row, friction, static, stiffness, float(random.normal()) if random.random() < 0.3 else 0.0)
+    if random.random() < 0.8:
+        random.choice(ADDERS)(parts)
+    return parts.scene(**_start(parts))
+
+
 def _struck(parts, law):
     add_contacts(parts, law)
     if parts.random.random() < 0.7:
@@ -150,6 +173,7 @@ DRAWN = {
     "friction loads": _loads,
     "friction contacts": _contacts,
     "friction impacts": _impacts,
+    "contact friction": _pressed,
     "friction limits": _limits,
     "friction free": _free,
     "friction units": _units,

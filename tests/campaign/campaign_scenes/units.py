@@ -38,6 +38,8 @@ def in_units(scene, time, length, mass):
             contacts.append(replace(item, **limits, **changed))
         else:
             changed = {"stiffness": item.stiffness * stiff, "damping": item.damping * mass / time}
+            changed["tangential_stiffness"] = item.tangential_stiffness * stiff
+            changed["tangential_velocity"] = item.tangential_velocity * length / time
             contacts.append(replace(item, gap=item.gap * length, **changed))
     loads = tuple(_load_in_units(load, time, length, mass, force) for load in scene.loads)
     return (
