@@ -81,6 +81,7 @@ from multiphi_exudyn.events.arrays import (
     FAILED,
     FIRMNESS,
     FIRST_CHANGE,
+    FIRST_EXITS,
     FREED,
     HEARD,
     KINDS,
@@ -94,6 +95,7 @@ from multiphi_exudyn.events.arrays import (
     PHASES,
     PULLING,
     REACHED,
+    RECOVERING,
     REFUSED,
     RIGID,
     SHARED,
@@ -110,7 +112,7 @@ from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state
 from multiphi_exudyn.events.striking import close_without_impact, impact
 from multiphi_exudyn.events.switching import switch
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN_ONCE
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
@@ -212,7 +214,8 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 def find_refused(ints: Ints) -> int:
     """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: some always taken, PULLING.
 
-    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since.
+    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since, and
+    does not wait where the instant itself, an impact, has turned it.
     """
     level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
@@ -225,13 +228,13 @@ def find_refused(ints: Ints) -> int:
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
-        if ints[ints[WORKED + PHASES] + k] == REFUSED:
+        if ints[ints[WORKED + PHASES] + k] == REFUSED or is_turned(ints, k) == 1:
             refused = 1
             if ints[heard + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
                 unheard = 1
-            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element) == 0
-            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or once:
+            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element, ints[exit_ + ASKED]) == 0
+            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or ints[exit_ + FIRMNESS] == TAKEN_FALLING or once:
                 ints[pulling + element] = ints[exit_ + ASKED]
                 pulled = 1
     if refused == 0:
@@ -242,13 +245,27 @@ def find_refused(ints: Ints) -> int:
 
 
 @compiled
-def is_latest(ints: Ints, element: int) -> int:
-    """1 where an element was the last to change at this instant, or has changed again and again."""
-    last, count = NOBODY, 0
+def is_turned(ints: Ints, exit_number: int) -> int:
+    """1 where what is taken once waits in WORKED, and was armed in the same state of its element before the instant."""
+    level, before = ints[WORKED + LEVEL], ints[REACHED + LEVEL]
+    exit_ = ints[level + EXITS] + exit_number * EXIT_INTS
+    element = ints[exit_ + ELEMENT]
+    waits = ints[ints[WORKED + PHASES] + exit_number] == RECOVERING and ints[exit_ + FIRMNESS] == TAKEN_ONCE
+    if not waits or ints[ints[before + STATES] + element] != ints[ints[level + STATES] + element]:
+        return 0
+    k = ints[ints[before + FIRST_EXITS] + element] + exit_number - ints[ints[level + FIRST_EXITS] + element]
+    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED and is_latest(ints, element, ints[exit_ + ASKED]) == 0 else 0
+
+
+@compiled
+def is_latest(ints: Ints, element: int, asked: int) -> int:
+    """1 where an element was the last to change at this instant, from the state asked for, or has changed often."""
+    last, left, count = NOBODY, NOBODY, 0
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
         last = ints[ints[CHANGES] + k * CHANGE_WIDTH]
+        left = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
         count += 1 if last == element else 0
-    return 1 if last == element or count > MOST_RETURNS else 0
+    return 1 if (last == element and left == asked) or count > MOST_RETURNS else 0
 
 
 @compiled
