@@ -82,6 +82,7 @@ from multiphi_exudyn.events.arrays import (
     FAILED,
     FIRMNESS,
     FIRST_CHANGE,
+    FIRST_EXITS,
     FREED,
     HEARD,
     KINDS,
@@ -95,6 +96,7 @@ from multiphi_exudyn.events.arrays import (
     PHASES,
     PULLING,
     REACHED,
+    RECOVERING,
     REFUSED,
     RIGID,
     SHARED,
@@ -213,7 +215,8 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 def find_refused(ints: Ints) -> int:
     """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: some always taken, PULLING.
 
-    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since.
+    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since, and
+    does not wait where the instant itself, an impact, has turned it.
     """
     level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
@@ -226,7 +229,7 @@ def find_refused(ints: Ints) -> int:
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
-        if ints[ints[WORKED + PHASES] + k] == REFUSED:
+        if ints[ints[WORKED + PHASES] + k] == REFUSED or is_turned(ints, k) == 1:
             refused = 1
             if ints[heard + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
@@ -240,6 +243,19 @@ def find_refused(ints: Ints) -> int:
     if unheard == 1:
         return 1
     return 2 if pulled == 1 else 3
+
+
+@compiled
+def is_turned(ints: Ints, exit_number: int) -> int:
+    """1 where what is taken once waits in WORKED, and was armed in the same state of its element before the instant."""
+    level, before = ints[WORKED + LEVEL], ints[REACHED + LEVEL]
+    exit_ = ints[level + EXITS] + exit_number * EXIT_INTS
+    element = ints[exit_ + ELEMENT]
+    waits = ints[ints[WORKED + PHASES] + exit_number] == RECOVERING and ints[exit_ + FIRMNESS] == TAKEN_ONCE
+    if not waits or ints[ints[before + STATES] + element] != ints[ints[level + STATES] + element]:
+        return 0
+    k = ints[ints[before + FIRST_EXITS] + element] + exit_number - ints[ints[level + FIRST_EXITS] + element]
+    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED and is_latest(ints, element, ints[exit_ + ASKED]) == 0 else 0
 
 
 @compiled

@@ -37,18 +37,18 @@ def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
 
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
-    """s of an element's exit in a level."""
-    own, constant = level.level, exit_.constant
+    """s of an element's exit in a level; a load that is a limit leaves no round-off of both."""
+    own, terms = level.level, [exit_.constant]
     position, rate = np.zeros(own.modes), np.zeros(own.modes)
     for share in exit_.shares:
         link = own.base.link_places[element][share.link]
         position, rate = position + share.gap * own.gap_rows[link], rate + share.rate * own.gap_rows[link]
-        constant += share.gap * float(level.gap_constants[link])
+        terms.append(share.gap * float(level.gap_constants[link]))
         if share.force:
             k = own.indices.index(link)
             position, rate = position + share.force * own.force_rows[k], rate + share.force * own.force_rate_rows[k]
-            constant += share.force * float(level.asymptotic.forces[k])
-    return Row(position, rate, constant)
+            terms.append(share.force * float(level.asymptotic.forces[k]))
+    return Row(position, rate, float(drop_round_off(np.sum(terms), np.sum(np.abs(terms)))))
 
 
 def signal_rows(level: LoadedLevel) -> list[Row]:

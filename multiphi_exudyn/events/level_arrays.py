@@ -235,10 +235,14 @@ class LevelArrays:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
-        """The signal that an exit's element would have in the level entered alone."""
+        """The signal that an exit's element would have in the level entered alone.
+
+        A contact that would slide is asked where it does: to stick would take its speed away.
+        """
         level = self.loaded[int(self.ints[source + a.NUMBER])]
         element, exit_ = exits_of(level)[exit_number]
-        entered = self.level(after(level, element, exit_))  # may make the buffers anew
+        asked = exit_ if exit_.turn is None else Exit(exit_.turn.forward)
+        entered = self.level(after(level, element, asked))  # may make the buffers anew
         target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
         signal = self.buffers.put("ints", put_signal(self.buffers, level, row))

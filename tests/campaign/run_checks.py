@@ -5,8 +5,11 @@ stays above min(g0, g1) - h^2/8 max|g''|; where that bound may lie below zero, t
 extended precision.
 """
 
+import itertools
+
 import numpy as np
 
+import multiphi_exudyn as mp
 from multiphi_exudyn.events.state import Phase
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
@@ -22,6 +25,7 @@ BLOCK = 2**18  # samples held at one time
 POLISH = 41  # samples around a lowest one, ROUNDS times over
 ROUNDS = 4
 
+SLIPS_UP = 1  # a state of friction: stick is before it, slip downwards after it
 EXPECTED_FAILURES = ("not independent of each other",)  # causes that are the scene's own
 
 
@@ -69,13 +73,14 @@ def _potential(segment):
 
 
 def ledger(run, scale):
-    """It closes; impact, damping and kinetic truncation take energy; without truncation no strain is lost.
+    """It closes; impact, damping, friction and kinetic truncation take energy; without truncation no strain is lost.
 
     The strain row alone may be negative, and only in a truncated basis: an instant that leaves a gap which is not
     zero can stretch the spring of the level that it enters.
     """
     found = run.ledger
     rows = {"impact": found.impact, "truncation_kinetic": found.truncation_kinetic, "damping": found.damping}
+    rows["friction"] = found.friction
     for name, value in rows.items():
         if not value >= -CLOSES * scale:
             return f"ledger: {name} {value:g} of {scale:g} J"
@@ -109,13 +114,11 @@ def missed(run, segments, samples, metre=1.0):
     complete, largest, reach = _complete(run), {}, _reach(segments, SMALLEST * metre)
     looked_at = list(_signals(segments, run, complete))
     for segment, contact, _, signal in looked_at:
-        key = contact, contact in segment.level.level.indices
-        own = signal.size(segment.end - segment.start)
-        largest[key] = max(
-            largest.get(key, 0.0), own, signal.arm * (np.max(np.abs(_load(run, segment))) if signal.held else reach)
-        )
+        key, own = (contact, signal.of), signal.size(segment.end - segment.start)
+        most = np.max(np.abs(_load(run, segment))) if signal.of == "reaction" else reach * signal.per_metre()
+        largest[key] = max(largest.get(key, 0.0), own, signal.arm * most)
     for segment, contact, heard, signal in looked_at:
-        size = largest[contact, contact in segment.level.level.indices]
+        size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
         unresolved = np.finfo(float).eps * segment.end * signal.steepness(at)
         if lowest < -(MISSED if heard else LAW) * size - unresolved:
@@ -126,14 +129,31 @@ def missed(run, segments, samples, metre=1.0):
 
 def _signals(segments, run, complete):
     """(segment, contact, whether it is armed, its signal) of all that is to be looked at."""
-    rigid = np.isinf(run.model.base.stiffnesses)
     for segment in segments:
-        for contact, phase in enumerate(segment.phases):
-            if run.model.contacts[contact].damping:
-                continue  # its signal is a force with a rate of its own: brute force judges it
-            held = rigid[contact] and contact in segment.level.level.indices
-            if segment.end > segment.start and (phase is Phase.ARMED or complete or held):
-                yield segment, contact, phase is Phase.ARMED, Signal(segment, contact, bool(rigid[contact]))
+        phases = iter(segment.phases)
+        for contact, element in enumerate(run.model.contacts):
+            link, state = run.model.link_places[contact][0], segment.level.states[contact]
+            if len(run.model.link_places[contact]) > 1:  # a contact with friction: brute force judges it
+                list(itertools.islice(phases, len(element.states[state].exits)))
+                continue
+            for made in _of(element, link in segment.level.level.indices, state):
+                phase, signal = next(phases), Signal(segment, link, *made)
+                if element.damping:
+                    continue  # its signal is a force with a rate of its own: brute force judges it
+                if segment.end > segment.start and (phase is Phase.ARMED or complete or signal.of == "reaction"):
+                    yield segment, contact, phase is Phase.ARMED, signal
+
+
+def _of(element, closed, state):
+    """Of what an element's signals are made in a state, with which factor and constant."""
+    if isinstance(element, mp.Friction):
+        if closed:
+            kind = "reaction" if element.rigid else "tension"
+            return [(kind, s, element.most) for s in (1.0, -1.0)]
+        return [("rate", 1.0 if state == SLIPS_UP else -1.0, 0.0)]
+    if not closed:
+        return [("gap", 1.0, 0.0)]
+    return [("reaction", 1.0, 0.0) if element.rigid else ("gap", -1.0, 0.0)]
 
 
 def _reach(segments, smallest):
@@ -144,30 +164,40 @@ def _reach(segments, smallest):
 
 
 class Signal:
-    """s of a contact on a segment: constant + Re sum a_j t^d_j exp(lambda_j t).
+    """s of a link on a segment: constant + Re sum a_j t^d_j exp(lambda_j t).
 
-    held: whether s is a reaction. arm: what a coordinate, or a load, of 1 can at most make of it.
+    of: what it is made of, a "gap", its "rate", a "reaction" or the "tension" of a spring. arm: what a coordinate, or
+    a load, of 1 can at most make of it.
     """
 
-    def __init__(self, segment, contact, rigid):
+    def __init__(self, segment, link, of, sign, constant):
         level = segment.level
-        own, self.basis, modal = level.level, segment.basis, segment.rows
-        if rigid and contact in own.indices:
-            row = own.base.directions[:, contact]
-            self.held, self.arm = True, float(np.sum(np.abs(row)) / (row @ row))
-            k = own.indices.index(contact)
-            rates = self.basis.derivative(modal)
-            self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ rates
+        own, self.basis, modal, self.of = level.level, segment.basis, segment.rows, of
+        row, self.arm, self.terms = own.base.directions[:, link], 1.0, abs(constant)
+        if of in ("reaction", "tension"):
+            k = own.indices.index(link)
+            self.coefficients = own.force_rows[k] @ modal + own.force_rate_rows[k] @ self.basis.derivative(modal)
             self.constant = float(level.asymptotic.forces[k])
-            self.terms = 0.0
         else:
-            sign = -1.0 if contact in own.indices else 1.0
-            self.coefficients = sign * (own.gap_rows[contact] @ modal)
-            self.constant = sign * float(level.gap_constants[contact])
-            row = np.abs(own.base.directions[:, contact])
-            self.held, self.arm = False, float(np.sum(row))
+            self.coefficients = own.gap_rows[link] @ modal
+            self.constant = float(level.gap_constants[link])
+        if of == "rate":
+            self.coefficients, self.constant = self.basis.derivative(self.coefficients), 0.0
+        if of == "reaction":
+            self.arm = float(np.sum(np.abs(row)) / (row @ row))
+        else:
+            row, self.arm = np.abs(row), float(np.sum(np.abs(row)))
+        if of == "gap":
             self.terms = float(row @ (np.abs(own.vectors) @ np.sum(np.abs(modal), axis=1)))
-            self.terms += float(row @ np.abs(level.asymptotic.configuration)) + abs(float(own.base.gaps[contact]))
+            self.terms += float(row @ np.abs(level.asymptotic.configuration)) + abs(float(own.base.gaps[link]))
+        self.coefficients, self.constant = sign * self.coefficients, sign * self.constant + constant
+        self.stiffness = float(own.base.stiffnesses[link])
+
+    def per_metre(self):
+        """What a length of 1 can at most make of it: the fastest rate of a speed, the stiffness of a spring."""
+        if self.of == "rate":
+            return float(np.max(np.abs(self.basis.rates), initial=0.0))
+        return self.stiffness if self.of == "tension" else 1.0
 
     def size(self, duration):
         """What round-off of s is measured against on [0, duration]: its bound, and what a gap is the sum of."""

@@ -21,6 +21,16 @@ LIGHT = dict.fromkeys(KINDS, (3, 4)) | {
     "several": (1, 2),
     "sampled": (0, 1),
     "truncated": (0, 1),
+    "friction": (0, 2),
+    "friction blocks": (1, 5),
+    "jenkins": (1, 11),
+    "friction loads": (1, 11),
+    "friction contacts": (2, 6),
+    "friction impacts": (0, 1),
+    "contact friction": (1, 2),
+    "friction limits": (1, 4),
+    "friction free": (1, 5),
+    "friction units": (5, 9),
 }  # quick ones
 
 
@@ -142,6 +152,62 @@ class TestBruteForce:
         answer = bf.solved(system, np.zeros(1), np.zeros(1), times)
         assert np.max(np.abs(answer.displacement[0] - 0.5 * (1 - np.cos(times)))) < 1e-12
         assert answer.impulse[0] == pytest.approx(times[-1] + 0.5 * math.sin(times[-1]), abs=1e-12)
+
+
+class TestBruteForceOfFriction:
+    """Against motions that are known exactly."""
+
+    ONE = np.ones(1)
+
+    def block(self, stiffness, *sliders, **more):
+        return bf.System(np.eye(1), np.zeros((1, 1)), stiffness * np.eye(1), sliders=sliders, **more)
+
+    def test_a_block_loses_as_much_in_every_half_cycle_until_it_rests(self):
+        """m 1, k 4, F .1 from x0 .33: it turns at .33 - .05 n and rests at .02 after seven half cycles."""
+        times = np.r_[math.pi / 2 * np.arange(1, 8), 20.0]
+        answer = bf.solved(self.block(4.0, bf.Slider(self.ONE, 0.1, 0.1)), 0.33 * self.ONE, 0 * self.ONE, times)
+        turns = [(0.33 - 0.05 * n) * (-1) ** n for n in range(1, 8)]
+        assert answer.displacement[0] == pytest.approx([*turns, 0.02], abs=1e-14)
+        assert answer.slipped == pytest.approx(sum(2 * (0.33 - 0.05 * n) - 0.05 for n in range(7)), abs=1e-13)
+
+    def test_a_block_on_a_belt_sticks_and_slips_with_its_period(self):
+        """m 1, k 25, V .3, limits 2 and 3.5."""
+        belt = bf.Slider(self.ONE, 2.0, 3.5, velocity=0.3)
+        answer = bf.solved(self.block(25.0, belt), 0 * self.ONE, 0 * self.ONE, np.array([12.0]))
+        slips = [t for t, _, state in answer.events if state == "-"]
+        assert np.diff(slips) == pytest.approx(1.3424777960769378, rel=1e-13)
+
+    def test_a_spring_in_series_gives_way_first(self):
+        """A free mass of 1 m/s on a spring of 25 N/m and 2 N: v^2 is 1 - 25 .08^2 where it slips, for v^2 / 4 m."""
+        ring = bf.Slider(self.ONE, 2.0, 2.0, stiffness=25.0)
+        answer = bf.solved(self.block(0.0, ring), 0 * self.ONE, self.ONE, np.array([10.0]))
+        assert [event[2] for event in answer.events] == ["+", "stick"]
+        assert answer.slipped == pytest.approx(0.21, abs=1e-13)
+
+    def test_two_blocks_that_are_one_carry_their_limits_together(self):
+        """Limits .06 and .04 on one mass: the free decay of .1."""
+        sliders = bf.Slider(self.ONE, 0.06, 0.06), bf.Slider(-self.ONE, 0.04, 0.04)
+        answer = bf.solved(self.block(4.0, *sliders), 0.33 * self.ONE, 0 * self.ONE, np.array([20.0]))
+        assert answer.displacement[0] == pytest.approx([0.02], abs=1e-13)
+
+    def test_friction_of_a_contact_follows_its_force(self):
+        """A block pressed on the ground by its weight and thrown along it: it rests after v^2 / (2 mu g)."""
+        floor = bf.Stop(np.array([0.0, 1.0]), 0.0, 1e4)
+        slider = bf.Slider(np.array([1.0, 0.0]), 0.3, 0.3, contact=0)
+        system = bf.System(
+            np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [floor], sliders=[slider], constant=np.array([0.0, -10.0])
+        )
+        answer = bf.solved(system, np.array([0.0, -1e-3]), np.array([2.0, 0.0]), np.array([0.5, 1.0]))
+        assert answer.displacement[0] == pytest.approx([2 * 0.5 - 1.5 * 0.25, 2.0 / 3], abs=1e-11)
+
+    def test_friction_of_a_rigid_contact_follows_its_reaction(self):
+        floor, slider = bf.Stop(np.array([0.0, 1.0]), 0.0), bf.Slider(np.array([1.0, 0.0]), 0.3, 0.3, contact=0)
+        system = bf.System(
+            np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [floor], sliders=[slider], constant=np.array([0.0, -10.0])
+        )
+        answer = bf.solved(system, np.zeros(2), np.array([2.0, 0.0]), np.array([0.5, 1.0]))
+        assert answer.displacement[0] == pytest.approx([2 * 0.5 - 1.5 * 0.25, 2.0 / 3], abs=1e-11)
+        assert answer.impulse == pytest.approx(10.0)
 
 
 class TestJudge:

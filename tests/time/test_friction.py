@@ -40,6 +40,19 @@ def assert_balanced(run, share=1e-12):
     assert run.ledger.friction >= 0
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_load_that_is_exactly_the_limit_moves_nothing(seed):
+    """Whatever the order of the sums: T = F is within the limit, and round-off of it is no slip."""
+    n, mass, springs, _, random = random_structure(seed)
+    row, limit = random.normal(size=n), float(10.0 ** random.uniform(-1, 1))
+    structure = mp.LinearStructure(mass, springs, points={"all": row})
+    for sign in (1.0, -1.0):
+        model = mp.MultiPhiModel(structure, [mp.Friction("floor", "all", limit)], modes="all")
+        run = mp.simulate(model, 30.0, loads=[mp.ConstantLoad("all", sign * limit)])
+        assert (run.status, len(run.events)) == ("ok", 0)
+        assert not np.any(run.displacement(30.0))
+
+
 class TestFreeDecay:
     """m 1, k 4, F .1 from x0 .33: seven half cycles of pi/2, 2 F/k shorter each, then rest at .02."""
 

@@ -5,10 +5,12 @@ import itertools
 import numpy as np
 
 from brute_force.levels import STEP
+from brute_force.sliding import SIGNS
 from brute_force.system import NoAnswer
 
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
+SOONER = (1e-5, 1e-7)  # the same where no set is admissible: a slip may be over before
 SLOW = 1e-7  # of the scene's speeds: what endless impacts end with
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
@@ -28,21 +30,32 @@ class Instants:
         y = self._without_drift(y, w, touching)
         y = self._struck(y, w, touching, answer)
         resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
-        best, worst = None, np.inf
-        for count in range(len(resting) + 1):
-            for held in itertools.combinations(resting, count):
-                if worst <= ZERO or not self._independent(held):
-                    continue
-                state = self._compliant(before, held, y, t)
-                violation = self._violation(state, resting, y, t)
-                if violation < worst:
-                    best, worst = state, violation
+        for moment in (MOMENT, *SOONER) if self.levels.system.sliders else (MOMENT,):
+            best, worst = self._least_violating(before, resting, y, t, moment)
+            if worst <= ZERO:
+                break
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
-        for i, (old, new) in enumerate(zip(before, best, strict=True)):
-            if old != new:
+        answer.rubbed += self.levels.sliding.let_go(before, best[0], y, w)
+        for i, (old, new) in enumerate(zip(before, best[0], strict=True)):
+            if old != new and (i < self.levels.c or t > 0):
                 answer.events.append((t, i, new))
-        return best, y
+        return best
+
+    def _least_violating(self, before, resting, y, t, moment):
+        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not."""
+        w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
+        for slides in self.levels.sliding.choices(before, y, w, self.speed):
+            for count in range(len(resting) + 1):
+                for held in itertools.combinations(resting, count):
+                    if worst <= ZERO or not self._independent(held, slides):
+                        continue
+                    state = self._compliant(before, held, slides, y, t)
+                    after = self.levels.sliding.entered(before, state, y, w)
+                    violation = self._violation(state, resting, after, t, moment)
+                    if violation < worst:
+                        best, worst = (state, after), violation
+        return best, worst
 
     def at_rest(self, y, t):
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
@@ -84,10 +97,13 @@ class Instants:
             0.0 if self.levels.speeds[i] is None else w[self.levels.speeds[i]]
         )
 
-    def _independent(self, held):
-        if not held:
+    def _independent(self, held, slides=()):
+        sliding = self.levels.sliding
+        rows = [self.rows[i] for i in held]
+        rows += [sliding.all[e].row for e, state in enumerate(slides) if state == "stick" and sliding.rigid(e)]
+        if not rows:
             return True
-        values = np.linalg.eigvalsh(self.rows[list(held)] @ self.inverse @ self.rows[list(held)].T)
+        values = np.linalg.eigvalsh(np.array(rows) @ self.inverse @ np.array(rows).T)
         return values[0] > DEPENDENT * values[-1]
 
     def _struck(self, y, w, touching, answer):
@@ -116,24 +132,31 @@ class Instants:
         y[2 * self.n :][touching] += best[1]
         return y
 
-    def moment(self, t):
+    def moment(self, t, share=MOMENT):
         """A short time [s]: of the fastest motion, less where loads change within a step."""
         k = min(int(np.searchsorted(self.levels.nodes, t, side="right")), len(self.levels.nodes) - 1)
         return (
-            MOMENT
+            share
             * STEP
             / self.levels.rate_of_all
             * float(np.clip(100 * (self.levels.nodes[k] - t) * self.levels.rate_of_all, 0.02, 1))
         )
 
-    def _compliant(self, before, held, y, t):
-        """The state with these rigid contacts closed: the others by where they are, or will be a moment later."""
-        state = list(before)
+    def _compliant(self, before, held, slides, y, t):
+        """The state with these rigid contacts closed: the others by where they are, or will be a moment later.
+
+        slides: states of the sliders, of those whose contacts are closed.
+        """
+        state, sliding, w = list(before), self.levels.sliding, self.levels.inputs(np.array([t]))[0]
+        state[sliding.first :] = slides
         for i in self.levels.rigid:
             state[i] = "closed" if i in held else "open"
         for _ in range(6):
-            level, tau = self.levels.level(tuple(state)), self.moment(t)
-            later, known = self.levels.inside(level, y, t)(tau), tuple(state)
+            for e, slider in enumerate(sliding.all):
+                shut = slider.contact is None or state[slider.contact] == "closed"
+                state[sliding.first + e] = slides[e] if shut else "off"
+            level, tau, known = self.levels.level(tuple(state)), self.moment(t), tuple(state)
+            later = self.levels.inside(level, sliding.entered(before, known, y, w), t)(tau)
             now, then = self.levels.inputs(np.array([t, t + tau]))
             for i, stop in enumerate(self.levels.system.stops):
                 if i not in self.levels.rigid:
@@ -165,22 +188,29 @@ class Instants:
             force = -stop.stiffness * gap(later) - stop.damping * self._rate(i, *later)
         return "closed" if force > 0 else "inside"
 
-    def _violation(self, state, resting, y, t):
-        """By how much the motion of a state leaves what is admissible a moment later, of what it could."""
-        if not resting:
+    def _violation(self, state, resting, y, t, moment):
+        """By how much the motion of a state leaves what is admissible a moment later, of what it could.
+
+        Of what sticks at once, too: it may be within its limit again a moment later.
+        """
+        first = self.levels.sliding.first
+        if not resting and len(state) == first:
             return 0.0
-        level, tau = self.levels.level(state), self.moment(t)
+        level, tau = self.levels.level(state), self.moment(t, moment)
         at = self.levels.inside(level, y, t)
         worst = 0.0
-        for share in (0.5, 1.0):
+        for share in (0.0, 0.5, 1.0):
             later = at(share * tau)
             w = self.levels.inputs(np.array([t + share * tau]))[0]
             s = level.signals @ later + level.signal_inputs @ w
-            for value, i, row, row_w in zip(s, level.turns, level.signals, level.signal_inputs, strict=True):
-                if i in resting:
-                    size = np.abs(row) @ np.abs(later) + np.abs(row_w) @ np.abs(w)
+            sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
+            for value, i, size in zip(s, level.turns, sizes, strict=True):
+                if (i in resting and share > 0) or (i >= first and (share > 0 or state[i] == "stick")):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2
+                    if state[i] in SIGNS:
+                        value = value if abs(value) > ROUND_OFF * size else 0.0
+                        size = self.speed * self.levels.rate_of_all * share * tau
                     worst = max(worst, -value / size if size else 0.0)
         return worst

@@ -40,14 +40,19 @@ class _Integration:
         self.length = max([self.length, *(np.max(np.abs(law.knots)) for law in self.levels.system.laws)])
         ways = [np.max(np.abs(self.levels.at_nodes[:, k])) for k in self.levels.ways if k is not None]
         self.length = max([self.length, *ways])
+        passing = [np.max(np.abs(self.levels.at_nodes[:, k])) for k in self.levels.slider_speeds if k is not None]
+        passing += [abs(slider.velocity) for slider in self.levels.system.sliders]
+        self.length = max([self.length, *(4 * STEP / self.levels.rate_of_all * v for v in passing)])
         accelerations = np.abs(self.levels.at_nodes) @ np.max(
             np.abs(self.levels.smooth_forces(self.levels.lowest())[1]), axis=0
         )
         self.length = max(self.length, np.max(accelerations) * (STEP / self.levels.rate_of_all) ** 2, 1e-300)
         self.speed = self.length * self.levels.rate_of_all
-        y, t, k = np.concatenate([displacement, velocity, np.zeros(self.levels.c)]), 0.0, 0
+        y, t, k = np.concatenate([displacement, velocity, np.zeros(self.levels.size - 2 * self.n)]), 0.0, 0
         instants = Instants(self.levels, self.length, self.speed, self.touch)
-        answer = Answer(*np.zeros((2, self.n, len(self.times))), length=self.length, speed=self.speed)
+        length = max(self.length, self.levels.sliding.largest_stretch())
+        size = {"length": length, "speed": length * self.levels.rate_of_all}
+        answer = Answer(*np.zeros((2, self.n, len(self.times))), **size)
         state, y = instants.settled(self.levels.lowest(), y, 0.0, answer)
         shown, count, block, rocking, before = 0, 0, LEAST, 0, 0.0
         while k < len(self.levels.nodes) - 1:
@@ -70,7 +75,13 @@ class _Integration:
                 y[: self.n, None],
                 y[self.n : 2 * self.n, None],
             )
-        answer.impulse = y[2 * self.n :]
+        answer.impulse = y[2 * self.n : 2 * self.n + self.levels.c]
+        answer.slipped = y[self.levels.sliding.way :]
+        answer.rubbed += sum(
+            s.limit * way
+            for s, way in zip(self.levels.system.sliders, answer.slipped, strict=True)
+            if s.contact is None
+        )
         return answer
 
     def _piece(self, level, y, t, k, block):
@@ -104,8 +115,14 @@ class _Integration:
             return None
         inputs = self.levels.inputs(times)
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
-        allowed = ZERO * (np.abs(states) @ np.abs(level.signals).T + np.abs(inputs) @ np.abs(level.signal_inputs).T)
-        largest = np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.levels.c])
+        allowed = ZERO * (np.abs(states) @ level.sizes[0].T + np.abs(inputs) @ level.sizes[1].T)
+        largest = np.concatenate(
+            [
+                np.repeat([self.length, self.speed, 0.0], [self.n, self.n, self.levels.c]),
+                self.levels.sliding.largest_tensions(self.length),
+                np.zeros(len(self.levels.system.sliders)),
+            ]
+        )
         allowed = np.maximum.accumulate(allowed + self.touch * (np.abs(level.signals) @ largest), axis=0)
         below = s[1:] < -allowed[1:]
         curved, bends = np.zeros_like(below), np.zeros((1, s.shape[1]))

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm
 
+from brute_force.sliding import SIGNS, Sliding
+
 STEP = 0.35  # times the fastest rate of any level: a step
 NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
 TERMS = 16  # of the exponential's series inside a step
@@ -14,13 +16,21 @@ TERMS = 16  # of the exponential's series inside a step
 
 @dataclass(frozen=True)
 class Level:
-    """y' = A y + W w(t); signals s = S y + T w(t) >= 0, each of (item, what it turns to)."""
+    """y' = A y + W w(t); signals s = S y + T w(t) >= 0, each of the item that then turns.
+
+    sizes: rows (s, y) and (s, w) of what round-off of s is measured against.
+    tensions, limits, slips: rows of the sliders' forces, of their static limits, and of their own speeds.
+    """
 
     matrix: np.ndarray
     inputs: np.ndarray
     signals: np.ndarray
     signal_inputs: np.ndarray
+    sizes: tuple
     turns: list
+    tensions: tuple
+    limits: tuple
+    slips: tuple
     steps: dict = field(default_factory=dict)
 
     def step(self, h):
@@ -54,6 +64,11 @@ class Levels:
         self.ways = [self._input(course and course.value) for course, _, _ in moving]
         self.speeds = [self._input(rate) for _, rate, _ in moving]
         self.accelerations = [self._input(acceleration) for _, _, acceleration in moving]
+        passing = [(s.course.rate, s.course.acceleration) if s.course else (None, None) for s in system.sliders]
+        self.slider_speeds = [self._input(rate) for rate, _ in passing]
+        self.slider_accelerations = [self._input(acceleration) for _, acceleration in passing]
+        self.size = 2 * self.n + self.c + 2 * len(system.sliders)
+        self.sliding = Sliding(self)
         self.nodes = self._grid()
         self.at_nodes = self.inputs(self.nodes)
         widths = np.diff(self.nodes)
@@ -70,7 +85,18 @@ class Levels:
         return np.column_stack([function(t) for function in self.functions])
 
     def _courses(self):
-        return [course for _, course in self.system.loads] + [s.course for s in self.system.stops if s.course]
+        moving = (*self.system.stops, *self.system.sliders)
+        return [course for _, course in self.system.loads] + [s.course for s in moving if s.course]
+
+    @functools.cached_property
+    def input_rates(self):
+        """(w, w): w' of w, as far as stops and counter-surfaces need it."""
+        rates = np.zeros((len(self.functions), len(self.functions)))
+        pairs = [*zip(self.ways, self.speeds, strict=True), *zip(self.speeds, self.accelerations, strict=True)]
+        for of, rate in pairs:
+            if of is not None and rate is not None:
+                rates[of, rate] = 1.0
+        return rates
 
     def _grid(self):
         end, courses = self.end, self._courses()
@@ -93,6 +119,9 @@ class Levels:
             if np.isfinite(stop.stiffness):
                 stiff += stop.stiffness * np.outer(stop.row, stop.row)
                 damped += stop.damping * np.outer(stop.row, stop.row)
+        for slider in self.system.sliders:
+            if np.isfinite(slider.stiffness):
+                stiff += slider.stiffness * np.outer(slider.row, slider.row)
         for law in self.system.laws:
             stiff += np.max(np.abs(np.diff(law.forces) / np.diff(law.knots))) * np.outer(law.row, law.row)
         matrix = np.block([[np.zeros_like(stiff), np.eye(self.n)], [-self.inverse @ stiff, -self.inverse @ damped]])
@@ -100,16 +129,15 @@ class Levels:
         return max(omega, np.max(np.abs(np.linalg.eigvals(matrix))), 1 / self.end)
 
     def level(self, state):
-        """The linear system of a state: of every contact "open", "closed" or "inside", of every law its segment."""
+        """Of contacts "open", "closed" or "inside", laws their segments, sliders "stick", "+", "-" or "off"."""
         if state not in self._built:
             self._built[state] = self._level(state)
         return self._built[state]
 
     def _level(self, state):
         """Everything is linear in (y, w): forces first, then accelerations, reactions and signals."""
-        n, c, w = self.n, self.c, len(self.functions)
-        gap, rate, force = np.zeros((3, c, 2 * n + c)), None, None
-        gap, rate, force = gap
+        n, c, w, sliding = self.n, self.c, len(self.functions), self.sliding
+        gap, rate, force = np.zeros((3, c, self.size))
         gap_w, rate_w, force_w = np.zeros((3, c, w))
         for i, stop in enumerate(self.system.stops):
             gap[i, :n], gap_w[i, 0], rate[i, n : 2 * n] = stop.row, stop.gap, stop.row
@@ -120,72 +148,103 @@ class Levels:
             if i not in self.rigid:
                 force[i] = -stop.stiffness * gap[i] - stop.damping * rate[i]
                 force_w[i] = -stop.stiffness * gap_w[i] - stop.damping * rate_w[i]
-        total, total_w = self.smooth_forces(state)
         closed = [i for i in range(c) if state[i] == "closed"]
+        tension, tension_w = np.zeros((len(sliding.all), self.size)), np.zeros((len(sliding.all), w))
+        slides, forces, tensions = dict(enumerate(state[sliding.first :])), (force, force_w), (tension, tension_w)
+        stuck = [e for e, s in slides.items() if s == "stick" and sliding.rigid(e)]
+        pulled = [e for e, s in slides.items() if s in SIGNS and sliding.all[e].contact in self.rigid]
+        total, total_w = self.smooth_forces(state)
         for i in closed:
             if i not in self.rigid:
                 total = total + np.outer(self.rows[i], force[i])
                 total_w = total_w + np.outer(self.rows[i], force_w[i])
+        for e in set(slides) - {*stuck, *pulled}:
+            tension[e], tension_w[e] = sliding.known(e, slides[e], forces)
+            total = total - np.outer(sliding.all[e].row, tension[e])
+            total_w = total_w - np.outer(sliding.all[e].row, tension_w[e])
         held = [i for i in closed if i in self.rigid]
-        if held:
-            rows = self.rows[held]
-            wanted = np.zeros((len(held), w))
-            for k, i in enumerate(held):
-                if self.accelerations[i] is not None:
-                    wanted[k, self.accelerations[i]] = 1
-            flexibility = rows @ self.inverse @ rows.T
-            force[held] = np.linalg.solve(flexibility, -rows @ self.inverse @ total)
-            force_w[held] = np.linalg.solve(flexibility, wanted - rows @ self.inverse @ total_w)
-            total, total_w = total + rows.T @ force[held], total_w + rows.T @ force_w[held]
-        matrix, inputs = np.zeros((2 * n + c, 2 * n + c)), np.zeros((2 * n + c, w))
+        if held or stuck:
+            (total, total_w), reactions = self._reactions(held, stuck, {e: slides[e] for e in pulled}, total, total_w)
+            for of, pull, found in zip(forces, tensions, reactions, strict=True):
+                of[held], pull[stuck] = found[: len(held)], found[len(held) :]
+        for e in pulled:
+            tension[e], tension_w[e] = sliding.known(e, slides[e], forces)
+        matrix, inputs = np.zeros((self.size, self.size)), np.zeros((self.size, w))
         matrix[:n, n : 2 * n] = np.eye(n)
         matrix[n : 2 * n], inputs[n : 2 * n] = self.inverse @ total, self.inverse @ total_w
         for i in closed:
             matrix[2 * n + i], inputs[2 * n + i] = force[i], force_w[i]
-        return Level(matrix, inputs, *self._signals(state, (gap, gap_w), (force, force_w)))
+        limits, slips = sliding.fill(slides, matrix, inputs, forces, tensions)
+        found = self._signals(state, (gap, gap_w), forces)
+        found += sliding.signals(slides, tensions, limits, slips)
+        signals = np.array([row for row, _, _ in found]).reshape(-1, self.size)
+        signal_inputs = np.array([row for _, row, _ in found]).reshape(-1, w)
+        turns = [turn for _, _, turn in found]
+        sizes = sliding.sizes(state, (signals, signal_inputs), turns, limits, tensions)
+        return Level(matrix, inputs, signals, signal_inputs, sizes, turns, tensions, limits, slips)
+
+    def _reactions(self, held, stuck, pulled, total, total_w):
+        """Forces with reactions, and the reactions, of contacts and of what sticks: each a pair of rows (y,) and (w,).
+
+        pulled: states of the sliders whose limits are a share of the contacts' reactions. What they hold keeps no
+        acceleration but round-off of itself.
+        """
+        sliders, wanted = self.system.sliders, np.zeros((len(held) + len(stuck), len(self.functions)))
+        rows = np.array([self.rows[i] for i in held] + [sliders[e].row for e in stuck])
+        pushes = np.array([self.rows[i] for i in held] + [-sliders[e].row for e in stuck]).T
+        for e, s in pulled.items():
+            pushes[:, held.index(sliders[e].contact)] -= SIGNS[s] * sliders[e].limit * sliders[e].row
+        courses = [self.accelerations[i] for i in held] + [self.slider_accelerations[e] for e in stuck]
+        for k, course in enumerate(courses):
+            if course is not None:
+                wanted[k, course] = 1
+        flexibility = rows @ self.inverse @ pushes
+        totals, reactions = [], []
+        for given, asked in ((total, 0.0 * rows @ total), (total_w, wanted)):
+            reaction, reached = np.zeros_like(asked), given
+            for _ in range(2):
+                more = np.linalg.solve(flexibility, asked - rows @ self.inverse @ reached)
+                reaction, reached = reaction + more, reached + pushes @ more
+            totals.append(reached)
+            reactions.append(reaction)
+        return totals, reactions
 
     def smooth_forces(self, state):
         """Of structure, loads and laws: rows (n, y) and (n, w)."""
         n, system = self.n, self.system
-        total, total_w = np.zeros((n, 2 * n + self.c)), np.zeros((n, len(self.functions)))
+        total, total_w = np.zeros((n, self.size)), np.zeros((n, len(self.functions)))
         total[:, :n], total[:, n : 2 * n] = -system.stiffness, -system.damping
         total_w[:, 0] = system.constant
         for (row, _), k in zip(system.loads, self.loads, strict=True):
             total_w[:, k] += row
-        for law, segment in zip(system.laws, state[self.c :], strict=True):
+        for law, segment in zip(system.laws, state[self.c : self.sliding.first], strict=True):
             slope = np.diff(law.forces)[segment] / np.diff(law.knots)[segment]
             total[:, :n] -= slope * np.outer(law.row, law.row)
             total_w[:, 0] -= (law.forces[segment] - slope * law.knots[segment]) * law.row
         return total, total_w
 
     def _signals(self, state, gaps, forces):
-        found, turns = [], []
+        found = []
         for i, stop in enumerate(self.system.stops):
-            gap, force = (gaps[0][i], gaps[1][i]), (forces[0][i], forces[1][i])
-            minus_gap, minus_force = (-gap[0], -gap[1]), (-force[0], -force[1])
+            gap, force = (gaps[0][i], gaps[1][i], i), (forces[0][i], forces[1][i], i)
+            minus_gap = -gap[0], -gap[1], i
             if state[i] == "open":
                 found.append(gap)
             elif state[i] == "inside":
-                found += [minus_gap, minus_force]
-                turns.append(i)
+                found += [minus_gap, (-forces[0][i], -forces[1][i], i)]
             else:
                 found.append(force if i in self.rigid or stop.damping else minus_gap)
-            turns.append(i)
         for j, law in enumerate(self.system.laws):
-            row, segment = np.zeros(2 * self.n + self.c), state[self.c + j]
+            row, segment = np.zeros(self.size), state[self.c + j]
             row[: self.n], one = law.row, np.eye(1, len(self.functions))[0]
             if segment > 0:
-                found.append((row, -law.knots[segment] * one))
-                turns.append(self.c + j)
+                found.append((row, -law.knots[segment] * one, self.c + j))
             if segment < len(law.knots) - 2:
-                found.append((-row, law.knots[segment + 1] * one))
-                turns.append(self.c + j)
-        if not found:
-            return np.zeros((0, 2 * self.n + self.c)), np.zeros((0, len(self.functions))), []
-        return np.array([row for row, _ in found]), np.array([row for _, row in found]), turns
+                found.append((-row, law.knots[segment + 1] * one, self.c + j))
+        return found
 
     def lowest(self):
-        return ("open",) * self.c + (0,) * len(self.system.laws)
+        return ("open",) * self.c + (0,) * len(self.system.laws) + ("off",) * len(self.system.sliders)
 
     def inside(self, level, y, t):
         """y(tau) after (y, t), within a step: (y,) of one tau, (y, k) of (k,)."""

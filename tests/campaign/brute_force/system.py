@@ -43,22 +43,42 @@ class Law:
 
 
 @dataclass(frozen=True)
+class Slider:
+    """Dry friction |T| <= F along a row, which slides past a counter-surface of ``velocity`` [m/s] or on a course.
+
+    F = limit [N], or limit times the force of the contact number ``contact``; static_limit: at which it begins to slip.
+    stiffness: of a spring in series [N/m].
+    """
+
+    row: np.ndarray
+    limit: float
+    static_limit: float
+    stiffness: float = np.inf
+    velocity: float = 0.0
+    course: Course | None = None
+    contact: int | None = None
+
+
+@dataclass(frozen=True)
 class System:
-    """M, C, K (n, n), contacts, laws, loads [(row, course)]; base: (e, course), which fixed stops hear as well."""
+    """M, C, K (n, n), contacts, laws, sliders, loads [(row, course)]."""
 
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
     stops: Sequence[Stop] = ()
     laws: Sequence[Law] = ()
+    sliders: Sequence[Slider] = ()
     loads: Sequence[tuple[np.ndarray, Course]] = ()
     constant: np.ndarray | float = 0.0
 
 
 @dataclass
 class Answer:
-    """x, x' (n, k) at the times asked for, events [(time, contact, state)], impulses (c,), energy lost by impacts.
+    """x, x' (n, k) at the times asked for, events [(time, item, state)], impulses (c,), energy lost by impacts.
 
+    Items are contacts, laws and sliders, in this order. slipped: way that every slider has slid [m], (f,).
+    rubbed: energy that those of constant limits have lost [J].
     length, speed: of the scene, what its gaps, start, stops and loads make [m, m/s].
     """
 
@@ -66,6 +86,8 @@ class Answer:
     velocity: np.ndarray
     events: list = field(default_factory=list)
     impulse: np.ndarray | None = None
+    slipped: np.ndarray | None = None
+    rubbed: float = 0.0
     impact: float = 0.0
     length: float = 0.0
     speed: float = 0.0

@@ -1,10 +1,11 @@
-"""Random scenes of what users bring, one kind each: loads, moving stops and bases, dampers, force laws, free bodies.
+"""Random scenes of what users bring, one kind each: loads, moving stops and bases, dampers, force laws,
+free bodies, dry friction.
 
 ``scene_of(kind, number)`` draws a scene from its kind and number alone; a new kind does not change what others draw.
 A scene holds the arguments of ``simulate`` and the same system in plain numbers for brute force (brute_force). Each
 has an answer: no start lies inside a rigid stop, and rigid stops do not contradict each other.
 
-Order: parts, loads, kinds, units.
+Order: parts, loads, kinds, sliders, units.
 """
 
 import itertools
@@ -12,11 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from campaign_scenes.kinds import DRAWN
+from campaign_scenes import kinds, sliders
 from campaign_scenes.units import later, scaled
 
 __all__ = ["KINDS", "later", "numbers", "scaled", "scene_of"]
 
+DRAWN = kinds.DRAWN | sliders.DRAWN
 KINDS = tuple(DRAWN)
 
 

@@ -49,6 +49,8 @@ class Parts:
     contacts: list = field(default_factory=list)
     stops: list = field(default_factory=list)
     laws: list = field(default_factory=list)
+    frictions: list = field(default_factory=list)
+    sliders: list = field(default_factory=list)
     loads: list = field(default_factory=list)
     forces: list = field(default_factory=list)
     constant: np.ndarray | float = 0.0
@@ -65,6 +67,9 @@ class Parts:
             for stop in self.stops:
                 if np.isfinite(stop.stiffness):
                     stiff += stop.stiffness * np.outer(stop.row, stop.row)
+            for slider in self.sliders:
+                if np.isfinite(slider.stiffness):
+                    stiff += slider.stiffness * np.outer(slider.row, slider.row)
             for _, law in self.laws:
                 stiff += 0.3 * np.max(np.abs(np.diff(law.forces) / np.diff(law.knots))) * np.outer(law.row, law.row)
             omega = np.sqrt(np.maximum(scipy.linalg.eigh(stiff, self.mass, eigvals_only=True), 0))
@@ -77,6 +82,18 @@ class Parts:
         row, name = np.asarray(row, float), f"c{len(self.contacts)}"
         self.contacts.append(mp.UnilateralContact(name, row, gap, stiffness, damping))
         self.stops.append(bf.Stop(row, gap, stiffness, damping))
+
+    def slider(self, row, limit, static_limit, stiffness=math.inf, velocity=0.0):
+        row, name = np.asarray(row, float), f"f{len(self.frictions)}"
+        self.frictions.append(mp.Friction(name, row, limit, static_limit, stiffness, velocity))
+        self.sliders.append(bf.Slider(row, limit, static_limit, stiffness, velocity))
+
+    def rub(self, i, row, friction, static_friction, stiffness=math.inf, velocity=0.0):
+        """Friction of the contact number i along a row."""
+        row, spring = np.asarray(row, float), {"tangential_stiffness": stiffness, "tangential_velocity": velocity}
+        coefficients = {"friction": friction, "static_friction": static_friction}
+        self.contacts[i] = replace(self.contacts[i], tangential=row, **coefficients, **spring)
+        self.sliders.append(bf.Slider(row, friction, static_friction, stiffness, velocity, contact=i))
 
     def load(self, row, made, course):
         self.loads.append(made)
@@ -93,10 +110,17 @@ class Parts:
             self.mass, self.stiffness, self.damping, {f"m{i}": i for i in range(self.n)}
         )
         law_items = [law for law, _ in self.laws]
-        model = mp.MultiPhiModel(structure, [*self.contacts, *law_items], modes=modes)
+        model = mp.MultiPhiModel(structure, [*self.contacts, *law_items, *self.frictions], modes=modes)
         matrix = np.zeros_like(self.mass) if self.matrix is None else self.matrix
         system = bf.System(
-            self.mass, matrix, self.stiffness, self.stops, [law for _, law in self.laws], self.forces, self.constant
+            self.mass,
+            matrix,
+            self.stiffness,
+            self.stops,
+            [law for _, law in self.laws],
+            self.sliders,
+            self.forces,
+            self.constant,
         )
         displacement = zero if displacement is None else displacement
         velocity = zero if velocity is None else velocity

@@ -32,8 +32,14 @@ def in_units(scene, time, length, mass):
     for item in _items(model):
         if isinstance(item, mp.ForceLaw):
             contacts.append(mp.ForceLaw(item.at, (item.knots * length, item.forces * force), name=item.name))
+        elif isinstance(item, mp.Friction):
+            limits = {"limit": item.limit * force, "static_limit": item.static_limit * force}
+            changed = {"stiffness": item.stiffness * stiff, "velocity": item.velocity * length / time}
+            contacts.append(replace(item, **limits, **changed))
         else:
             changed = {"stiffness": item.stiffness * stiff, "damping": item.damping * mass / time}
+            changed["tangential_stiffness"] = item.tangential_stiffness * stiff
+            changed["tangential_velocity"] = item.tangential_velocity * length / time
             contacts.append(replace(item, gap=item.gap * length, **changed))
     loads = tuple(_load_in_units(load, time, length, mass, force) for load in scene.loads)
     return (
@@ -46,7 +52,7 @@ def in_units(scene, time, length, mass):
 
 
 def _items(model):
-    """Contacts and laws as they were given."""
+    """Contacts, laws and frictions as they were given."""
     laws = dict.fromkeys(contact.law for contact in model.contacts if hasattr(contact, "law"))
     return [*(contact for contact in model.contacts if not hasattr(contact, "law")), *laws]
 
@@ -60,6 +66,12 @@ def _load_in_units(load, time, length, mass, force):
         return replace(load, amplitude=load.amplitude * force, frequency_hz=load.frequency_hz / time)
     if isinstance(load, mp.SampledLoad):
         return mp.SampledLoad(load.at, load.time * time, load.force * force)
+    if isinstance(load, mp.SweepLoad):
+        hertz = load.start_hz / time, load.end_hz / time
+        return mp.SweepLoad(load.at, load.amplitude * force, *hertz, load.duration * time, load.law, load.tolerance)
+    if isinstance(load, mp.FunctionLoad):
+        breaks = tuple(t * time for t in load.breaks)
+        return mp.FunctionLoad(load.at, lambda t: force * load.function(t / time), load.tolerance, breaks)
     return replace(load, course=_course_in_units(load.course, time, length))
 
 

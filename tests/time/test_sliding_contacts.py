@@ -1,0 +1,39 @@
+"""Contacts that rub: with friction that tends to none they move as contacts without."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import multiphi_exudyn as mp
+
+
+@pytest.mark.parametrize("speed", [2.0, -2.0, 0.3])
+def test_a_viscous_contact_that_slides_opens_as_one_without_friction(speed):
+    """Its damper leaves it inside its stop, however fast it slides: to stick first would take that speed away."""
+    structure = mp.LinearStructure([[1.0, 0.4], [0.4, 1.0]], np.diag([4.0, 1.0]), points={"z": 0, "x": 1})
+    runs = []
+    for rubs in ({}, {"tangential": "x", "friction": 1e-10}):
+        contact = mp.UnilateralContact("floor", "z", 0.05, 200.0, damping=8.0, **rubs)
+        runs.append(mp.simulate(mp.MultiPhiModel(structure, [contact], modes="all"), 12.0, velocity=[-1.0, speed]))
+    smooth, rubbing = runs
+    assert len(smooth.contact_intervals("floor")) > 3
+    assert_allclose(rubbing.contact_intervals("floor"), smooth.contact_intervals("floor"), rtol=0, atol=1e-7)
+    assert_allclose(rubbing.at("z", 12.0), smooth.at("z", 12.0), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_spring_sticks_at_once_where_an_impact_has_turned_its_slip(side):
+    """A mass that drags a ring is struck by a heavier one and thrown back, while a force turns it round again."""
+    structure = mp.LinearStructure(np.diag([1.0, 3.0]), np.zeros((2, 2)), points={"a": 0, "b": 1})
+    stop = mp.UnilateralContact("stop", {"a": -side, "b": side}, 0.6)
+    ring = mp.Friction("ring", "a", 0.1, stiffness=10.0)
+    model = mp.MultiPhiModel(structure, [stop, ring], modes="all")
+    run = mp.simulate(
+        model, 0.3, velocity=[side, -2.0 * side], loads=[mp.ConstantLoad("a", 2 * side), mp.ConstantLoad("b", 9 * side)]
+    )
+    struck = next(event.time for event in run.events if event.contact == "stop")
+    sticks = run.stick_intervals("ring")
+    assert sticks[0][1] < struck == sticks[1][0]
+    assert run.friction_force("ring", struck + 1e-9) == pytest.approx(side * 0.1, abs=1e-6)
+    assert side * run.friction_force("ring", 0.3) < 0.1
+    assert abs(run.ledger.residual) < 1e-12
