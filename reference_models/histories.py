@@ -12,6 +12,7 @@ from reference_models.actions import Way
 from reference_models.beam_system import AXIAL, BeamSystem
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
+from reference_models.point_friction import PointFriction
 from reference_models.recorder import Recorder, Watched
 
 __all__ = ["Histories", "watched"]
@@ -21,7 +22,7 @@ __all__ = ["Histories", "watched"]
 class Histories:
     """Deflections [m] of points and gaps [m] of contacts by name, (s,) each, at times (s,) [s].
 
-    rates: g' [m/s] of viscous contacts.
+    rates: g' [m/s] of viscous contacts. tensions: T [N] of frictions, slips: way [m] of the bristle on its surface.
     """
 
     time: np.ndarray
@@ -29,6 +30,8 @@ class Histories:
     gaps: dict[str, np.ndarray]
     rates: dict[str, np.ndarray]
     contacts: tuple[PointContact, ...]
+    tensions: dict[str, np.ndarray]
+    slips: dict[str, np.ndarray]
 
     @property
     def forces(self) -> dict[str, np.ndarray]:
@@ -43,6 +46,7 @@ class Histories:
         contacts: tuple[PointContact, ...],
         settings: FullBeamSettings,
         ways: Mapping[str, Way],
+        frictions: Sequence[PointFriction],
     ) -> Histories:
         """The recorded steps, up to the last one at which everything is finite; names: of all points."""
         time, watched = np.array(recorder.times), np.array(recorder.watched)
@@ -61,25 +65,40 @@ class Histories:
             gaps[name] = gaps[name] - way.at(time[:count])
             if name in rates:
                 rates[name] = rates[name] - way.rate(time[:count])
-        return cls(time[:count], points, gaps, rates, contacts)
+        data = np.array(recorder.data[:count]).reshape(count, -1, 2)
+        travels = {friction.name: friction.travel(points, time[:count]) for friction in frictions}
+        tensions = {f.name: f.force(travels[f.name], data[:, i]) for i, f in enumerate(frictions)}
+        slips = {f.name: travels[f.name] - tensions[f.name] / f.stiffness for f in frictions}
+        return cls(time[:count], points, gaps, rates, contacts, tensions, slips)
 
     def at(self, time: np.ndarray) -> Histories:
-        """The same at other times (k,), by cubic splines through the steps."""
+        """The same at other times (k,), by cubic splines through the steps, straight lines for friction."""
         if len(self.time) < 2:
             return self
         points, gaps, rates = (self._splined(given, time) for given in (self.points, self.gaps, self.rates))
-        return Histories(time, points, gaps, rates, self.contacts)
+        tensions, slips = (self._interpolated(given, time) for given in (self.tensions, self.slips))
+        return Histories(time, points, gaps, rates, self.contacts, tensions, slips)
+
+    def _interpolated(self, given: dict[str, np.ndarray], time: np.ndarray) -> dict[str, np.ndarray]:
+        return {name: np.interp(time, self.time, values) for name, values in given.items()}
 
     def _splined(self, given: dict[str, np.ndarray], time: np.ndarray) -> dict[str, np.ndarray]:
         return {name: CubicSpline(self.time, values)(time) for name, values in given.items()}
 
 
 def watched(system: BeamSystem, contacts: Sequence[PointContact], forces: np.ndarray) -> Watched:
-    """What a Histories needs: deflections of all points, axial motion of contacts; speeds of points of viscous ones."""
+    """What a Histories needs: deflections of all points, axial motion of contacts; speeds of points of viscous ones;
+    the states of frictions.
+    """
     points = [system.coordinate(name) for name in system.points]
     touching = [system.coordinate(contact.point, AXIAL) for contact in contacts]
     viscous = [system.coordinate(name) for name in viscous_points(contacts)]
-    return Watched(np.array([*points, *touching], dtype=int), np.array(viscous, dtype=int), forces)
+    data = [index for connector in system.frictions for index in connector.data]
+    return Watched(_indices([*points, *touching]), _indices(viscous), forces, _indices(data))
+
+
+def _indices(given: Sequence[int]) -> np.ndarray:
+    return np.array(given, dtype=int)
 
 
 def viscous_points(contacts: Sequence[PointContact]) -> list[str]:

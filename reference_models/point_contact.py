@@ -19,7 +19,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structure import At
 from reference_models.beams import Beams
 
-__all__ = ["PointContact", "point_and_coefficient", "point_contacts"]
+__all__ = ["PointContact", "point_and_coefficient", "point_and_other", "point_contacts"]
 
 
 @dataclass(frozen=True)
@@ -93,13 +93,13 @@ def _point_contact(beams: Beams, contact: UnilateralContact) -> PointContact:
     if contact.rigid:
         raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one (a penalty spring)")
     what = f"contact {contact.name!r} direction"
-    point, coefficient, other = _pair(what, contact.direction)
+    point, coefficient, other = point_and_other(what, contact.direction)
     for name in (point,) if other is None else (point, other):
         beams.check_point(what, name)
     return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping, other)
 
 
-def _pair(what: str, direction: At) -> tuple[str, float, str | None]:
+def point_and_other(what: str, direction: At) -> tuple[str, float, str | None]:
     """Point and coefficient of a direction, and the point of the opposite coefficient, if it has two."""
     if not isinstance(direction, Mapping) or len(direction) != 2:
         return *point_and_coefficient(what, direction), None

@@ -1,8 +1,9 @@
 """What is kept while a full beam is integrated, at the least cost per step.
 
-Every step: the time, the watched coordinates, and how far loads have moved. At output_step: all velocities at
-both ends of a step, from which the dissipated energy follows. Every millisecond: all coordinates and velocities,
-from which the energy follows after the run. The cost is 1 to 2 us a step, as that of Exudyn's own sensors.
+Every step: the time, the watched coordinates, how far loads have moved, and the state of frictions. At
+output_step: all velocities at both ends of a step, from which the dissipated energy follows. Every millisecond: all
+coordinates and velocities, from which the energy follows after the run. The cost is 1 to 2 us a step, as that
+of Exudyn's own sensors.
 """
 
 from __future__ import annotations
@@ -22,11 +23,15 @@ EARLY = 1e-6  # of a sampling step: how much before its time a sample may be tak
 
 @dataclass(frozen=True)
 class Watched:
-    """Kept at every step: coordinates and speeds, indices of ODE2 coordinates; forces: (n_full, m), of them force.q."""
+    """Kept at every step: coordinates and speeds, indices of ODE2 coordinates; forces: (n_full, m), of them force.q.
+
+    data: indices of data coordinates. The beams' n_full coordinates are the system's first ones.
+    """
 
     coordinates: np.ndarray
     speeds: np.ndarray
     forces: np.ndarray
+    data: np.ndarray
 
 
 class Recorder:
@@ -40,15 +45,19 @@ class Recorder:
         self.watched: list[np.ndarray] = []
         self.speeds: list[np.ndarray] = []
         self.projections: list[np.ndarray] = []
+        self.data: list[np.ndarray] = []
         self.velocity_steps: list[int] = []
         self.velocities: list[np.ndarray] = []
         self.state_times: list[float] = []
         self.states: list[tuple[np.ndarray, np.ndarray]] = []
         self.stopped = False
         self._indices, self._moving, self._forces = watched.coordinates, watched.speeds, watched.forces.T
+        self._data_indices, count = watched.data, len(watched.forces)
         self._output_step = output_step
         self._q = mbs.systemData.GetODE2Coordinates(copy=False)
         self._q_t = mbs.systemData.GetODE2Coordinates_t(copy=False)
+        self._beams, self._beams_t = self._q[:count], self._q_t[:count]
+        self._data = mbs.systemData.GetDataCoordinates(copy=False)
         self._next_output = self._next_state = 0.0
         self._was_due = False
         self._bar = tqdm(
@@ -67,11 +76,13 @@ class Recorder:
         if len(self._moving):
             self.speeds.append(self._q_t[self._moving])
         if len(self._forces):
-            self.projections.append(self._forces @ self._q)
+            self.projections.append(self._forces @ self._beams)
+        if len(self._data_indices):
+            self.data.append(self._data[self._data_indices])
         due = t >= self._next_output
         if due or self._was_due:
             self.velocity_steps.append(len(self.times) - 1)
-            self.velocities.append(self._q_t.copy())
+            self.velocities.append(self._beams_t.copy())
         if due:
             self._next_output = t + self._output_step * (1 - EARLY)
         self._was_due = due
