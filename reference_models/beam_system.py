@@ -29,6 +29,7 @@ from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
 from reference_models.point_friction import FrictionConnector, PointFriction, add_friction, connector_of
 from reference_models.point_law import PointLaw
+from reference_models.rubbing import Rub
 
 __all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "bending_coordinates", "build_beam_system"]
 
@@ -70,7 +71,8 @@ class BeamSystem:
     container owns mbs and must live as long. nodes of all beams, one beam after the other, and first_coordinates
     (index of each node's first ODE2 coordinate). points: name -> number of its node. load: a LoadCoordinate along +z,
     zero, or None. driver: an ObjectGenericODE2 on all nodes whose forceVector is zero, or None. stops: of the
-    contacts, by name. frictions: their connectors.
+    contacts, by name. frictions: their connectors. rubs: of contacts with
+    friction.
     """
 
     container: Any
@@ -82,6 +84,7 @@ class BeamSystem:
     driver: Any
     stops: Mapping[str, Stop]
     frictions: tuple[FrictionConnector, ...]
+    rubs: tuple[Rub, ...]
 
     def coordinate(self, point: str, component: int = DEFLECTION) -> int:
         """Index of a coordinate of the node at a point among the system's ODE2 coordinates."""
@@ -114,7 +117,10 @@ def build_beam_system(
         _add_contact(mbs, stops[contact.name], settings, ground, places)
     for law in laws:
         _add_law(mbs, law, ground, places[law.point].node)
-    rubbing = [_add_friction(mbs, friction, ground, places) for friction in frictions]
+    rubs = [Rub(contact, contact.tangent, stops[contact.name]) for contact in contacts if contact.tangent]
+    for rub in rubs:
+        _add_rub(mbs, rub, ground, places)
+    connectors = [_add_friction(mbs, friction, ground, places) for friction in frictions]
     nodes = tuple(node for beam in laid.values() for node in beam.nodes)
     if damping is not None:
         mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes), dampingMatrix=damping))
@@ -125,8 +131,11 @@ def build_beam_system(
     mbs.Assemble()
     first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
     points = {point: nodes.index(place.node) for point, place in places.items()}
-    connectors = tuple(connector_of(mbs, *given) for given in zip(frictions, rubbing, strict=True))
-    return BeamSystem(container, mbs, nodes, first, points, load, driver, stops, connectors)
+    placed = tuple(connector_of(mbs, *given) for given in zip(frictions, connectors, strict=True))
+    system = BeamSystem(container, mbs, nodes, first, points, load, driver, stops, placed, tuple(rubs))
+    for rub in rubs:
+        rub.place(system.coordinate)
+    return system
 
 
 def bending_coordinates(kind: str, count: int) -> np.ndarray:
@@ -282,6 +291,14 @@ def _add_law(mbs: Any, law: PointLaw, ground: Any, node: Any) -> None:
 
     markers = [ground, _marker(mbs, node, DEFLECTION)]
     mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=force))
+
+
+def _add_rub(mbs: Any, rub: Rub, ground: Any, places: Mapping[str, _Place]) -> None:
+    """A spring on the tangential deflection whose user function is the contact's friction."""
+    tangent = rub.tangent
+    other = ground if tangent.other is None else _marker(mbs, places[tangent.other].node, DEFLECTION)
+    markers = [other, _marker(mbs, places[tangent.point].node, DEFLECTION)]
+    mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=rub.force))
 
 
 def _add_friction(mbs: Any, friction: PointFriction, ground: Any, places: Mapping[str, _Place]) -> Any:

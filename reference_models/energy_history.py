@@ -27,7 +27,7 @@ __all__ = ["contact_losses", "dissipated_energy", "energy_history", "friction_lo
 
 
 def energy_history(
-    mbs: Any, recorder: Recorder, laws: Sequence[PointLaw], frictions: Sequence[PointFriction], steps: Histories
+    mbs: Any, recorder: Recorder, laws: Sequence[PointLaw], steps: Histories
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times (j,) [s] and energies (j,) [J] of the states kept; the system is left in the last of them."""
     time = np.array(recorder.state_times)
@@ -37,8 +37,8 @@ def energy_history(
     kept = np.searchsorted(steps.time, time)
     for contact in steps.contacts:
         energy += contact.energy(steps.gaps[contact.name][kept])
-    for friction in frictions:
-        energy += steps.tensions[friction.name][kept] ** 2 / (2 * friction.stiffness)
+    for name, stiffness in steps.bristles.items():
+        energy += steps.tensions[name][kept] ** 2 / (2 * stiffness)
     for law in laws:
         deflection = steps.points[law.point]
         energy += _energy_of(law, deflection[0]) + _summed(law.forces(deflection), deflection)[kept]

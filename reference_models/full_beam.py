@@ -82,6 +82,7 @@ class FullBeam:
         self.settings = settings
         self._check_round({contact.name for contact in self.contacts if contact.damping}, "no damping")
         self._check_round({contact.name for contact in self.contacts if contact.other}, "one point")
+        self._check_round({contact.name for contact in self.contacts if contact.tangent}, "no friction")
         started = time.perf_counter()
         with quiet():
             self.structure = _linearized(self.beams, settings)
@@ -215,7 +216,7 @@ class FullBeam:
         names = tuple(self.beams.points)
         steps = Histories.recorded(recorder, names, self.contacts, self.settings, actions.ways, self.frictions)
         grid = steps.at(_grid(steps.time[-1], self.settings))
-        energy_time, energy = energy_history(system.mbs, recorder, self.laws, self.frictions, steps)
+        energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
         lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
         moved = not actions.none or any(friction.velocity for friction in self.frictions)
         work = work_of(actions, recorder, self.frictions, steps, energy_time) if moved else None
@@ -247,7 +248,8 @@ class FullBeam:
     def _not_started(self, message: str, offline_s: float) -> FullRun:
         none = np.empty(0)
         contacts = {contact.name: none for contact in self.contacts}
-        frictions = {friction.name: none for friction in self.frictions}
+        rubbing = [contact.name for contact in self.contacts if contact.tangent is not None]
+        frictions = dict.fromkeys([*(friction.name for friction in self.frictions), *rubbing], none)
         return FullRun(
             status="failed",
             message=message,

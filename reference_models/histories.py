@@ -22,7 +22,8 @@ __all__ = ["Histories", "watched"]
 class Histories:
     """Deflections [m] of points and gaps [m] of contacts by name, (s,) each, at times (s,) [s].
 
-    rates: g' [m/s] of viscous contacts. tensions: T [N] of frictions, slips: way [m] of the bristle on its surface.
+    rates: g' [m/s] of viscous contacts. tensions: T [N] of frictions and of contacts with friction, slips: way [m] of
+    their patches, bristles: their stiffness [N/m].
     """
 
     time: np.ndarray
@@ -32,6 +33,7 @@ class Histories:
     contacts: tuple[PointContact, ...]
     tensions: dict[str, np.ndarray]
     slips: dict[str, np.ndarray]
+    bristles: dict[str, float]
 
     @property
     def forces(self) -> dict[str, np.ndarray]:
@@ -50,7 +52,7 @@ class Histories:
     ) -> Histories:
         """The recorded steps, up to the last one at which everything is finite; names: of all points."""
         time, watched = np.array(recorder.times), np.array(recorder.watched)
-        count = np.argmin(np.append(np.all(np.isfinite(watched), axis=1), False))
+        count = int(np.argmin(np.append(np.all(np.isfinite(watched), axis=1), False)))
         columns = watched[:count].T
         points = dict(zip(names, columns, strict=False))
         gaps = {
@@ -65,11 +67,11 @@ class Histories:
             gaps[name] = gaps[name] - way.at(time[:count])
             if name in rates:
                 rates[name] = rates[name] - way.rate(time[:count])
-        data = np.array(recorder.data[:count]).reshape(count, -1, 2)
-        travels = {friction.name: friction.travel(points, time[:count]) for friction in frictions}
-        tensions = {f.name: f.force(travels[f.name], data[:, i]) for i, f in enumerate(frictions)}
-        slips = {f.name: travels[f.name] - tensions[f.name] / f.stiffness for f in frictions}
-        return cls(time[:count], points, gaps, rates, contacts, tensions, slips)
+        rubbed = _rubbed(recorder, count, points, contacts, frictions)
+        tensions = {name: force for name, (force, _, _) in rubbed.items()}
+        slips = {name: _patch(way, force, stiffness) for name, (force, way, stiffness) in rubbed.items()}
+        bristles = {name: stiffness for name, (_, _, stiffness) in rubbed.items()}
+        return cls(time[:count], points, gaps, rates, contacts, tensions, slips, bristles)
 
     def at(self, time: np.ndarray) -> Histories:
         """The same at other times (k,), by cubic splines through the steps, straight lines for friction."""
@@ -77,7 +79,7 @@ class Histories:
             return self
         points, gaps, rates = (self._splined(given, time) for given in (self.points, self.gaps, self.rates))
         tensions, slips = (self._interpolated(given, time) for given in (self.tensions, self.slips))
-        return Histories(time, points, gaps, rates, self.contacts, tensions, slips)
+        return Histories(time, points, gaps, rates, self.contacts, tensions, slips, self.bristles)
 
     def _interpolated(self, given: dict[str, np.ndarray], time: np.ndarray) -> dict[str, np.ndarray]:
         return {name: np.interp(time, self.time, values) for name, values in given.items()}
@@ -94,7 +96,33 @@ def watched(system: BeamSystem, contacts: Sequence[PointContact], forces: np.nda
     touching = [system.coordinate(contact.point, AXIAL) for contact in contacts]
     viscous = [system.coordinate(name) for name in viscous_points(contacts)]
     data = [index for connector in system.frictions for index in connector.data]
-    return Watched(_indices([*points, *touching]), _indices(viscous), forces, _indices(data))
+    return Watched(_indices([*points, *touching]), _indices(viscous), forces, _indices(data), system.rubs)
+
+
+def _rubbed(
+    recorder: Recorder,
+    count: int,
+    points: Mapping[str, np.ndarray],
+    contacts: Sequence[PointContact],
+    frictions: Sequence[PointFriction],
+) -> dict[str, tuple[np.ndarray, np.ndarray, float]]:
+    """T (s,) [N], tangential way (s,) [m] and bristle [N/m] of frictions and of contacts with friction, by name."""
+    time, found = np.array(recorder.times)[:count], {}
+    data = np.array(recorder.data[:count]).reshape(count, len(frictions), 2)
+    for i, friction in enumerate(frictions):
+        way = friction.travel(points, time)
+        found[friction.name] = friction.force(way, data[:, i]), way, friction.stiffness
+    tangents = {contact.name: contact.tangent for contact in contacts if contact.tangent is not None}
+    forces = np.array(recorder.rubbed[:count]).reshape(count, len(tangents))
+    for (name, tangent), force in zip(tangents.items(), forces.T, strict=True):
+        found[name] = force, tangent.travel(points), tangent.stiffness
+    return found
+
+
+def _patch(way: np.ndarray, force: np.ndarray, stiffness: float) -> np.ndarray:
+    """How far (s,) [m] a bristle's foot has moved on its counter-surface since the start."""
+    place = way - force / stiffness
+    return place - place[:1]
 
 
 def _indices(given: Sequence[int]) -> np.ndarray:

@@ -8,11 +8,14 @@ of Exudyn's own sensors.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
+
+from reference_models.rubbing import Rub
 
 __all__ = ["ENERGY_STEP", "Recorder", "Watched"]
 
@@ -25,13 +28,15 @@ EARLY = 1e-6  # of a sampling step: how much before its time a sample may be tak
 class Watched:
     """Kept at every step: coordinates and speeds, indices of ODE2 coordinates; forces: (n_full, m), of them force.q.
 
-    data: indices of data coordinates. The beams' n_full coordinates are the system's first ones.
+    data: indices of data coordinates. rubs: contacts with friction. The beams' n_full coordinates are the system's
+    first ones.
     """
 
     coordinates: np.ndarray
     speeds: np.ndarray
     forces: np.ndarray
     data: np.ndarray
+    rubs: Sequence[Rub] = ()
 
 
 class Recorder:
@@ -46,13 +51,14 @@ class Recorder:
         self.speeds: list[np.ndarray] = []
         self.projections: list[np.ndarray] = []
         self.data: list[np.ndarray] = []
+        self.rubbed: list[list[float]] = []
         self.velocity_steps: list[int] = []
         self.velocities: list[np.ndarray] = []
         self.state_times: list[float] = []
         self.states: list[tuple[np.ndarray, np.ndarray]] = []
         self.stopped = False
         self._indices, self._moving, self._forces = watched.coordinates, watched.speeds, watched.forces.T
-        self._data_indices, count = watched.data, len(watched.forces)
+        self._data_indices, self._rubs, count = watched.data, watched.rubs, len(watched.forces)
         self._output_step = output_step
         self._q = mbs.systemData.GetODE2Coordinates(copy=False)
         self._q_t = mbs.systemData.GetODE2Coordinates_t(copy=False)
@@ -79,6 +85,8 @@ class Recorder:
             self.projections.append(self._forces @ self._beams)
         if len(self._data_indices):
             self.data.append(self._data[self._data_indices])
+        if self._rubs:
+            self.rubbed.append([rub.end_step(self._q) for rub in self._rubs])
         due = t >= self._next_output
         if due or self._was_due:
             self.velocity_steps.append(len(self.times) - 1)
