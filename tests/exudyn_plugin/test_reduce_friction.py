@@ -78,10 +78,18 @@ def motion(trajectory, time, start=0.0):
         ({}, 0.0),
         ({"between": True}, 0.0),
         ({"between": True, "factor0": 0.5, "factor1": -1.5}, 0.0),
+        ({"staticFrictionOffsetForce": 1e-6}, 0.0),
         ({"stiffness": 3.0, "damping": 0.2, "offset": 0.05, "velocityOffset": 0.3}, 0.0),
         ({"data": (0.0, 0.1, 0.0), "start": 0.1}, 0.1),
     ],
-    ids=["to ground", "two coordinates", "factors", "spring and damper", "started elsewhere"],
+    ids=[
+        "to ground",
+        "two coordinates",
+        "factors",
+        "a hair between the limits",
+        "spring and damper",
+        "started elsewhere",
+    ],
 )
 def test_a_bristle_moves_as_in_exudyn(system, start):
     trajectory = reduced_run(TwoMasses(**system), 8.0)

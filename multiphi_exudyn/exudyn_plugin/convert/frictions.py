@@ -5,6 +5,7 @@
 s the bristle's place, k_s stickingStiffness, F dynamicFrictionForce: Friction(limit=F, stiffness=k_s), whatever spring,
 damper and limit stops the connector has beside it, if the bristle sticks where the reduction is made, s = q. Everything
 else that the connector offers as friction is another law, and left out with its name. (velocityOffset is the damper's.)
+A hair of staticFrictionOffsetForce is taken: without one Exudyn's own runs may slip to the wrong side where stick ends.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from multiphi_exudyn.mechanics.friction import Friction
 
 __all__ = ["frictions_of"]
 
+HAIR = 1e-3  # of the limit: a static offset so small is a limit of its own, however it falls with the speed
 UNSTRETCHED = 1e-9  # of the limit: what a bristle at its place carries by round-off
 
 
@@ -34,14 +36,15 @@ def _friction(mbs: Any, index: int, item: Mapping[str, Any]) -> Friction | str:
         return refusal
     first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
     row = item["factor1"] * second - item["factor0"] * first
-    return Friction(item["name"], row, item["dynamicFrictionForce"], stiffness=item["stickingStiffness"])
+    limit = item["dynamicFrictionForce"]
+    return Friction(item["name"], row, limit, limit + item["staticFrictionOffsetForce"], item["stickingStiffness"])
 
 
 def _law(item: Mapping[str, Any]) -> str:
     """What makes it another law; empty if nothing does."""
     if item["frictionProportionalZone"] != 0:
         return "friction in proportion to slow speeds (frictionProportionalZone), which creeps where it should stick"
-    if item["staticFrictionOffsetForce"] != 0:
+    if item["staticFrictionOffsetForce"] > HAIR * item["dynamicFrictionForce"]:
         return "friction that falls with the speed (staticFrictionOffsetForce, exponentialDecayStatic)"
     if item["viscousFrictionFactor"] != 0:
         return "friction that grows with the speed of slip (viscousFrictionFactor)"
