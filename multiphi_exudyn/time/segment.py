@@ -145,11 +145,11 @@ class Listed(Segments):
 
     def __init__(self, segments: Sequence[Segment]) -> None:
         self._segments = segments
-        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by closed contacts: one may have been built anew
+        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
         for segment in segments:
-            known.setdefault(segment.level.level.indices, (len(known), segment.level))
+            known.setdefault(segment.level.states, (len(known), segment.level))
         self.levels = [level for _, level in known.values()]
-        self.numbers = np.array([known[segment.level.level.indices][0] for segment in segments], np.int64)
+        self.numbers = np.array([known[segment.level.states][0] for segment in segments], np.int64)
         self.starts = np.array([segment.start for segment in segments])
         self.ends = np.array([segment.end for segment in segments])
 
