@@ -39,6 +39,11 @@ class State:
         return self.level.states
 
     @property
+    def held(self) -> np.ndarray:
+        """The places (h,) that links hold [m]."""
+        return self.displacement[self.level.modal.modes + self.level.excitation.prescribed :]
+
+    @property
     def kinetic(self) -> float:
         """Kinetic energy [J]."""
         return float(self.level.kinetic(self.velocity))
