@@ -24,15 +24,6 @@ def block(*elements, stiffness=4.0):
     return mp.MultiPhiModel(structure, elements, modes="all")
 
 
-def friction(run, name, t):
-    """T (k,): less the force of the link, or less the push."""
-    i = run.model.index(name)
-    states = run.model.contacts[i].states
-    segments = [next(s for s in run.segments if s.start <= time <= s.end) for time in t]
-    pushes = np.array([states[segment.level.states[i]].push for segment in segments])
-    return -run.contact_force(name, t) - pushes
-
-
 def kinds(run):
     return [event.kind for event in run.events]
 
@@ -105,7 +96,7 @@ class TestJenkinsElement:
         for part in (s for s in run.segments if s.start >= 2 * period - 1e-9 and s.end > s.start):
             t = part.start + (part.end - part.start) * (nodes + 1) / 2
             assert_allclose(run.at("m", t), self.reach * np.cos(2 * math.pi * self.hertz * t), rtol=0, atol=1e-13)
-            power = friction(run, "ring", t) * np.array([run.velocity(time)[0] for time in t])
+            power = run.friction_force("ring", t) * np.array([run.velocity(time)[0] for time in t])
             area += float(weights @ power) * (part.end - part.start) / 2
         assert area == pytest.approx(4 * self.limit * (self.reach - self.limit / self.stiffness), rel=1e-12)
 
