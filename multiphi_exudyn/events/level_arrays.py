@@ -182,7 +182,7 @@ class LevelArrays:
         """Where the level of elements in these states stands in the ints, packed if it was not."""
         key = tuple(states)
         if key not in self._levels:
-            self._add(self.levels.pushed(key) if self.levels.model.general else self.levels.level(np.flatnonzero(key)))
+            self._add(self.levels.level(key))
         record = self._offsets[self._levels[key]]
         if record not in self._shown:
             self._show_level(record)
@@ -359,7 +359,7 @@ class LevelArrays:
         self._reserve(r + q, self._exponentials(modal.response), len(exits))
         record = self.buffers.take("ints", a.LEVEL_INTS)
         firsts = np.searchsorted([i for i, _ in exits], range(len(level.states) + 1))
-        ends = [k for i in self.levels.ends(own.indices) for k in range(firsts[i], firsts[i + 1])]
+        ends = [k for i in self.levels.ends(level.states) for k in range(firsts[i], firsts[i + 1])]
         omega = modal.omega
         periods = np.divide(1.0, omega, out=np.zeros(r), where=omega > 0)
         given = {

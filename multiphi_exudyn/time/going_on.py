@@ -28,8 +28,8 @@ def going_on(trajectory: Trajectory, levels: LoadedLevels) -> Start:
     state, model = trajectory.final, levels.model
     assert state is not None, "a run that is ok has a final state"
     before, r = state.level, _modes(state.level)
-    held = state.displacement[len(state.displacement) - len(model.held) :]
-    level = levels.pushed(before.states) if model.general else levels.level(before.level.indices)
+    held = state.held
+    level = levels.level(before.states)
     prescribed, rates = levels.drive.values[:2]
     w, w_t = np.concatenate([prescribed, held]), np.concatenate([rates, np.zeros(len(held))])
     jump = _at(before, state.displacement[r:]) - _at(level, w)

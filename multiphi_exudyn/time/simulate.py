@@ -140,7 +140,7 @@ def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: fl
     """
     load = excitation.static
     alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: LoadedLevels.static(model, load))
-    return LoadedLevels(model, excitation, time, end, alone) if excitation.channels else alone
+    return LoadedLevels(model, excitation, time, end, alone) if excitation.prescribed else alone
 
 
 def _start(run: Run, excitation: Excitation) -> Start:

@@ -13,7 +13,7 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.coordinates import flags_of, matrices
+from multiphi_exudyn.exudyn_plugin.body.coordinates import matrices
 from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
@@ -73,11 +73,14 @@ def CreateMultiPhiBody(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
-    model.need_contacts("model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
     body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), loads, PROVISIONAL, matchedStepSize)
+    moving = [contact for contact in model.contacts if contact.velocity]
+    if rows and moving:
+        name, speed = moving[0].name, moving[0].velocity
+        raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")
     if rows and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
@@ -119,7 +122,7 @@ def _motion(
 
 
 def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None) -> dict[str, Any]:
-    stepped, (q, q_t) = body.stepped_level(body.state.closed), body.start
+    stepped, (q, q_t) = body.stepped_level(body.state.states), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
             name=f"Node:{body.name}",
@@ -141,7 +144,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
         )
     )
     if body.model.contacts:
-        values = flags_of(body.state.closed, body.state.phases)
+        values = body.coordinates.layout.of(body.state)
         items["nGenericData"] = mbs.AddNode(
             NodeGenericData(
                 name=f"Node:{body.name}.level", initialCoordinates=values, numberOfDataCoordinates=len(values)
@@ -152,5 +155,6 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
 
 def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, rows, body.model.most_levels)
-    interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
+    stepped = body.stepped_level(body.state.states)
+    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors
