@@ -106,6 +106,7 @@ def add_friction(mbs: Any, friction: PointFriction, ground: Any, marker: Any, ot
         other = _surface(mbs, friction.velocity, ground)
     return mbs.AddObject(
         eii.ObjectConnectorCoordinateSpringDamperExt(
+            name=friction.name,
             markerNumbers=[other, marker],
             nodeNumber=mbs.AddNode(eii.NodeGenericData(initialCoordinates=[0.0, 0.0, 0.0], numberOfDataCoordinates=3)),
             factor0=1.0 if friction.velocity else friction.coefficient,
