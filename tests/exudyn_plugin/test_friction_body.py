@@ -127,7 +127,7 @@ class TestAlone:
 
 
 class TestCoupled:
-    @pytest.mark.parametrize("kind", RING)
+    @pytest.mark.parametrize("kind", ["rigid", "lets go"])
     def test_a_mass_on_a_spring_converges_with_order_two(self, kind):
         whole = mp.LinearStructure(*with_spring(8.0, 0.5), {f"m{i}": i for i in range(4)})
         native = mp.simulate(mp.MultiPhiModel(whole, [RING[kind]], modes="all"), END, displacement=[*START, 0.0])
@@ -148,7 +148,7 @@ class TestCoupled:
         assert_converges(native, lambda h: run(model(RING[kind]), h, add=add, interface=("m2",), matchedStepSize=h))
 
     @pytest.mark.parametrize("point", ["m1", "m2"])
-    @pytest.mark.parametrize("kind", RING)
+    @pytest.mark.parametrize("kind", ["rigid", "lets go"])
     def test_a_mass_where_it_rubs_or_beside_it_converges_with_order_two(self, kind, point):
         chained = chain(3, damping=DAMPING, stiffness=10.0)
         mass = np.array(chained.mass)

@@ -19,7 +19,8 @@ Under loads that vary, s of xi = (eta, w), linear interpolation is off by at mos
 p = P w + Q w' the modal force. The channels enter by bounds that hold for the whole run; a kink of a sampled course
 counts as the second derivative 2 |jump of w'| / h. Steps in which a course itself jumps are never taken for clear.
 
-Either is a matrix times x = (q, q', q'', 1, f, places that links hold, w, w') at the ends. Exudyn's own state is read where it stands.
+Either is a matrix times x = (q, q', q'', 1, f, places that links hold, w, w') at the ends. Exudyn's own state is read
+where it stands.
 """
 
 from __future__ import annotations
@@ -148,7 +149,8 @@ class StepTest:
         self._numbers = np.concatenate([np.zeros(matrix), self._matrix.ravel(), self._norm.ravel()])
         self._numbers[[STEP, ROUNDING, TIME]] = step, rounding, math.nan
         self._numbers[[first + 3 * size, first + width + 3 * size]] = 1.0
-        sizes = size, conditions.points, conditions.held, conditions.channels, behind, behind + both, count, int(conditions.direct)
+        entries = conditions.points, conditions.held, conditions.channels
+        sizes = size, *entries, behind, behind + both, count, int(conditions.direct)
         starts = first, first + width, matrix, matrix + count * width, MULTIPLIERS + 1
         self._ints = np.array([*sizes, *starts, *places], dtype=np.int64)
         self._kept = tuple(views)

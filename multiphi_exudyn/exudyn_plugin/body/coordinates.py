@@ -40,15 +40,21 @@ class Coordinates:
     """Coordinates (s,) of one body. items: its typed indices. stepped: see the module's docstring.
 
     interface: its interface coordinates or None. surroundings: the system around them, views: q, q', q'' in the
-    system's current state, multipliers: all those of the system, during a run. held: places (h,) that links hold, as the
-    interface has them. layout: of the data node. most: levels of which Exudyn's own matrices are kept. matched: whether
-    M differs among levels. rigid: whether links of the body become rigid. slips: whether links have held
+    system's current state, multipliers: all those of the system, during a run. held: places (h,) that links hold, as
+    the interface has them. layout: of the data node. most: levels of which Exudyn's own matrices are kept. matched:
+    whether M differs among levels. rigid: whether links of the body become rigid. slips: whether links have held
     places. foreseen: whether what happens at an event depends on the forces that follow it, as reactions do, and
     accelerations that say which way something slips.
     """
 
     def __init__(
-        self, items: dict[str, Any], stepped: SteppedLevel, held: np.ndarray, layout: LevelData, most: int, matched: bool
+        self,
+        items: dict[str, Any],
+        stepped: SteppedLevel,
+        held: np.ndarray,
+        layout: LevelData,
+        most: int,
+        matched: bool,
     ) -> None:
         self.items = items
         self.stepped, self.held, self.layout = stepped, held, layout

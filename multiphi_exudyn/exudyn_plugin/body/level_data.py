@@ -1,8 +1,8 @@
 """Level data: what the data node of a body holds of its level.
 
-    the number of every element's state (c,): of a contact 0 open, 1 closed,
-    the phase of every exit (e,): 0 armed, 1 recovering, 2 refused, 3 held back; behind those of a level zeros,
-    the places that links hold (h,) [m]
+the number of every element's state (c,): of a contact 0 open, 1 closed,
+the phase of every exit (e,): 0 armed, 1 recovering, 2 refused, 3 held back; behind those of a level zeros,
+the places that links hold (h,) [m]
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@
 
 and of elements with held places T = -lambda, less what they push, and how far their patches have gone.
 
-Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing during a run.
+Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing
+during a run.
 """
 
 from __future__ import annotations
