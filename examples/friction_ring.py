@@ -20,7 +20,7 @@ from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_run import FullRun
 from reference_models.rig import rig_beam, rig_damping
 
-RING = mp.Friction("ring", "node2", limit=3.0, stiffness=1e5)
+RING = mp.Friction("ring", "node2", limit=3.0, stiffness=2e4)
 LOAD = mp.HarmonicLoad("node3", 5.0, 12.0, -np.pi / 2)
 T_END = 0.5  # s
 STEPS = (2e-4, 1e-4, 5e-5, 2.5e-5)  # s, of the full beam; the finest is what others are compared with
@@ -58,15 +58,22 @@ def solved() -> Results:
     points = {name: (system.nodes[number], DEFLECTION) for name, number in system.points.items()}
     reduction = reduce(system.mbs, modes=6, points=points, strict=True)
     print(reduction.report)
-    reduced_run(reduction.model)  # builds the levels
-    started = time.perf_counter()
-    trajectory = reduced_run(reduction.model)
-    return Results(runs, trajectory, time.perf_counter() - started)
+    trajectory = reduced_run(reduction.model)  # with a check of its linear range beside the system itself
+    alone = mp.MultiPhiModel(reduction.structure, reduction.model.contacts, modes=6)
+    seconds = [timed(alone) for _ in range(6)]
+    return Results(runs, trajectory, min(seconds[1:]))  # the first one builds the levels
 
 
 def reduced_run(model: mp.MultiPhiModel) -> mp.Trajectory:
     """Under the same load, from rest."""
     return mp.simulate(model, T_END, loads=[LOAD])
+
+
+def timed(model: mp.MultiPhiModel) -> float:
+    """Time of a run [s]."""
+    started = time.perf_counter()
+    reduced_run(model)
+    return time.perf_counter() - started
 
 
 def draw(found: Results, path: str) -> None:
@@ -78,9 +85,8 @@ def draw(found: Results, path: str) -> None:
         (tip, run.time, 1e3 * run.points["node3"]),
         (loop, 1e3 * run.points["node2"], run.friction_force["ring"]),
     ):
-        axes.plot(x, y, color="0.75", linewidth=4, label=f"full Exudyn beam, {run.online_s:.1f} s")
-    label = f"reduced, 6 modes, {1e3 * found.reduced_s:.0f} ms"
-    tip.plot(run.time, 1e3 * reduced.at("node3", run.time), color="#0072B2", linewidth=1, label=label)
+        axes.plot(x, y, color="0.75", linewidth=4, label="full Exudyn beam")
+    tip.plot(run.time, 1e3 * reduced.at("node3", run.time), color="#0072B2", linewidth=1, label="reduced, 6 modes")
     loop.plot(1e3 * reduced.at("node2", run.time), reduced.friction_force("ring", run.time), color="#0072B2")
     for start, end in reduced.stick_intervals("ring"):
         tip.axvspan(start, end, color="#D55E00", alpha=0.15, linewidth=0)
@@ -88,7 +94,7 @@ def draw(found: Results, path: str) -> None:
     tip.set_ylabel("tip in mm")
     loop.set_xlabel("beam at the ring in mm")
     loop.set_ylabel("friction force in N")
-    tip.legend(loc="lower left")
+    figure.legend(*tip.get_legend_handles_labels(), loc="outside upper center", ncols=2)
     figure.savefig(path, dpi=120)
 
 
