@@ -132,7 +132,7 @@ class FullBeam:
     ) -> FullRun:
         """Pull at ``load_at`` until ``measured_at`` deflects by ``displacement`` [m], let go, integrate.
 
-        Without these three the beam starts straight and at rest; friction sets in where it starts.
+        Without these three the beam starts straight and at rest; friction carries what a slow pull leaves in it.
         damping: C [N s/m], (n, n), in the coordinates of ``structure``; it acts on deflections and rotations alone.
         loads: set in at t = 0, not before; their rows are in the coordinates of ``structure`` too. A numerical failure
         is a status of the result; MultiPhiValueError is for the arguments only.

@@ -4,15 +4,17 @@
 
 w is the deflection of the point, less that of the other one, v the speed of the counter-surface, s the place where the
 bristle stands, q - T / k at any time. ObjectConnectorCoordinateSpringDamperExt says the same of its bristle if its data
-node [T where it slips else 0, s, limit stop] begins with [0, q, 0]: stuck, unstretched where the run starts. Its static
-limit ends with the speed; here it ends where slip begins. Where both are the same, stick that sets in at the limit is
-at once beyond it by round-off, and slip then goes by the sign of a speed that is round-off too: at some turns the force
-jumps to the other side, and a run is 5 to 16 % off, at fine steps as at coarse ones. A hair between the limits ends
-that.
+node [T where it slips else 0, s, limit stop] begins with [0, q - T / k, 0]: stuck, T = 0 where the beam is straight.
+Its static limit ends with the speed; here it ends where slip begins.
+
+Where both limits are the same, stick that sets in at the limit is at once beyond it by round-off, and slip then goes by
+the sign of a speed that is round-off too: at some turns the force jumps to the other side, and a run is 4 to 16 % off,
+at fine steps as at coarse ones. A hair between the limits ends that.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -56,6 +58,11 @@ class PointFriction:
         state, place = data.T
         return np.where(state == 0, self.stiffness * (travel - place), state)
 
+    def slow_force(self, travel: float) -> float:
+        """T [N] after a slow way q [m] from zero."""
+        sticking = self.stiffness * travel
+        return sticking if abs(sticking) <= self.static_limit else math.copysign(self.limit, travel)
+
 
 @dataclass(frozen=True)
 class FrictionConnector:
@@ -65,17 +72,20 @@ class FrictionConnector:
     item: Any
     data: tuple[int, int]
 
-    def take_off(self, mbs: Any) -> None:
-        """Let a static solution be without it: that has no velocities, by which Exudyn tells which way slip goes."""
-        mbs.SetObjectParameter(self.item, "activeConnector", False)
+    def pull_slowly(self, mbs: Any) -> None:
+        """Take what follows as slow: a static solution has no velocities, by which Exudyn tells which way slip goes."""
+        mbs.SetObjectParameter(self.item, "springForceUserFunction", self._slow_force)
 
-    def put_on(self, mbs: Any) -> None:
-        """End of that, in the solution: its bristle sticks in the initial state, unstretched."""
+    def let_go(self, mbs: Any) -> None:
+        """End of that, in the solution: the bristle sticks in the initial state, under the force it carries."""
         travel = mbs.GetObjectOutput(self.item, exu.OutputVariableType.Displacement)
-        mbs.SetObjectParameter(self.item, "activeConnector", True)
+        mbs.SetObjectParameter(self.item, "springForceUserFunction", 0)
         data = mbs.systemData.GetDataCoordinates()
-        data[list(self.data)] = 0.0, travel
+        data[list(self.data)] = 0.0, travel - self.friction.slow_force(travel) / self.friction.stiffness
         mbs.systemData.SetDataCoordinates(data, exu.ConfigurationType.Initial)
+
+    def _slow_force(self, mbs: Any, t: float, item: int, u: float, *parameters: float) -> float:
+        return self.friction.slow_force(u)
 
 
 def point_frictions(beams: Beams, frictions: Sequence[Friction]) -> tuple[PointFriction, ...]:
