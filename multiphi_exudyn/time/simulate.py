@@ -30,7 +30,7 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Run", "levels_of", "motion_of", "simulate"]
+__all__ = ["Run", "check_going_on", "levels_of", "motion_of", "simulate"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -67,7 +67,7 @@ def simulate(
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     run = Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start)
     if start is not None:
-        _check_going_on(run)
+        check_going_on(run)
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
@@ -77,7 +77,10 @@ def simulate(
 
 @dataclass(frozen=True)
 class Run:
-    """What ``simulate`` is asked for, there is more about it there; t_end [s]."""
+    """What ``simulate`` is asked for, there is more about it there; t_end [s].
+
+    rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
+    """
 
     model: MultiPhiModel
     t_end: float
@@ -86,6 +89,7 @@ class Run:
     loads: Sequence[Load] = ()
     compiled: bool | None = None
     start: Trajectory | None = None
+    rewound: bool = False
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -104,8 +108,9 @@ class Run:
         excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        levels = levels_of(self.model, excitation, self.start.t_end if self.start else 0.0, self.t_end)
-        start = _start(self, excitation) if self.start is None else going_on(self.start, levels)
+        begins = self.start.t_end if self.start and not self.rewound else 0.0
+        levels = levels_of(self.model, excitation, begins, self.t_end)
+        start = _start(self, excitation) if self.start is None else going_on(self.start, levels, self.rewound)
         return motion_of(levels, start, self.compiled)
 
     def _decided(self) -> Trajectory:
@@ -184,7 +189,7 @@ def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) ->
     return states
 
 
-def _check_going_on(run: Run) -> None:
+def check_going_on(run: Run) -> None:
     """Refuse a trajectory from whose end this run cannot go on."""
     start = run.start
     if not isinstance(start, Trajectory):
@@ -195,7 +200,7 @@ def _check_going_on(run: Run) -> None:
         raise MultiPhiValueError("start: got a trajectory of another model, need one of the same object")
     if start.status != "ok":
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
-    if not run.t_end > start.t_end:
+    if not run.rewound and not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
 
 
