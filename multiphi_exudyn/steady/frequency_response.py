@@ -14,6 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
@@ -65,18 +66,18 @@ def frequency_response(
     other_loads: Sequence[StaticLoad] = (),
     periods: int = 400,
     tolerance: float = 1e-6,
-    start: Trajectory | None = None,
+    start: Trajectory | Equilibrium | None = None,
 ) -> FrequencyResponse:
     """Steady states at ``frequencies`` [Hz] in the order given, each from the one before, places held included.
 
-    The first from x, x' (n,), or from where the trajectory ``start`` has ended.
+    The first from x, x' (n,), or from ``start``, as ``simulate`` has it.
 
     load: whose frequency is replaced. The other arguments: see ``steady_state``. A frequency at which the run fails
     is a state with that status; the next one starts where the failed one did. Issues a MultiPhiWarning for each kind of
     warning that states have, not one for each state.
     """
     states = list[SteadyState]()
-    begin = displacement, velocity, start
+    begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None] = displacement, velocity, start
     with kept_back():
         for hz in _frequencies(frequencies):
             state = settled(model, at_frequency(load, hz), begin, other_loads, periods, tolerance)

@@ -53,10 +53,6 @@ class PeriodMap:
         """From the end of a run, at the beginning of a period, over some periods."""
         return Run(self.model, periods * self.period, loads=self.loads, start=start, rewound=True).trajectory()
 
-    def first(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
-        """From x, x' (n,) over some periods."""
-        return Run(self.model, periods * self.period, x, v, self.loads).trajectory()
-
     def states(self, trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
         """(s y, y', T / sqrt(k)) (2 m + e, k) at times (k,) [s], T of the e springs with held places."""
         base = self.model.base

@@ -25,13 +25,14 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.steady.shooting import PeriodMap, Shooting
 from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.simulate import Run, check_going_on
+from multiphi_exudyn.time.simulate import Run, started
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
@@ -58,7 +59,8 @@ class SteadyState:
     residual: by how much states ``order`` periods apart differ, relative to the size of the motion, both in
     sqrt(energy); where it is not periodic the smallest over all orders.
     multiplier: the largest modulus by which a small disturbance grows in a period of the load; NaN where the run
-    settled by itself. Links that never slip have no part in it (shooting.py). periods: of the load run one after the other.
+    settled by itself. Links that never slip have no part in it (shooting.py). periods: of the load run one after
+    the other.
     trajectory: one period of the response, or the last CHUNK periods of the load where it is not periodic; a failed
     run ends early. displacement, velocity: (n,), at the end of the run: another one can go on from there.
     warnings: what to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
@@ -106,14 +108,15 @@ def steady_state(
     other_loads: Sequence[StaticLoad] = (),
     periods: int = 400,
     tolerance: float = 1e-6,
-    start: Trajectory | None = None,
+    start: Trajectory | Equilibrium | None = None,
 ) -> SteadyState:
-    """The response that a run from x, x' (n,) at t = 0 settles to, or from where the trajectory ``start`` has ended.
+    """The response that a run from x, x' (n,) at t = 0 settles to, or from ``start``, as ``simulate`` has it.
 
     load: HarmonicLoad, or BaseMotion with a Harmonic course. other_loads: constant ones. periods: of the load, after
     which a run that has not settled ends. tolerance: relative to the size of the motion, to which states repeat.
     A response that attracts slowly is found by Newton's method from where the run is; which response, where several
-    attract, follows from the start: places that friction holds are part of it, and only ``start`` hands them on. Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
+    attract, follows from the start: places that friction holds are part of it, and only ``start`` hands them on.
+    Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
     has to be decided, by a run of ``simulate``.
     """
     with kept_back():
@@ -125,18 +128,17 @@ def steady_state(
 def settled(
     model: MultiPhiModel,
     load: PeriodicLoad,
-    begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | None],
+    begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None],
     other_loads: Sequence[StaticLoad],
     periods: int,
     tolerance: float,
 ) -> SteadyState:
-    """What ``steady_state`` gives, without its MultiPhiWarning; begin: x, x' (n,) and a trajectory, as there."""
+    """What ``steady_state`` gives, without its MultiPhiWarning; begin: x, x' (n,) and its ``start``."""
     _check(model, load, other_loads, periods, tolerance)
-    model, (displacement, velocity, start) = model.decided or model, begin
-    if start is not None:
-        check_going_on(Run(model, 1.0, displacement, velocity, start=start, rewound=True))
-    search = _Search(PeriodMap(model, (load, *other_loads), 1.0 / frequency(load)), load, tolerance)
-    return search.settle(search.first(displacement, velocity) if start is None else search.run(start, CHUNK), periods)
+    model, (displacement, velocity, start), loads = model.decided or model, begin, (load, *other_loads)
+    period = 1.0 / frequency(load)
+    run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
+    return _Search(PeriodMap(model, loads, period), load, tolerance).settle(_warned(run.trajectory()), periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
@@ -203,10 +205,6 @@ class _Search:
                 return self._lost(chunk, done)
             start, multiplier = self._shot(chunk)
             trajectory = self.run(start, CHUNK)
-
-    def first(self, displacement: np.ndarray | None, velocity: np.ndarray | None) -> Trajectory:
-        """The first chunk, from x, x' (n,)."""
-        return _warned(self.map.first(displacement, velocity, CHUNK))
 
     def run(self, start: Trajectory, periods: int) -> Trajectory:
         """Periods from the end of a run on."""

@@ -5,8 +5,8 @@
 The level is the same, with x_inf, R, Y under the loads before and x_inf,n, R_n, Y_n under those that follow, with their
 channels w_n; what links hold and the phases of all exits stay. Under the same loads nothing changes but round-off.
 
-Where time begins anew, for loads that repeat, so do the courses of counter-surfaces: places on those stay where they are
-in space.
+Where time begins anew, for loads that repeat, so do the courses of counter-surfaces: places on those stay where they
+are in space.
 """
 
 from __future__ import annotations

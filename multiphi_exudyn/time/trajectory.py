@@ -34,7 +34,8 @@ INSTANTS = 1001  # at which a nudged run is compared, beside the events
 class Start:
     """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 
-    gaps: (c,) [m] of all contacts at y = 0, as stops that have moved leave them.
+    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
+    held places, leave them.
     states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
     time [s], state: when the run begins, and of one that goes on from another what that has come to.
     """
