@@ -123,14 +123,6 @@ class MultiPhiModel:
         """Whether there are elements that are no contacts: with other states than open and closed."""
         return any(not isinstance(contact, (UnilateralContact, LawSpring)) for contact in self.contacts)
 
-    def need_contacts(self, what: str) -> None:
-        """Refuse other elements where they are not provided for."""
-        others = [c.name for c in self.contacts if not isinstance(c, (UnilateralContact, LawSpring))]
-        if others:
-            raise MultiPhiValueError(
-                f"{what}: got the elements {', '.join(others)}, need contacts and force laws alone"
-            )
-
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
         """Positions of the elements whose link has a held place, one channel each."""

@@ -31,7 +31,7 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Run", "levels_of", "motion_of", "simulate"]
+__all__ = ["Run", "levels_of", "motion_of", "simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -68,11 +68,7 @@ def simulate(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
-    run = Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start)
-    if start is not None:
-        _check_start(run)
-    if isinstance(start, Equilibrium):
-        run = replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
+    run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
@@ -82,7 +78,10 @@ def simulate(
 
 @dataclass(frozen=True)
 class Run:
-    """What ``simulate`` is asked for, there is more about it there; t_end [s]."""
+    """What ``simulate`` is asked for, there is more about it there; t_end [s].
+
+    rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
+    """
 
     model: MultiPhiModel
     t_end: float
@@ -92,6 +91,7 @@ class Run:
     compiled: bool | None = None
     start: Trajectory | Equilibrium | None = None
     stretches: Mapping[str, float] | None = None
+    rewound: bool = False
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -111,8 +111,8 @@ class Run:
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before = self.start if isinstance(self.start, Trajectory) else None
-        levels = levels_of(self.model, excitation, before.t_end if before else 0.0, self.t_end)
-        start = _start(self, excitation) if before is None else going_on(before, levels)
+        levels = levels_of(self.model, excitation, before.t_end if before and not self.rewound else 0.0, self.t_end)
+        start = _start(self, excitation) if before is None else going_on(before, levels, self.rewound)
         return motion_of(levels, start, self.compiled)
 
     def _decided(self) -> Trajectory:
@@ -195,6 +195,16 @@ def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) ->
     return states
 
 
+def started(run: Run) -> Run:
+    """The run with its start looked into: an equilibrium is its displacement and its stretches."""
+    start = run.start
+    if start is not None:
+        _check_start(run)
+    if isinstance(start, Equilibrium):
+        return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
+    return run
+
+
 def _check_start(run: Run) -> None:
     """Refuse a trajectory from whose end this run cannot go on, and an equilibrium of another model."""
     start = run.start
@@ -214,7 +224,7 @@ def _check_start(run: Run) -> None:
         raise MultiPhiValueError("start: got a trajectory of another model, need one of the same object")
     if start.status != "ok":
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
-    if not run.t_end > start.t_end:
+    if not run.rewound and not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
 
 
