@@ -27,7 +27,9 @@ from multiphi_exudyn.mechanics.section import Section
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.point_contact import PointContact
+from reference_models.point_friction import FrictionConnector, PointFriction, add_friction, connector_of
 from reference_models.point_law import PointLaw
+from reference_models.rubbing import Rub
 
 __all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "bending_coordinates", "build_beam_system"]
 
@@ -69,7 +71,8 @@ class BeamSystem:
     container owns mbs and must live as long. nodes of all beams, one beam after the other, and first_coordinates
     (index of each node's first ODE2 coordinate). points: name -> number of its node. load: a LoadCoordinate along +z,
     zero, or None. driver: an ObjectGenericODE2 on all nodes whose forceVector is zero, or None. stops: of the
-    contacts, by name.
+    contacts, by name. frictions: their connectors. rubs: of contacts with
+    friction.
     """
 
     container: Any
@@ -80,6 +83,8 @@ class BeamSystem:
     load: Any
     driver: Any
     stops: Mapping[str, Stop]
+    frictions: tuple[FrictionConnector, ...]
+    rubs: tuple[Rub, ...]
 
     def coordinate(self, point: str, component: int = DEFLECTION) -> int:
         """Index of a coordinate of the node at a point among the system's ODE2 coordinates."""
@@ -94,6 +99,7 @@ def build_beam_system(
     load_at: str | None = None,
     laws: Sequence[PointLaw] = (),
     driven: bool = False,
+    frictions: Sequence[PointFriction] = (),
 ) -> BeamSystem:
     """Build and assemble; damping: (n_full, n_full) on all coordinates; load_at: point of a load.
 
@@ -111,6 +117,10 @@ def build_beam_system(
         _add_contact(mbs, stops[contact.name], settings, ground, places)
     for law in laws:
         _add_law(mbs, law, ground, places[law.point].node)
+    rubs = [Rub(contact, contact.tangent, stops[contact.name]) for contact in contacts if contact.tangent]
+    for rub in rubs:
+        _add_rub(mbs, rub, ground, places)
+    connectors = [_add_friction(mbs, friction, ground, places) for friction in frictions]
     nodes = tuple(node for beam in laid.values() for node in beam.nodes)
     if damping is not None:
         mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes), dampingMatrix=damping))
@@ -121,7 +131,11 @@ def build_beam_system(
     mbs.Assemble()
     first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
     points = {point: nodes.index(place.node) for point, place in places.items()}
-    return BeamSystem(container, mbs, nodes, first, points, load, driver, stops)
+    placed = tuple(connector_of(mbs, *given) for given in zip(frictions, connectors, strict=True))
+    system = BeamSystem(container, mbs, nodes, first, points, load, driver, stops, placed, tuple(rubs))
+    for rub in rubs:
+        rub.place(system.coordinate)
+    return system
 
 
 def bending_coordinates(kind: str, count: int) -> np.ndarray:
@@ -277,6 +291,19 @@ def _add_law(mbs: Any, law: PointLaw, ground: Any, node: Any) -> None:
 
     markers = [ground, _marker(mbs, node, DEFLECTION)]
     mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=force))
+
+
+def _add_rub(mbs: Any, rub: Rub, ground: Any, places: Mapping[str, _Place]) -> None:
+    """A spring on the tangential deflection whose user function is the contact's friction."""
+    tangent = rub.tangent
+    other = ground if tangent.other is None else _marker(mbs, places[tangent.other].node, DEFLECTION)
+    markers = [other, _marker(mbs, places[tangent.point].node, DEFLECTION)]
+    mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=rub.force))
+
+
+def _add_friction(mbs: Any, friction: PointFriction, ground: Any, places: Mapping[str, _Place]) -> Any:
+    other = ground if friction.other is None else _marker(mbs, places[friction.other].node, DEFLECTION)
+    return add_friction(mbs, friction, ground, _marker(mbs, places[friction.point].node, DEFLECTION), other)
 
 
 def _add_circle_contact(mbs: Any, contact: PointContact, radius: float, x: float, elements: list[Any]) -> None:

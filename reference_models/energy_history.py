@@ -1,9 +1,10 @@
 """Energy of a full beam after its run, from the states that were kept.
 
-E = T + V + sum 1/2 k_i min(0, g_i)^2 + sum integral F_j dq_j,   W_d(t) = integral of v.C v
+E = T + V + sum 1/2 k_i min(0, g_i)^2 + sum integral F_j dq_j + sum T_e^2 / (2 k_e),   W_d(t) = integral of v.C v
 
 Loads and stops that move do the work   W(t) = sum integral u_j d(p_j.q) + sum integral lambda_i dz_i,   a viscous
-contact dissipates   integral (lambda - k max(0, -g)) d(-g).   From step to step they are sums of mean force times
+contact dissipates   integral (lambda - k max(0, -g)) d(-g),   friction   integral T_e ds_e   on the way s_e of its
+bristle's foot; a counter-surface does   -integral T_e v_e dt.   From step to step they are sums of mean force times
 way, which is what the trapezoidal rule has.
 """
 
@@ -18,10 +19,11 @@ from scipy.integrate import cumulative_trapezoid, quad
 
 from reference_models.actions import Actions
 from reference_models.histories import Histories
+from reference_models.point_friction import PointFriction
 from reference_models.point_law import PointLaw
 from reference_models.recorder import Recorder
 
-__all__ = ["contact_losses", "dissipated_energy", "energy_history", "work_of"]
+__all__ = ["contact_losses", "dissipated_energy", "energy_history", "friction_losses", "work_of"]
 
 
 def energy_history(
@@ -35,20 +37,26 @@ def energy_history(
     kept = np.searchsorted(steps.time, time)
     for contact in steps.contacts:
         energy += contact.energy(steps.gaps[contact.name][kept])
+    for name, stiffness in steps.bristles.items():
+        energy += steps.tensions[name][kept] ** 2 / (2 * stiffness)
     for law in laws:
         deflection = steps.points[law.point]
         energy += _energy_of(law, deflection[0]) + _summed(law.forces(deflection), deflection)[kept]
     return time, energy
 
 
-def work_of(actions: Actions, recorder: Recorder, steps: Histories, time: np.ndarray) -> np.ndarray:
-    """Work (j,) [J] of loads and moving stops by the times (j,), which are among the steps'."""
+def work_of(
+    actions: Actions, recorder: Recorder, frictions: Sequence[PointFriction], steps: Histories, time: np.ndarray
+) -> np.ndarray:
+    """Work (j,) [J] of loads, moving stops and counter-surfaces by the times (j,), which are among the steps'."""
     total = np.zeros(len(steps.time))
     moved = np.array(recorder.projections).reshape(len(recorder.times), len(actions.courses))[: len(total)]
     for value, way in zip(actions.values(steps.time).T, moved.T, strict=True):
         total += _summed(value, way)
     for name, way in actions.ways.items():
         total += _summed(steps.forces[name], way.at(steps.time))
+    for friction in frictions:
+        total -= _summed(steps.tensions[friction.name], friction.velocity * steps.time)
     return total[np.searchsorted(steps.time, time)]
 
 
@@ -59,6 +67,14 @@ def contact_losses(steps: Histories, time: np.ndarray) -> np.ndarray:
         if contact.damping:
             gap = steps.gaps[contact.name]
             total -= _summed(steps.forces[contact.name] - contact.force(gap), gap)
+    return total[np.searchsorted(steps.time, time)]
+
+
+def friction_losses(steps: Histories, time: np.ndarray) -> np.ndarray:
+    """Energy (j,) [J] that friction has dissipated by the times (j,), which are among the steps'."""
+    total = np.zeros(len(steps.time))
+    for name, tension in steps.tensions.items():
+        total += _summed(tension, steps.slips[name])
     return total[np.searchsorted(steps.time, time)]
 
 

@@ -1,9 +1,10 @@
 """The full nonlinear model: Exudyn beams with contact elements, from the beams' description.
 
-    M q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq - sum F_j d(q_j)/dq + f(t),   lambda_i = k_i max(0, -g_i)
+    M q'' + C_q q' + Q(q) = sum lambda_i d(g_i)/dq - sum F_j d(q_j)/dq - sum T_e d(q_e)/dq + f(t)
+    lambda_i = k_i max(0, -g_i),   |T_e| <= limit
 
-Large displacements, penalty contacts, local force laws F_j, loads and moving supports (actions.py), implicit time
-integration. A reduced model of the same scene takes
+Large displacements, penalty contacts, local force laws F_j, friction T_e, loads and moving supports (actions.py),
+implicit time integration. A reduced model of the same scene takes
 its (M, C, K) from ``structure``, so that the two differ in nothing but the reduction, the geometric
 nonlinearity and the time integration.
 """
@@ -24,18 +25,26 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from reference_models.actions import Actions, actions_of
 from reference_models.beam_system import DEFLECTION, BeamSystem, bending_coordinates, build_beam_system
 from reference_models.beams import Beams, as_beams
 from reference_models.drive import Drive
-from reference_models.energy_history import contact_losses, dissipated_energy, energy_history, work_of
+from reference_models.energy_history import (
+    contact_losses,
+    dissipated_energy,
+    energy_history,
+    friction_losses,
+    work_of,
+)
 from reference_models.exudyn_quiet import quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance, FullRun, closed_intervals
 from reference_models.histories import Histories, watched
 from reference_models.integration import Integration, integrate
 from reference_models.point_contact import point_contacts
+from reference_models.point_friction import point_frictions
 from reference_models.point_law import Law, point_laws
 from reference_models.recorder import Recorder
 from reference_models.solver_settings import simulation_settings
@@ -49,10 +58,11 @@ WHOLE_STEP = 1e-6  # of a step: how far the last sample of a grid may lie beyond
 
 
 class FullBeam:
-    """A beam, or beams side by side, and their contacts as an Exudyn model.
+    """A beam, or beams side by side, their contacts and friction as an Exudyn model.
 
     contacts: each on one point, or between two, with a finite stiffness; the force of a viscous one, and every force
     law, is a Python function that Exudyn calls several times a step (2 to 3 us a step more).
+    frictions: each on one point, or between two, with a finite stiffness.
     settings: elements are those of each beam. structure: all of it without contacts and laws, linearised where it is
     straight; its points are beams.points.
     """
@@ -63,13 +73,16 @@ class FullBeam:
         contacts: Sequence[UnilateralContact],
         settings: FullBeamSettings = DEFAULT_SETTINGS,
         force_laws: Sequence[Law] = (),
+        frictions: Sequence[Friction] = (),
     ) -> None:
         self.beams = as_beams(beam)
         self.contacts = point_contacts(self.beams, contacts)
         self.laws = point_laws(self.beams, force_laws)
+        self.frictions = point_frictions(self.beams, frictions)
         self.settings = settings
         self._check_round({contact.name for contact in self.contacts if contact.damping}, "no damping")
         self._check_round({contact.name for contact in self.contacts if contact.other}, "one point")
+        self._check_round({contact.name for contact in self.contacts if contact.tangent}, "no friction")
         started = time.perf_counter()
         with quiet():
             self.structure = _linearized(self.beams, settings)
@@ -119,10 +132,10 @@ class FullBeam:
     ) -> FullRun:
         """Pull at ``load_at`` until ``measured_at`` deflects by ``displacement`` [m], let go, integrate.
 
-        Without these three the beam starts straight and at rest. damping: C [N s/m], (n, n), in the coordinates of
-        ``structure``; it acts on deflections and rotations alone. loads: set in at t = 0, not before; their rows are in
-        the coordinates of ``structure`` too. A numerical failure is a status of the result; MultiPhiValueError is for
-        the arguments only.
+        Without these three the beam starts straight and at rest; friction carries what a slow pull leaves in it.
+        damping: C [N s/m], (n, n), in the coordinates of ``structure``; it acts on deflections and rotations alone.
+        loads: set in at t = 0, not before; their rows are in the coordinates of ``structure`` too. A numerical failure
+        is a status of the result; MultiPhiValueError is for the arguments only.
         """
         if not (math.isfinite(t_end) and t_end > 0):
             raise MultiPhiValueError(f"t_end: got {t_end!r}, need a finite time > 0")
@@ -134,7 +147,9 @@ class FullBeam:
             started = time.perf_counter()
             load = None if start is None else start.load_at
             driven = bool(actions.courses)
-            system = build_beam_system(self.beams, self.settings, self.contacts, matrix, load, self.laws, driven)
+            system = build_beam_system(
+                self.beams, self.settings, self.contacts, matrix, load, self.laws, driven, self.frictions
+            )
             solver = simulation_settings(self.settings, t_end)
             try:
                 force = 0.0 if start is None else self._start_force(start, system, solver)
@@ -198,12 +213,15 @@ class FullBeam:
         force: float,
         offline_s: float,
     ) -> FullRun:
-        steps = Histories.recorded(recorder, tuple(self.beams.points), self.contacts, self.settings, actions.ways)
+        names = tuple(self.beams.points)
+        steps = Histories.recorded(recorder, names, self.contacts, self.settings, actions.ways, self.frictions)
         grid = steps.at(_grid(steps.time[-1], self.settings))
         energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
         lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
-        work = None if actions.none else work_of(actions, recorder, steps, energy_time)
-        balance = EnergyBalance.of(energy_time, energy, lost, work)
+        moved = not actions.none or any(friction.velocity for friction in self.frictions)
+        work = work_of(actions, recorder, self.frictions, steps, energy_time) if moved else None
+        rubbed = friction_losses(steps, energy_time)
+        balance = EnergyBalance.of(energy_time, energy, lost, work, rubbed)
         failure = _failure(integration, recorder, steps, balance)
         return FullRun(
             status="failed" if failure else "ok",
@@ -214,6 +232,8 @@ class FullBeam:
             contact_force=grid.forces,
             gaps=grid.gaps,
             contact_intervals={name: closed_intervals(steps.time, gap) for name, gap in steps.gaps.items()},
+            friction_force=grid.tensions,
+            slip=grid.slips,
             energy_time=energy_time,
             energy=energy,
             balance=balance,
@@ -228,6 +248,8 @@ class FullBeam:
     def _not_started(self, message: str, offline_s: float) -> FullRun:
         none = np.empty(0)
         contacts = {contact.name: none for contact in self.contacts}
+        rubbing = [contact.name for contact in self.contacts if contact.tangent is not None]
+        frictions = dict.fromkeys([*(friction.name for friction in self.frictions), *rubbing], none)
         return FullRun(
             status="failed",
             message=message,
@@ -237,6 +259,8 @@ class FullBeam:
             contact_force=contacts,
             gaps=contacts,
             contact_intervals=dict.fromkeys(contacts, ()),
+            friction_force=frictions,
+            slip=frictions,
             energy_time=none,
             energy=none,
             balance=None,

@@ -19,9 +19,9 @@ class EnergyBalance:
     """Energy of a run [J].
 
     dissipated: by the damping matrix, the integral of v.C v, sampled at output_step, and by viscous contacts.
-    work: of loads and of supports that move.
+    friction: what friction has dissipated. work: of loads, and of supports and counter-surfaces that move.
     scale: the initial energy; where something acts, the largest one of the run.
-    worst_gain: largest rise of energy + dissipated - work above an earlier value of it, relative to scale.
+    worst_gain: largest rise of energy + dissipated + friction - work above an earlier value of it, relative to scale.
     worst_gain_at: when that was [s]; gain_at: when the gain first exceeded ENERGY_GAIN, or None.
     """
 
@@ -33,17 +33,24 @@ class EnergyBalance:
     gain_at: float | None
     work: float
     scale: float
+    friction: float = 0.0
 
     @classmethod
     def of(
-        cls, time: np.ndarray, energy: np.ndarray, dissipated: np.ndarray, work: np.ndarray | None = None
+        cls,
+        time: np.ndarray,
+        energy: np.ndarray,
+        dissipated: np.ndarray,
+        work: np.ndarray | None = None,
+        rubbed: np.ndarray | None = None,
     ) -> EnergyBalance:
         """The balance of energies (k,) [J] at times (k,) [s] with what had been dissipated and done by then.
 
-        work: None where nothing acts.
+        work: None where nothing acts. rubbed: by friction.
         """
         done = np.zeros(len(energy)) if work is None else work
-        balance = energy + dissipated - done
+        lost = np.zeros(len(energy)) if rubbed is None else rubbed
+        balance = energy + dissipated + lost - done
         scale = energy[0] if work is None else float(np.max(energy)) or 1.0  # nothing has moved: nothing is gained
         with np.errstate(over="ignore", invalid="ignore"):  # a run that has blown up
             gain = (balance - np.minimum.accumulate(balance)) / scale
@@ -58,6 +65,7 @@ class EnergyBalance:
             gain_at=float(time[beyond[0]]) if len(beyond) else None,
             work=float(done[-1]),
             scale=float(scale),
+            friction=float(lost[-1]),
         )
 
 
@@ -69,6 +77,7 @@ class FullRun:
     time (k,) [s]; points: name -> deflection (k,) [m]; gaps: contact -> g (k,) [m], open where > 0;
     contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> ((t_close, t_open), ...) [s],
     from the gaps of all steps, crossings interpolated linearly.
+    friction_force: friction -> T (k,) [N]; slip: friction -> way (k,) [m] of its patch on the counter-surface.
     energy_time (j,) [s], energy (j,) [J]: kinetic, strain and contact springs; balance: its summary.
     start_force [N], zero for a start at rest where it is straight; steps: accepted time steps; dofs: free coordinates.
     offline_s: building and static start; online_s: the dynamic solver alone, wall clock [s].
@@ -82,6 +91,8 @@ class FullRun:
     contact_force: Mapping[str, np.ndarray]
     gaps: Mapping[str, np.ndarray]
     contact_intervals: Mapping[str, tuple[tuple[float, float], ...]]
+    friction_force: Mapping[str, np.ndarray]
+    slip: Mapping[str, np.ndarray]
     energy_time: np.ndarray
     energy: np.ndarray
     balance: EnergyBalance | None

@@ -19,12 +19,32 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structure import At
 from reference_models.beams import Beams
 
-__all__ = ["PointContact", "point_and_coefficient", "point_contacts"]
+__all__ = ["PointContact", "Tangent", "point_and_coefficient", "point_and_other", "point_contacts"]
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Where and how a contact rubs: y = c u of a point, less that of another, mu, mu_s >= mu, stiffness k_t [N/m]."""
+
+    point: str
+    coefficient: float
+    friction: float
+    static_friction: float
+    stiffness: float
+    other: str | None = None
+
+    def travel(self, of_points: Mapping[str, np.ndarray]) -> np.ndarray:
+        """y (s,) [m] of deflections of points by name, (s,) each."""
+        own = of_points[self.point]
+        return self.coefficient * (own if self.other is None else own - of_points[self.other])
 
 
 @dataclass(frozen=True)
 class PointContact:
-    """name; point; c; gap [m], k [N/m], damping d [N s/m] of the contact as given; other: point it meets, or None."""
+    """name; point; c; gap [m], k [N/m], damping d [N s/m] of the contact as given; other: point it meets, or None.
+
+    tangent: of a contact with friction, else None.
+    """
 
     name: str
     point: str
@@ -33,6 +53,7 @@ class PointContact:
     stiffness: float
     damping: float = 0.0
     other: str | None = None
+    tangent: Tangent | None = None
 
     @property
     def direction(self) -> dict[str, float]:
@@ -93,13 +114,13 @@ def _point_contact(beams: Beams, contact: UnilateralContact) -> PointContact:
     if contact.rigid:
         raise MultiPhiValueError(f"contact {contact.name!r} stiffness: got inf, need a finite one (a penalty spring)")
     what = f"contact {contact.name!r} direction"
-    point, coefficient, other = _pair(what, contact.direction)
+    point, coefficient, other = point_and_other(what, contact.direction)
     for name in (point,) if other is None else (point, other):
         beams.check_point(what, name)
     return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping, other)
 
 
-def _pair(what: str, direction: At) -> tuple[str, float, str | None]:
+def point_and_other(what: str, direction: At) -> tuple[str, float, str | None]:
     """Point and coefficient of a direction, and the point of the opposite coefficient, if it has two."""
     if not isinstance(direction, Mapping) or len(direction) != 2:
         return *point_and_coefficient(what, direction), None

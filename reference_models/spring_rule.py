@@ -134,7 +134,7 @@ class SpringRule:
 
     def _moved(self, state: State, changing: set[int]) -> State:
         """The state in the level in which these contacts have changed (eq. 38.6)."""
-        level = self.level(changing.symmetric_difference(state.closed))
+        level = self.level(changing.symmetric_difference(state.level.level.indices))
         move = self._way(state.level, level)
         displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
         return replace(state, level=level, displacement=displacement, velocity=velocity)

@@ -1,7 +1,8 @@
 """Static start: the force along z at one point under which another deflects as far as asked.
 
 The force is found by the secant method on the nonlinear static solution, contacts included, from the
-linear contact-free guess; the solution becomes the system's initial state and the force is taken off.
+linear contact-free guess; the solution becomes the system's initial state and the force is taken off. The force has
+grown slowly, and friction carries what that leaves in its bristle.
 """
 
 from __future__ import annotations
@@ -36,7 +37,11 @@ def static_start(
         system.mbs.systemData.SetSystemState(straight, initial)
         return _deflection(system, coordinate, force, simulation_settings) - deflection
 
+    for connector in system.frictions:
+        connector.pull_slowly(system.mbs)
     force = _secant(miss, guess, -deflection, DEFLECTION_TOLERANCE * abs(deflection))
+    for connector in system.frictions:
+        connector.let_go(system.mbs)
     system.mbs.SetLoadParameter(system.load, "load", 0.0)
     return force
 

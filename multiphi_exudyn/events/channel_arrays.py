@@ -67,10 +67,10 @@ class ChannelArrays:
         return self._excitation.drive(float(self._pieces.starts[piece]))
 
     def at(self, buffers: Buffers, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Set the channels to a time [s]: w, w' (q,) there."""
+        """Set the channels to a time [s]: w, w' (q,) there of those that are functions of time."""
         piece = max(int(np.searchsorted(self._pieces.starts, time, side="right")) - 1, 0)
         self.set(buffers, piece, time - float(self._pieces.starts[piece]), time)
-        q, place = int(buffers.ints[a.CHANNELS]), int(buffers.ints[a.DRIVE])
+        q, place = int(buffers.ints[a.PRESCRIBED]), int(buffers.ints[a.DRIVE])
         return buffers.numbers[place : place + q].copy(), buffers.numbers[place + q : place + 2 * q].copy()
 
     def set(self, buffers: Buffers, piece: int, age: float, time: float) -> None:

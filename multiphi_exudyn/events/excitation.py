@@ -120,9 +120,10 @@ class Excitation:
         return found
 
     @classmethod
-    def constant(cls, load: np.ndarray, contacts: int) -> Excitation:
-        """A static load (m,) alone, on a structure with so many contacts."""
-        return cls(load, np.zeros((len(load), 0)), np.zeros((contacts, 0)), (), (), math.inf)
+    def constant(cls, load: np.ndarray, contacts: int, held: Sequence[int] = ()) -> Excitation:
+        """A static load (m,) alone, on a structure with so many contacts, of which some have held places."""
+        stops = np.eye(contacts)[:, list(held)]
+        return cls(load, np.zeros((len(load), len(held))), stops, (), (-1,) * len(held), math.inf)
 
     @functools.cached_property
     def shape(self) -> tuple[bytes | tuple[int, ...], ...]:

@@ -15,7 +15,7 @@ from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
-__all__ = ["after", "entered_row", "exits_of", "signal_row", "signal_rows", "state_of"]
+__all__ = ["after", "entered_row", "exits_of", "signal_row", "signal_rows", "state_of", "way_back"]
 
 
 def state_of(level: LoadedLevel, element: int) -> ElementState:
@@ -59,11 +59,20 @@ def signal_rows(level: LoadedLevel) -> list[Row]:
     return rows
 
 
+def way_back(level: LoadedLevel, element: int, exit_: Exit) -> Exit:
+    """The exit of the state that an exit leads to by which the element would come back."""
+    states = level.level.base.contacts[element].states
+    return _way_back(state_of(level, element), next(state for state in states if state.name == exit_.asked))
+
+
+def _way_back(here: ElementState, there: ElementState) -> Exit:
+    return next((exit_ for exit_ in there.exits if exit_.asked == here.name), there.exits[0])
+
+
 def entered_row(move: Transition, element: int) -> Row:
     """s that an element would have after a transition, as a function of the states of its source."""
-    back = state_of(move.source, element).name
-    exits = state_of(move.target, element).exits
-    there = signal_row(move.target, element, next((e for e in exits if e.asked == back), exits[0]))
+    back = _way_back(state_of(move.source, element), state_of(move.target, element))
+    there = signal_row(move.target, element, back)
     terms = there.position * move.offset
     constant = 0.0 if sign_of(terms, there.constant) == 0 else there.constant + float(np.sum(terms))
     return Row(

@@ -20,6 +20,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.scratch_arrays import ScratchArrays
 from multiphi_exudyn.events.state_arrays import measure
+from multiphi_exudyn.mechanics.element import Exit
 
 __all__ = ["LevelArrays"]
 
@@ -183,7 +184,7 @@ class LevelArrays:
         """Where the level of elements in these states stands in the ints, packed if it was not."""
         key = tuple(states)
         if key not in self._levels:
-            self._add(self.levels.pushed(key) if self.levels.model.general else self.levels.level(np.flatnonzero(key)))
+            self._add(self.levels.level(key))
         record = self._offsets[self._levels[key]]
         if record not in self._tables.levels:
             if self.held is not None:
@@ -225,7 +226,7 @@ class LevelArrays:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
         self.scratch.reserve(n, free, len(exits_of(level)))
-        record = put_level(self.buffers, level, number, self.levels.ends(level.level.indices))
+        record = put_level(self.buffers, level, number, self.levels.ends(level.states))
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
 

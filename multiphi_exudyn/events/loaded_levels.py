@@ -6,7 +6,7 @@ All of it is made when it is asked for, and kept as long as the model's bound al
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -29,12 +29,13 @@ T = TypeVar("T")
 
 @dataclass
 class _Known:
-    """What is kept of a level: its ``ends``, maps to other levels by their closed contacts.
+    """What is kept of a level: ``links`` that hold in it, its ``ends``, maps to other levels by their states.
 
     further: what others make of it, by their keys.
     """
 
     level: LoadedLevel
+    links: tuple[int, ...]
     ends: tuple[int, ...] = ()
     ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
     further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(FURTHER))
@@ -43,7 +44,8 @@ class _Known:
 class LoadedLevels:
     """Levels of ``model`` under an excitation, for motions from ``time`` to ``until`` [s]; drive: at ``time``.
 
-    alone: those under its static loads alone, which outlast a run; these where there are no channels.
+    A level goes by the states of all elements, a number each. alone: those under its static loads alone, with held
+    places for channels, which outlast a run; these where nothing varies.
     arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
     for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py).
     """
@@ -72,7 +74,7 @@ class LoadedLevels:
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray) -> LoadedLevels:
         """Levels under a static ``load`` (m,) in base coordinates alone."""
-        return cls(model, Excitation.constant(load, len(model.links)))
+        return cls(model, Excitation.constant(load, len(model.links), model.held))
 
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""
@@ -95,44 +97,51 @@ class LoadedLevels:
         """The static load (m,)."""
         return self.excitation.static
 
-    def level(self, closed: Iterable[int]) -> LoadedLevel:
-        """The level with these contacts closed, under the loads."""
-        key = tuple(sorted(closed))
-        self.model.level_at(key)  # of the levels that the model keeps it is now the one used last
-        return self._of(key).level
+    def level(self, states: Sequence[int]) -> LoadedLevel:
+        """The level of elements in these states, under the loads and what they push."""
+        known = self._of(tuple(states))
+        self.model.level_at(known.links)  # of the levels that the model keeps it is now the one used last
+        return known.level
 
-    def further(self, closed: tuple[int, ...], key: Hashable, make: Callable[[], T]) -> T:
+    def further(self, states: tuple[int, ...], key: Hashable, make: Callable[[], T]) -> T:
         """What others make of a level, by a key of theirs that says all it depends on; kept with the level."""
-        made: T = self._of(closed).further.get_or_build(key, make)
+        made: T = self._of(states).further.get_or_build(key, make)
         return made
 
-    def forget(self, closed: tuple[int, ...]) -> None:
-        """Let go of what is kept of a level."""
-        self._known.drop(closed)
+    def forget(self, links: tuple[int, ...]) -> None:
+        """Let go of what is kept of the levels in which these links hold."""
+        for states in [states for states, known in self._known.items() if known.links == links]:
+            self._known.drop(states)
 
-    def _of(self, closed: tuple[int, ...]) -> _Known:
-        return self._known.get_or_build(closed, lambda: _Known(self._loaded(closed)))
+    def _of(self, states: tuple[int, ...]) -> _Known:
+        return self._known.get_or_build(states, lambda: self._loaded(states))
 
-    def _loaded(self, closed: tuple[int, ...]) -> LoadedLevel:
-        if self.alone is self:
-            return LoadedLevel.of(self.model.level_at(closed), self.load)
-        return self.alone.level(closed).under(self.excitation)
-
-    def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
-        """The level of elements in these states, under the loads and what they push."""
-        level = LoadedLevel.of(self.model.level_at(self.model.links_held(states)), self.load + self.model.push(states))
-        return replace(level, own_states=states).under(self.excitation)
+    def _loaded(self, states: tuple[int, ...]) -> _Known:
+        if self.alone is not self:
+            return _Known(self.alone.level(states).alone.under(self.excitation), self.model.links_held(states))
+        links = self.model.links_held(states)
+        level = LoadedLevel.of(self.model.level_at(links), self.load + self.model.push(states))
+        level = replace(level, own_states=states)
+        return _Known(level.under(self.excitation) if self.model.general else level, links)
 
     def with_channels(self, state: State) -> State:
         """A state under the static loads alone as one of these levels, at the time at which they set out."""
+        level, r = self.level(state.level.states), state.level.modal.modes
         w, w_t, _ = self.drive.values
-        xi, xi_t = np.concatenate([state.displacement, w]), np.concatenate([state.velocity, w_t])
-        return State(self.level(state.closed), xi, xi_t, state.phases)
+        x, v = state.displacement, state.velocity
+        xi, xi_t = np.concatenate([x[:r], w, x[r:]]), np.concatenate([v[:r], w_t, v[r:]])
+        return State(level, xi, xi_t, state.phases)
 
-    def _close(self, closed: tuple[int, ...], gone: _Known) -> None:
+    def without_channels(self, state: State) -> State:
+        """eta, the held places, and their rates alone, in the level under static loads alone."""
+        r, places = state.level.modal.modes, self.excitation.prescribed
+        x, v = (np.delete(xi, slice(r, r + places)) for xi in (state.displacement, state.velocity))
+        return State(self.alone.level(state.level.states), x, v, state.phases)
+
+    def _close(self, states: tuple[int, ...], gone: _Known) -> None:
         """The ways to a level that is not kept any more."""
         for _, known in self._known.items():
-            known.ways.pop(closed, None)
+            known.ways.pop(states, None)
 
     @property
     def levels_kept(self) -> int:
@@ -141,25 +150,23 @@ class LoadedLevels:
 
     @property
     def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """From and to which closed contacts maps between levels are kept."""
+        """From and to which levels, by their states, maps are kept."""
         return [(source, target) for source, known in self._known.items() for target in known.ways]
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
         """The map between two levels, computed once as long as they are kept."""
-        if self.model.general:  # kept by the arrays of a run alone
-            return Transition(source, target)
-        ways = self._of(source.level.indices).ways
-        if target.level.indices not in ways:
-            ways[target.level.indices] = Transition(source, target)
-        return ways[target.level.indices]
+        ways = self._of(source.states).ways
+        if target.states not in ways:
+            ways[target.states] = Transition(source, target)
+        return ways[target.states]
 
-    def ends(self, closed: tuple[int, ...]) -> tuple[int, ...]:
-        """Contacts that can ask first while all are armed: of a force law the ends of its chains."""
+    def ends(self, states: tuple[int, ...]) -> tuple[int, ...]:
+        """Elements that can ask first while all are armed: of a force law the ends of its chains."""
         if not self.model.chains:
             return self._all
-        known = self._of(closed)
+        known = self._of(states)
         if not known.ends:
-            chains, held = self.model.chains, set(closed)
+            chains, held = self.model.chains, set(known.links)
             linked = {i for chain in chains for i in chain}
             found = {i for i in self._all if i not in linked}
             for chain in chains:

@@ -26,7 +26,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class State:
-    """level, modal displacement and velocity (r,), phase of every contact (c,)."""
+    """level, displacement xi and velocity xi' (r + q,), phase of every exit."""
 
     level: LoadedLevel
     displacement: np.ndarray
@@ -34,15 +34,14 @@ class State:
     phases: tuple[Phase, ...]
 
     @property
-    def closed(self) -> tuple[int, ...]:
-        """Positions of the closed contacts."""
-        return self.level.level.indices
+    def states(self) -> tuple[int, ...]:
+        """The number of every element's state."""
+        return self.level.states
 
     @property
-    def static(self) -> State:
-        """eta, eta' alone, in the level under static loads alone."""
-        r = self.level.modal.modes
-        return State(self.level.alone, self.displacement[:r], self.velocity[:r], self.phases)
+    def held(self) -> np.ndarray:
+        """The places (h,) that links hold [m]."""
+        return self.displacement[self.level.modal.modes + self.level.excitation.prescribed :]
 
     @property
     def kinetic(self) -> float:
@@ -56,7 +55,7 @@ class State:
 
     @functools.cached_property
     def reach(self) -> np.ndarray:
-        """How far (r,) the velocities carry the modes: |eta'| / omega, zero where nothing oscillates."""
+        """How far (r + q,) the velocities carry the modes: |eta'| / omega, zero where nothing oscillates."""
         omega = self.level.level.omega
         return np.divide(np.abs(self.velocity), omega, out=np.zeros(len(omega)), where=omega > 0)
 

@@ -124,14 +124,6 @@ class MultiPhiModel:
         """Whether there are elements with other states than open and closed."""
         return any(not _opens_and_closes(contact) for contact in self.contacts)
 
-    def need_contacts(self, what: str) -> None:
-        """Refuse other elements where they are not provided for."""
-        others = [c.name for c in self.contacts if not _opens_and_closes(c)]
-        if others:
-            raise MultiPhiValueError(
-                f"{what}: got the elements {', '.join(others)}, need contacts and force laws alone"
-            )
-
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
         """Positions of the links that have a held place, one channel each."""

@@ -14,9 +14,11 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
+from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
 __all__ = ["FrequencyResponse", "frequency_response"]
@@ -64,21 +66,24 @@ def frequency_response(
     other_loads: Sequence[StaticLoad] = (),
     periods: int = 400,
     tolerance: float = 1e-6,
+    start: Trajectory | Equilibrium | None = None,
 ) -> FrequencyResponse:
-    """Steady states at ``frequencies`` [Hz] in the order given, each from the one before; the first from x, x' (n,).
+    """Steady states at ``frequencies`` [Hz] in the order given, each from the one before, places held included.
+
+    The first from x, x' (n,), or from ``start``, as ``simulate`` has it.
 
     load: whose frequency is replaced. The other arguments: see ``steady_state``. A frequency at which the run fails
     is a state with that status; the next one starts where the failed one did. Issues a MultiPhiWarning for each kind of
     warning that states have, not one for each state.
     """
     states = list[SteadyState]()
-    x, v = displacement, velocity
+    begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None] = displacement, velocity, start
     with kept_back():
         for hz in _frequencies(frequencies):
-            state = settled(model, at_frequency(load, hz), x, v, other_loads, periods, tolerance)
+            state = settled(model, at_frequency(load, hz), begin, other_loads, periods, tolerance)
             states.append(state)
             if state.status != "failed":
-                x, v = state.displacement, state.velocity
+                begin = None, None, state.trajectory
     response = FrequencyResponse(np.array(frequencies, dtype=float), tuple(states))
     issue(response.warnings)
     return response

@@ -1,13 +1,19 @@
 """Shooting: states that repeat after whole periods, by Newton's method on the map of a period.
 
-P maps q = (s y, y') at the beginning of a period of the loads to q at its end, s = max(omega, 2 pi / T). A state that
-repeats after p periods solves P^p(q) = q:
+P maps a state at the beginning of a period of the loads to the one at its end. A state that repeats after p periods
+solves P^p(z) = z:
 
-    (1 - J) dq = P^p(q) - q,   J = dP^p / dq
+    (1 - J) dz = P^p(z) - z,   J = dP^p / dz,   z = (s eta, eta', u w),   s = max(omega, 2 pi / T),   u = 2 pi / (T |h|)
 
-J by finite differences, in the modes of the level that holds at whole periods. The eigenvalues of J, the multipliers,
-say by what small disturbances grow: the state attracts if they lie inside the unit circle. Between events the map is
-linear, so that few steps suffice. Source: A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, 1995, ch. 3, 5.
+eta, eta' in the level that holds at whole periods, w the places that links hold; J by finite differences. The
+eigenvalues of J, the multipliers, say by what small disturbances grow: the state attracts if they lie inside the unit
+circle. Between events the map is linear, so that few steps suffice.
+
+A link that slips forgets its place: a multiplier is zero. One that never slips keeps it: its multiplier is one, and to
+every such place belongs another state that repeats. Those places are no unknowns: they stay what the path that led here
+has made them, and their multipliers are left out.
+
+Source: A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, 1995, ch. 3, 5.
 """
 
 from __future__ import annotations
@@ -15,13 +21,16 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.events.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.going_on import stops_moved
+from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -40,90 +49,108 @@ class PeriodMap:
     loads: Sequence[Load]
     period: float
 
-    @functools.cached_property
-    def scales(self) -> np.ndarray:
-        """s (m, 1) [rad/s]."""
-        return np.maximum(self.model.base.modes.omega, 2 * math.pi / self.period)[:, None]
+    def run(self, start: Trajectory, periods: int) -> Trajectory:
+        """From the end of a run, at the beginning of a period, over some periods."""
+        return Run(self.model, periods * self.period, loads=self.loads, start=start, rewound=True).trajectory()
 
-    def run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
-        """From x, x' (n,) over some periods."""
-        return Run(self.model, periods * self.period, x, v, self.loads).trajectory()
-
-    def states(self, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """q (2 m, k) of x, x' (n, k)."""
+    def states(self, trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
+        """(s y, y', T / sqrt(k)) (2 m + e, k) at times (k,) [s], T of the e springs with held places."""
         base = self.model.base
-        return np.vstack([self.scales * base.coordinates(x), base.coordinates(v)])
-
-    def configuration(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """x, x' (n,) of q (2 m,)."""
-        m, shapes = len(self.scales), self.model.base.modes.shapes
-        return shapes @ (q[:m] / self.scales[:, 0]), shapes @ q[m:]
-
-    def directions(self, closed: tuple[str, ...]) -> np.ndarray:
-        """Orthonormal directions of q (2 m, 2 r): modes of the level with these contacts closed, at rest and moving."""
-        vectors = self.model.level(closed).vectors
-        nothing = np.zeros_like(vectors)
-        return np.block([[np.linalg.qr(self.scales * vectors)[0], nothing], [nothing, vectors]])
+        scales = np.maximum(base.modes.omega, 2 * math.pi / self.period)[:, None]
+        places, rates = base.coordinates(trajectory.displacement(times)), base.coordinates(trajectory.velocity(times))
+        sprung = [c for c in self.model.contacts if c.held and not c.rigid]
+        stretched = [trajectory.friction_force(c.name, times) / math.sqrt(c.stiffness) for c in sprung]
+        return np.vstack([scales * places, rates, *stretched])
 
 
 @dataclass(frozen=True)
 class Shooting:
-    """Newton's method around a state q (2 m,) along ``directions``; difference: step of the finite differences."""
+    """Newton's method around the end of a run; difference: step of the finite differences."""
 
     map: PeriodMap
     order: int
-    directions: np.ndarray
-    origin: np.ndarray
+    start: Trajectory
     difference: float
 
-    @classmethod
-    def around(
-        cls, of: PeriodMap, order: int, closed: tuple[str, ...], x: np.ndarray, v: np.ndarray, difference: float
-    ) -> Shooting:
-        """Around x, x' (n,), a state in the level with these contacts closed."""
-        return cls(of, order, of.directions(closed), of.states(x[:, None], v[:, None])[:, 0], difference)
-
-    def attracting(self, tolerance: float, far: float) -> tuple[np.ndarray, np.ndarray, float] | None:
-        """x, x' of a state that repeats and attracts, with its largest multiplier in a period; None if there is none.
+    def attracting(self, tolerance: float, far: float) -> tuple[Trajectory, float] | None:
+        """A run that ends in a state that repeats and attracts, with its largest multiplier in a period; or None.
 
         tolerance: length of the last step of Newton's method. far: the longest step it may take.
         """
-        place, allowed = np.zeros(self.directions.shape[1]), far
+        place, allowed = np.zeros(len(self._scales)), far
         for _ in range(MOST_STEPS):
-            reached = self._mapped(place)
-            jacobian = None if reached is None else self._jacobian(place, reached)
-            if reached is None or jacobian is None:
+            run = self._run(place)
+            if run is None:
                 return None
-            step = np.linalg.lstsq(np.eye(len(place)) - jacobian, reached - place)[0]
+            free, reached = self._free(run), self._place(run)
+            jacobian = self._jacobian(place, reached, free)
+            if jacobian is None:
+                return None
+            step = np.zeros(len(place))
+            step[free] = np.linalg.lstsq(np.eye(len(free)) - jacobian, (reached - place)[free])[0]
             length = float(np.linalg.norm(step))
             if not length <= allowed:
                 return None
             place, allowed = place + step, max(SHRINKING * length, tolerance)
             if length <= tolerance:
-                largest = float(np.max(np.abs(np.linalg.eigvals(jacobian)))) ** (1 / self.order)
-                return (*self._configuration(place), largest) if largest < ATTRACTS else None
+                largest = float(np.max(np.abs(np.linalg.eigvals(jacobian)), initial=0.0)) ** (1 / self.order)
+                return (self._moved(place), largest) if largest < ATTRACTS else None
         return None
 
-    def _configuration(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.map.configuration(self.origin + self.directions @ place)
+    @property
+    def _state(self) -> State:
+        """Where the run has ended."""
+        assert self.start.final is not None, "a run that is ok has a final state"
+        return self.start.final
 
-    def _mapped(self, place: np.ndarray) -> np.ndarray | None:
-        """P^p, None where the run fails or cannot start."""
+    @functools.cached_property
+    def _scales(self) -> np.ndarray:
+        """(s, 1, u) (2 r + h,)."""
+        level, slowest = self._state.level, 2 * math.pi / self.map.period
+        lengths = np.linalg.norm(level.level.base.directions[:, list(self.map.model.held)], axis=0)
+        omega = level.modal.omega
+        return np.concatenate([np.maximum(omega, slowest), np.ones(len(omega)), slowest / lengths])
+
+    def _moved(self, place: np.ndarray) -> Trajectory:
+        """A run that ends ``place`` away from where this one ended."""
+        own, change = self._state, place / self._scales
+        r, given = own.level.modal.modes, np.zeros(own.level.excitation.prescribed)
+        xi = own.displacement + np.concatenate([change[:r], given, change[2 * r :]])
+        xi_t = own.velocity + np.concatenate([change[r : 2 * r], given, 0 * own.held])
+        return replace(self.start, final=replace(own, displacement=xi, velocity=xi_t))
+
+    def _run(self, place: np.ndarray) -> Trajectory | None:
+        """A run over the periods of the order, None where it fails or cannot start."""
         try:
-            trajectory = self.map.run(*self._configuration(place), self.order)
+            trajectory = self.map.run(self._moved(place), self.order)
         except MultiPhiValueError:  # a disturbance that leads into a rigid stop
             return None
-        if trajectory.status != "ok":
-            return None
-        end = np.array([trajectory.t_end])
-        reached = self.map.states(trajectory.displacement(end), trajectory.velocity(end))[:, 0]
-        return np.asarray(self.directions.T @ (reached - self.origin))
+        return trajectory if trajectory.status == "ok" else None
 
-    def _jacobian(self, place: np.ndarray, reached: np.ndarray) -> np.ndarray | None:
+    def _place(self, trajectory: Trajectory) -> np.ndarray:
+        """How far away from where this one ended another run has ended, in the level in which this one did."""
+        own, other = self._state, trajectory.final
+        assert other is not None, "a run that is ok has a final state"
+        level = own.level
+        held = other.held + (stops_moved(other) - stops_moved(own))[list(self.map.model.held)]
+        centre = np.concatenate([own.displacement[: len(own.displacement) - len(held)], held])
+        y = other.level.configuration(other.displacement) - level.configuration(centre)
+        v = other.level.motion(other.velocity) - level.motion(own.velocity)
+        vectors = level.modal.vectors
+        return self._scales * np.concatenate([vectors.T @ y, vectors.T @ v, held - own.held])
+
+    def _free(self, trajectory: Trajectory) -> np.ndarray:
+        """Which coordinates are unknowns: all but places that links have held all the time."""
+        levels = [level.states for level in listed(trajectory.segments).levels]
+        elements = self.map.model.contacts
+        kept = [all(elements[i].states[states[i]].holds for states in levels) for i in self.map.model.held]
+        return np.flatnonzero(np.append(np.ones(len(self._scales) - len(kept), bool), ~np.array(kept, bool)))
+
+    def _jacobian(self, place: np.ndarray, reached: np.ndarray, free: np.ndarray) -> np.ndarray | None:
         columns = []
-        for direction in np.eye(len(place)):
-            moved = self._mapped(place + self.difference * direction)
-            if moved is None:
+        for direction in np.eye(len(place))[free]:
+            run = self._run(place + self.difference * direction)
+            if run is None:
                 return None
-            columns.append((moved - reached) / self.difference)
-        return np.array(columns).T
+            columns.append((self._place(run) - reached)[free] / self.difference)
+        return np.array(columns).reshape(len(free), len(free)).T

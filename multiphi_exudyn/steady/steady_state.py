@@ -1,13 +1,15 @@
 """Steady state: where a run under a harmonic load settles, found on the map of one period of the load.
 
-The state at whole periods T of the load, q = (s y, y') in base coordinates with s = max(omega, 2 pi / T), is a sequence
+The state at whole periods T of the load is a sequence, q = (s y, y', F / sqrt(k)) with s = max(omega, 2 pi / T), y in
+base coordinates, F the forces of springs k in series with friction,
 
     q_k+1 = P(q_k)
 
 A response of order p repeats after p periods, P^p(q) = q: 1 is a periodic response, 2 and more a sub-harmonic one. The
 run goes on from chunk to chunk of periods until the states repeat to a tolerance; that test decides. What decays slowly
 is not waited for: between chunks Newton's method looks for the repeating state (shooting.py), and the next chunk starts
-there, if the state attracts.
+there, if the state attracts. Everything is handed on from chunk to chunk, places that friction holds too. Where a link
+sticks for ever, to every such place belongs another response; found is that to which the start leads.
 """
 
 from __future__ import annotations
@@ -23,12 +25,14 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.steady.shooting import PeriodMap, Shooting
 from multiphi_exudyn.time.reliability import warnings_of
+from multiphi_exudyn.time.simulate import Run, started
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
@@ -55,7 +59,8 @@ class SteadyState:
     residual: by how much states ``order`` periods apart differ, relative to the size of the motion, both in
     sqrt(energy); where it is not periodic the smallest over all orders.
     multiplier: the largest modulus by which a small disturbance grows in a period of the load; NaN where the run
-    settled by itself. periods: of the load run one after the other.
+    settled by itself. Links that never slip have no part in it (shooting.py). periods: of the load run one after
+    the other.
     trajectory: one period of the response, or the last CHUNK periods of the load where it is not periodic; a failed
     run ends early. displacement, velocity: (n,), at the end of the run: another one can go on from there.
     warnings: what to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
@@ -103,17 +108,19 @@ def steady_state(
     other_loads: Sequence[StaticLoad] = (),
     periods: int = 400,
     tolerance: float = 1e-6,
+    start: Trajectory | Equilibrium | None = None,
 ) -> SteadyState:
-    """The response that a run from x, x' (n,) at t = 0 settles to.
+    """The response that a run from x, x' (n,) at t = 0 settles to, or from ``start``, as ``simulate`` has it.
 
     load: HarmonicLoad, or BaseMotion with a Harmonic course. other_loads: constant ones. periods: of the load, after
     which a run that has not settled ends. tolerance: relative to the size of the motion, to which states repeat.
     A response that attracts slowly is found by Newton's method from where the run is; which response, where several
-    attract, follows from the start. Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
+    attract, follows from the start: places that friction holds are part of it, and only ``start`` hands them on.
+    Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
     has to be decided, by a run of ``simulate``.
     """
     with kept_back():
-        state = settled(model, load, displacement, velocity, other_loads, periods, tolerance)
+        state = settled(model, load, (displacement, velocity, start), other_loads, periods, tolerance)
     issue(state.warnings)
     return state
 
@@ -121,20 +128,17 @@ def steady_state(
 def settled(
     model: MultiPhiModel,
     load: PeriodicLoad,
-    displacement: np.ndarray | None,
-    velocity: np.ndarray | None,
+    begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None],
     other_loads: Sequence[StaticLoad],
     periods: int,
     tolerance: float,
 ) -> SteadyState:
-    """What ``steady_state`` gives, without its MultiPhiWarning."""
+    """What ``steady_state`` gives, without its MultiPhiWarning; begin: x, x' (n,) and its ``start``."""
     _check(model, load, other_loads, periods, tolerance)
-    model = model.decided or model
-    n = model.structure.n
-    x = np.zeros(n) if displacement is None else model.structure.vector("displacement", displacement)
-    v = np.zeros(n) if velocity is None else model.structure.vector("velocity", velocity)
-    search = _Search(PeriodMap(model, (load, *other_loads), 1.0 / frequency(load)), load, tolerance)
-    return search.settle(x, v, periods)
+    model, (displacement, velocity, start), loads = model.decided or model, begin, (load, *other_loads)
+    period = 1.0 / frequency(load)
+    run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
+    return _Search(PeriodMap(model, loads, period), load, tolerance).settle(_warned(run.trajectory()), periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
@@ -146,10 +150,8 @@ def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Some periods of a run: x, x' (n, k + 1) at whole periods, q (2 m, k + 1), size of the motion, trajectory."""
+    """Some periods of a run: q (2 m + e, k + 1) at whole periods, size of the motion, trajectory."""
 
-    displacements: np.ndarray
-    velocities: np.ndarray
     states: np.ndarray
     size: float
     trajectory: Trajectory
@@ -188,11 +190,10 @@ class _Search:
     tolerance: float
     warned: list[tuple[str, ...]] = field(default_factory=list)
 
-    def settle(self, x: np.ndarray, v: np.ndarray, periods: int) -> SteadyState:
-        """Chunks until states repeat, Newton's method in between."""
+    def settle(self, trajectory: Trajectory, periods: int) -> SteadyState:
+        """Chunks until states repeat, of which this is the first, Newton's method in between."""
         done, multiplier = 0, math.nan
         while True:
-            trajectory = self._run(x, v, CHUNK)
             self.warned.append(trajectory.warnings)
             if trajectory.status != "ok":
                 return self._failed(trajectory, done)
@@ -202,43 +203,39 @@ class _Search:
                 return self._found(chunk, int(repeating[0]) + 1, done, multiplier)
             if done >= periods:
                 return self._lost(chunk, done)
-            x, v, multiplier = self._shot(chunk)
+            start, multiplier = self._shot(chunk)
+            trajectory = self.run(start, CHUNK)
 
-    def _run(self, x: np.ndarray, v: np.ndarray, periods: int) -> Trajectory:
-        trajectory = self.map.run(x, v, periods)
-        return replace(trajectory, warnings=warnings_of(trajectory))
+    def run(self, start: Trajectory, periods: int) -> Trajectory:
+        """Periods from the end of a run on."""
+        return _warned(self.map.run(start, periods))
 
     def _chunk(self, trajectory: Trajectory) -> _Chunk:
         whole = np.minimum(np.arange(CHUNK + 1) * self.map.period, trajectory.t_end)
-        last = np.linspace(whole[-2], whole[-1], SAMPLES)
-        x, v = trajectory.displacement(whole), trajectory.velocity(whole)
-        moving = self.map.states(trajectory.displacement(last), trajectory.velocity(last))
+        moving = self.map.states(trajectory, np.linspace(whole[-2], whole[-1], SAMPLES))
         size = float(np.max(np.linalg.norm(moving - np.mean(moving, axis=1, keepdims=True), axis=0)))
-        return _Chunk(x, v, self.map.states(x, v), size, trajectory)
+        return _Chunk(self.map.states(trajectory, whole), size, trajectory)
 
-    def _shot(self, chunk: _Chunk) -> tuple[np.ndarray, np.ndarray, float]:
-        """x, x' where the next chunk starts, and the largest multiplier there."""
-        x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
+    def _shot(self, chunk: _Chunk) -> tuple[Trajectory, float]:
+        """A run at whose end the next chunk starts, and the largest multiplier there."""
         order = chunk.candidate
         if not order:
-            return x, v, math.nan
-        closed = chunk.trajectory.segments[-1].level.level.closed
-        shooting = Shooting.around(self.map, order, closed, x, v, DIFFERENCE * chunk.size)
-        return shooting.attracting(self.tolerance * chunk.size, chunk.reach) or (x, v, math.nan)
+            return chunk.trajectory, math.nan
+        shooting = Shooting(self.map, order, chunk.trajectory, DIFFERENCE * chunk.size)
+        return shooting.attracting(self.tolerance * chunk.size, chunk.reach) or (chunk.trajectory, math.nan)
 
     # ------------------------------------------------------------------ results
 
     def _found(self, chunk: _Chunk, order: int, done: int, multiplier: float) -> SteadyState:
         residual = chunk.drifts[order - 1] / chunk.size if chunk.size else 0.0
-        x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
-        shown = self._run(x, v, order)
-        told = self._told(shown)
+        shown = self.run(chunk.trajectory, order)
+        (x, v), told = _reached(chunk.trajectory), self._told(shown)
         return SteadyState("periodic", "", self.load, order, float(residual), multiplier, done, shown, x, v, told)
 
     def _lost(self, chunk: _Chunk, done: int) -> SteadyState:
         order, residual = int(np.argmin(chunk.drifts)) + 1, float(np.min(chunk.drifts) / chunk.size)
         message = f"states {order} periods apart still differ by {residual:.2g} of the motion after {done} periods"
-        x, v = chunk.displacements[:, -1], chunk.velocities[:, -1]
+        x, v = _reached(chunk.trajectory)
         run, told = chunk.trajectory, self._told(chunk.trajectory)
         return SteadyState("not settled", message, self.load, 0, residual, math.nan, done, run, x, v, told)
 
@@ -256,6 +253,16 @@ class _Search:
         before = grouped(("", sentences) for sentences in self.warned)
         earlier = [f"{group.kind}: before it settled, {group.example}" for group in before if group.kind not in own]
         return (*shown.warnings, *earlier)
+
+
+def _warned(trajectory: Trajectory) -> Trajectory:
+    """With its warnings."""
+    return replace(trajectory, warnings=warnings_of(trajectory))
+
+
+def _reached(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """x, x' (n,) at its end."""
+    return trajectory.displacement(trajectory.t_end), trajectory.velocity(trajectory.t_end)
 
 
 def _half_range(trajectory: Trajectory, point: At, start: float, end: float) -> float:
@@ -294,7 +301,6 @@ def _course(load: PeriodicLoad) -> Harmonic:
 def _check(
     model: MultiPhiModel, load: PeriodicLoad, other_loads: Sequence[StaticLoad], periods: int, tolerance: float
 ) -> None:
-    model.need_contacts("steady state")
     if isinstance(model.modes, Tolerance) and model.decided is None:
         raise MultiPhiValueError(
             "model modes: got a Tolerance that has not decided yet, need a run of simulate first, a number or 'all'"

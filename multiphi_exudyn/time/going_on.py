@@ -4,6 +4,9 @@
 
 The level is the same, with x_inf, R, Y under the loads before and x_inf,n, R_n, Y_n under those that follow, with their
 channels w_n; what links hold and the phases of all exits stay. Under the same loads nothing changes but round-off.
+
+Where time begins anew, for loads that repeat, so do the courses of counter-surfaces: places on those stay where they
+are in space.
 """
 
 from __future__ import annotations
@@ -18,29 +21,31 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import State
 from multiphi_exudyn.time.trajectory import Start, Trajectory
 
-__all__ = ["going_on", "nudged"]
+__all__ = ["going_on", "nudged", "stops_moved"]
 
 CONTINUOUS = 1e-9  # of where a stop stands: a smaller difference is what its course is followed to
 
 
-def going_on(trajectory: Trajectory, levels: LoadedLevels) -> Start:
-    """The end of a trajectory as the start of a run in other levels."""
+def going_on(trajectory: Trajectory, levels: LoadedLevels, rewound: bool = False) -> Start:
+    """The end of a trajectory as the start of a run in other levels; rewound: at t = 0, and not at that end."""
     state, model = trajectory.final, levels.model
     assert state is not None, "a run that is ok has a final state"
     before, r = state.level, _modes(state.level)
-    held = state.displacement[len(state.displacement) - len(model.held) :]
-    level = levels.pushed(before.states) if model.general else levels.level(before.level.indices)
+    level, places, held = levels.level(before.states), list(model.held), state.held
     prescribed, rates = levels.drive.values[:2]
+    before_moved, moved = stops_moved(state), level.excitation.moved(prescribed)
+    if rewound:
+        held = held + (before_moved - moved)[places]
+        before_moved[places] = moved[places]
     w, w_t = np.concatenate([prescribed, held]), np.concatenate([rates, np.zeros(len(held))])
     jump = _at(before, state.displacement[r:]) - _at(level, w)
     slowed = _carried(before, state.velocity[r:]) - _carried(level, w_t)
     vectors = level.level.vectors[:, :r]
     xi = np.concatenate([state.displacement[:r] + vectors.T @ jump, w])
     xi_t = np.concatenate([state.velocity[:r] + vectors.T @ slowed, w_t])
-    moved = _moved(level, w)
-    _check_stops(level, moved, _moved(before, state.displacement[r:]))
+    _check_stops(level, moved, before_moved)
     gaps = model.base.gaps - moved
-    gaps[list(model.held)] -= held
+    gaps[places] -= held
     return Start(
         displacement=level.configuration(xi),
         velocity=vectors @ xi_t[:r] + _carried(level, w_t),
@@ -49,7 +54,7 @@ def going_on(trajectory: Trajectory, levels: LoadedLevels) -> Start:
         gaps=gaps,
         states=before.states,
         held=held,
-        time=trajectory.t_end,
+        time=0.0 if rewound else trajectory.t_end,
         state=State(level, xi, xi_t, state.phases),
     )
 
@@ -64,9 +69,10 @@ def nudged(trajectory: Trajectory, velocity: np.ndarray) -> Trajectory:
     return replace(trajectory, final=replace(state, velocity=np.concatenate([given, state.velocity[r:]])))
 
 
-def _moved(level: LoadedLevel, w: np.ndarray) -> np.ndarray:
-    """How far (c,) [m] the stops have moved."""
-    return level.excitation.moved(w[: level.excitation.prescribed])
+def stops_moved(state: State) -> np.ndarray:
+    """How far (c,) [m] stops and counter-surfaces have moved where a state is."""
+    r, excitation = _modes(state.level), state.level.excitation
+    return excitation.moved(state.displacement[r : r + excitation.prescribed])
 
 
 def _check_stops(level: LoadedLevel, moved: np.ndarray, before: np.ndarray) -> None:

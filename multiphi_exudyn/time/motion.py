@@ -103,7 +103,7 @@ class Motion:
     @property
     def static_state(self) -> State:
         """The present state as one under static loads alone."""
-        return self.state.static
+        return self.levels.without_channels(self.state)
 
     def advance(self, end: float, to_change: bool = False) -> None:
         """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""

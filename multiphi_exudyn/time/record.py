@@ -323,10 +323,12 @@ class Record:
         return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:
-        """The phases (n, c), in numbers, at the start of every segment."""
-        numbers, starts = np.zeros((len(self.rows), len(self._contacts)), np.int64), self.rows[:, 4]
-        unsettled = starts >= 0
-        numbers[unsettled] = self.phases[starts[unsettled][:, None] + np.arange(len(self._contacts))]
+        """The phases (n, e), in numbers, at the start of every segment; e: the most exits of a level."""
+        counts = np.array([len(exits_of(level)) for level in self.levels], np.int64)[self.rows[:, 0]]
+        numbers, starts = np.zeros((len(self.rows), int(np.max(counts, initial=0))), np.int64), self.rows[:, 4]
+        for count in np.unique(counts[starts >= 0]).tolist():
+            unsettled = (starts >= 0) & (counts == count)
+            numbers[unsettled, :count] = self.phases[starts[unsettled][:, None] + np.arange(count)]
         return numbers
 
     def segment(self, i: int) -> Segment:

@@ -32,7 +32,7 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Run", "levels_of", "motion_of", "simulate"]
+__all__ = ["Run", "levels_of", "motion_of", "simulate", "started"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -70,11 +70,7 @@ def simulate(
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     _check_impacts(model)
-    run = Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start)
-    if start is not None:
-        _check_start(run)
-    if isinstance(start, Equilibrium):
-        run = replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
+    run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     found = warnings_of(trajectory, tolerance)
@@ -84,7 +80,10 @@ def simulate(
 
 @dataclass(frozen=True)
 class Run:
-    """What ``simulate`` is asked for, there is more about it there; t_end [s]."""
+    """What ``simulate`` is asked for, there is more about it there; t_end [s].
+
+    rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
+    """
 
     model: MultiPhiModel
     t_end: float
@@ -94,6 +93,7 @@ class Run:
     compiled: bool | None = None
     start: Trajectory | Equilibrium | None = None
     stretches: Mapping[str, float] | None = None
+    rewound: bool = False
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -117,13 +117,13 @@ class Run:
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before = self.start if isinstance(self.start, Trajectory) else None
         levels = self._levels(finer)
-        start = _start(self, levels) if before is None else going_on(before, levels)
+        start = _start(self, levels) if before is None else going_on(before, levels, self.rewound)
         return motion_of(levels, start, self.compiled)
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
         model, loads = self.model, unchanging(self.loads)
-        time = self.start.t_end if isinstance(self.start, Trajectory) else 0.0
+        time = self.start.t_end if isinstance(self.start, Trajectory) and not self.rewound else 0.0
 
         def made() -> LoadedLevels:
             return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
@@ -160,7 +160,7 @@ def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: fl
     """
     load = excitation.static
     alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: LoadedLevels.static(model, load))
-    return LoadedLevels(model, excitation, time, end, alone) if excitation.channels else alone
+    return LoadedLevels(model, excitation, time, end, alone) if excitation.prescribed else alone
 
 
 @dataclass(frozen=True)
@@ -238,6 +238,16 @@ def _check_impacts(model: MultiPhiModel) -> None:
         )
 
 
+def started(run: Run) -> Run:
+    """The run with its start looked into: an equilibrium is its displacement and its stretches."""
+    start = run.start
+    if start is not None:
+        _check_start(run)
+    if isinstance(start, Equilibrium):
+        return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
+    return run
+
+
 def _check_start(run: Run) -> None:
     """Refuse a trajectory from whose end this run cannot go on, and an equilibrium of another model."""
     start = run.start
@@ -257,7 +267,7 @@ def _check_start(run: Run) -> None:
         raise MultiPhiValueError("start: got a trajectory of another model, need one of the same object")
     if start.status != "ok":
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
-    if not run.t_end > start.t_end:
+    if not run.rewound and not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
 
 

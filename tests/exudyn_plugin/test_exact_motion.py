@@ -41,8 +41,8 @@ def held(model, row, force):
     """What a force on a point is to the levels of a model."""
     in_base = row[None, :] @ model.base.modes.shapes
 
-    def acting(closed):
-        level = model.level_at(closed)
+    def acting(states):
+        level = model.level_at(model.links_held(states))
         rows = in_base @ level.vectors
         return Acting(force * rows[0], force * _reactions(level, in_base, rows)[:, 0])
 
@@ -101,9 +101,9 @@ def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
     assert reached.changed
     assert {event.time for event in reached.events} == {reached.time}
     level = model.level_at(())
-    assert level.gap_rows[0] @ reached.before[1] < 0
-    assert 0.1 + level.gap_rows[0] @ reached.before[0] == pytest.approx(0.0, abs=1e-12)
-    assert not math.isclose(reached.state.kinetic, 0.5 * reached.before[1] @ reached.before[1])
+    assert level.gap_rows[0] @ reached.before.velocity < 0
+    assert 0.1 + level.gap_rows[0] @ reached.before.displacement == pytest.approx(0.0, abs=1e-12)
+    assert not math.isclose(reached.state.kinetic, reached.before.kinetic)
 
 
 def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
@@ -138,7 +138,8 @@ def test_bodies_that_take_turns_move_as_each_one_alone(case):
         motion = Run(model, T_END, None, velocity).begun()
         in_base = row[None, :] @ model.base.modes.shapes
         attached = AttachedInertia(np.array([[0.7]]), np.eye(1))
-        inertia = PointInertia(attached, model.base, in_base, lambda closed: in_base @ model.level_at(closed).vectors)
+        rows_in = lambda states: in_base @ model.level_at(model.links_held(states)).vectors  # noqa: E731
+        inertia = PointInertia(attached, model.base, in_base, rows_in)
         exact, events, state = ExactMotion(motion, motion.levels, "body"), [], motion.static_state
         exact.begin(0.0)
         for k in range(30):

@@ -89,11 +89,11 @@ def run(model, step, add, interface=("m2",), solver=TRAPEZOIDAL, **given):
     mbs.SolveDynamic(settings(step), solverType=solver)
     body = mbs.variables["multiPhi"]["b"]
     eta = mbs.GetSensorStoredData(items["sCoordinates"])[:, 1:]
-    level = mbs.GetSensorStoredData(items["sLevel"])[:, 1] > 0.5
+    level, layout = mbs.GetSensorStoredData(items["sLevel"])[:, 1:], body.coordinates.layout
     shown = np.empty((len(eta), len(sensors)))
-    for k, (values, closed) in enumerate(zip(eta, level, strict=True)):
-        loaded = body.stepped_level((0,) if closed else ()).loaded
-        x = model.base.modes.shapes @ loaded.configuration(values[: loaded.level.modes])
+    for k, (values, states, held) in enumerate(zip(eta, layout.states(level), layout.held(level), strict=True)):
+        loaded = body.stepped_level(states.tolist()).loaded
+        x = model.base.modes.shapes @ loaded.configuration(np.concatenate([values[: loaded.modal.modes], held]))
         shown[k] = [model.structure.row(name) @ x for name in items["nInterface"]]
     return np.column_stack([mbs.GetSensorStoredData(s)[:, 1] for s in sensors]), shown, body.events
 
@@ -297,7 +297,7 @@ def test_rates_of_interface_coordinates_are_those_of_the_body_at_every_step(stif
     assert len(body.events) >= 4
     for sensor, key in zip(sensors, ("sCoordinates_t", "sCoordinates_tt"), strict=True):
         own, y = mbs.GetSensorStoredData(items[key])[:, 1:], mbs.GetSensorStoredData(sensor)[:, 1]
-        shapes = [body.stepped_level((0,) if closed else ()).loaded.level.shapes for closed in level]
+        shapes = [body.stepped_level((int(closed),)).loaded.level.shapes for closed in level]
         shown = np.array([point @ s @ q[: s.shape[1]] for s, q in zip(shapes, own, strict=True)])
         assert np.max(np.abs(y - shown)) < 1e-9 * np.max(np.abs(shown))
 

@@ -119,7 +119,7 @@ def test_the_report_names_what_was_taken_and_what_was_left_out():
     system.mbs.Assemble()
     reduction = reduce(system.mbs)
     assert [(item.name, reason) for item, reason in reduction.left_out] == [
-        ("slide", "friction"),
+        ("slide", "friction that slips already (data coordinate 0: 1), need a bristle that sticks: 0"),
         ("timed", "its user function is none of time alone (it reads mbs.systemData)"),
     ]
     assert reduction.loads == ()
@@ -339,7 +339,8 @@ def test_a_hinged_bar_on_a_stop_moves_as_in_exudyn():
 
 def test_strict_refuses_what_would_be_left_out_and_names_it():
     with pytest.raises(
-        mp.MultiPhiValueError, match=r"leaves out \(ObjectConnector.*Ext 'slide': friction\), need strict=F"
+        mp.MultiPhiValueError,
+        match=r"leaves out \(ObjectConnector.*Ext 'slide': friction that slips.*\), need strict=F",
     ):
         reduce(mass_between_limit_stops(friction=1.5).mbs, strict=True)
     assert reduce(mass_between_limit_stops().mbs, strict=True).left_out == ()

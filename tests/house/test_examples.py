@@ -75,6 +75,18 @@ def test_force_laws(capsys, monkeypatch, tmp_path):
     assert capsys.readouterr().out.count("order") == 4
 
 
+def test_friction_in_exudyn(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["friction_in_exudyn.py", str(tmp_path / "ring.png")])
+    example = load("friction_in_exudyn")
+    monkeypatch.setattr(example, "STEPS", (4e-4, 1e-4))
+    monkeypatch.setattr(example, "T_END", 0.2)
+    found = example.main()
+    time = found.full[1e-4].time
+    assert found.error({name: found.reduced.at(name, time) for name in example.POINTS}) < 2e-3
+    assert (tmp_path / "ring.png").stat().st_size > 10_000
+    assert "friction, 3 N by a bristle of 20000 N/m" in capsys.readouterr().out
+
+
 def test_modal_test(capsys, tmp_path):
     picture = tmp_path / "modal.png"
     own, found = load("modal_test").main([str(picture)])

@@ -165,11 +165,6 @@ class TestModel:
         with pytest.raises(mp.MultiPhiValueError, match="state of 'ring': got 'open', need one of: stick, slip"):
             model.level({"ring": "open"})
 
-    def test_what_knows_contacts_alone_refuses_other_elements(self):
-        load = mp.HarmonicLoad("m1", 1.0, 1.0)
-        with pytest.raises(mp.MultiPhiValueError, match="got the elements ring, need contacts and force laws"):
-            mp.steady_state(self.model(), load)
-
 
 def integrated(model, sliders, force, t_end):
     """State (x, x', T) at the end and the times of all changes, by DOP853 from event to event."""

@@ -2,8 +2,8 @@
 
     M q'' + D q' + K q = drive + (loads and connectors of the system),   q = eta of the present level
 
-NodeGenericODE2 holds q, ObjectGenericODE2 the matrices of the level, NodeGenericData the level: for every contact
-0 open or 1 closed, then for every contact its phase (events/phases.py: 0 armed, 1 recovering, 2 refused).
+NodeGenericODE2 holds q, ObjectGenericODE2 the matrices of the level, NodeGenericData the level: the states of all
+elements, phases of their exits, and the places that links hold (level_data.py).
 
 A body on which nothing acts but its own loads follows a motion that is known beforehand (run_ahead.py): at the ends of
 steps with events its coordinates, matrices and level are those of ``simulate``. In between Exudyn's steps are of second
@@ -31,9 +31,10 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import StepTest
-from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates, flags_of
+from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates
 from multiphi_exudyn.exudyn_plugin.body.exact_step import Step, exact_step
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
+from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
 from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
@@ -78,8 +79,9 @@ class MultiPhiBody:
         self._exact: ExactMotion | None = None
         self._most = 0.0
         self._record = RunRecord(self._state, motion.start_loss)
-        stepped, state = self._stepped(self._state.closed), self._state
-        self.coordinates = Coordinates(self.items, stepped, most, matched_step is not None)
+        stepped, state = self._stepped(self._state.states), self._state
+        layout, matched = LevelData(self.model), matched_step is not None
+        self.coordinates = Coordinates(self.items, stepped, state.held, layout, most, matched)
         self._given = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
         self._given_events = tuple(motion.record.events())
         self._events = list(self._given_events)
@@ -133,27 +135,27 @@ class MultiPhiBody:
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
         return warnings_of_body(self.model, self._record.of(self._events, truncated))
 
-    def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
-        """The level of closed contacts as the solver has it."""
-        return self._stepped(tuple(closed))
+    def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
+        """The level of elements in these states as the solver has it."""
+        return self._stepped(tuple(states))
 
     def force_vector(self, stepped: SteppedLevel) -> np.ndarray:
         """Constant force (s,) of the object in a level, at the present time."""
-        return stepped.drive + self._own.force_at(stepped.closed, 0.0 if math.isnan(self.time) else self.time)
+        return stepped.drive + self._own.force_at(stepped.states, 0.0 if math.isnan(self.time) else self.time)
 
-    def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+    def own_forces(self, states: tuple[int, ...], times: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
-        return self._own.forces(closed, times)
+        return self._own.forces(states, times)
 
-    def own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+    def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """(p, f) of the same at the end of a step."""
-        return np.concatenate([self._own.force_at(closed, time), np.zeros(self.coordinates.points)])
+        return np.concatenate([self._own.force_at(states, time), np.zeros(self.coordinates.points)])
 
     def shown(
-        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, time: np.ndarray
+        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, held: np.ndarray, time: np.ndarray
     ) -> tuple[LoadedLevel, np.ndarray, np.ndarray]:
         """Level and coordinates (.., k), with their rates, in which configurations and forces are read."""
-        return self._own.shown(stepped, eta, eta_t, time)
+        return self._own.shown(stepped, eta, eta_t, held, time)
 
     # ------------------------------------------------------------------ a step
 
@@ -165,7 +167,7 @@ class MultiPhiBody:
         if self._test is not None and not self._own.jump(self._test.time, t, self._rounding):
             self._test.tell(t, self._own.channels_at(t))
         stepped = self.coordinates.stepped
-        force = stepped.drive + self._own.force_at(stepped.closed, t)
+        force = stepped.drive + self._own.force_at(stepped.states, t)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
 
     def after_step(self, mbs: Any, t: float) -> None:
@@ -205,7 +207,7 @@ class MultiPhiBody:
         self._events += found.events
         self._record.see(found.state)
         self._choose_test()
-        self.coordinates.store(flags_of(found.state.closed, found.state.phases))
+        self.coordinates.store(self.coordinates.layout.of(found.state))
         bodies = bodies_of(mbs)
         bodies.disturbed = bodies.disturbed or found.disturbed
 
@@ -248,7 +250,7 @@ class MultiPhiBody:
         assert self._test is not None
         armed = all(phase is Phase.ARMED for phase in self._state.phases)
         channels = (self._own.channels_at(time),) if self.varies else ()
-        self._test.begin(time, np.concatenate([x, *channels]), armed)
+        self._test.begin(time, np.concatenate([x, self._state.held, *channels]), armed)
 
     def look_again(self) -> None:
         """Take the present state as the start of the next step: another body's event may have moved this one."""
@@ -263,7 +265,8 @@ class MultiPhiBody:
         self._test = None
         if self._run_ahead is not None:
             self._run_ahead.running = False
-        stepped = self._stepped(self.coordinates.stored()[0])
+        states, _, self.coordinates.held = self.coordinates.stored()
+        stepped = self._stepped(states)
         self.coordinates.load(mbs, stepped, self.force_vector(stepped))
 
     def _begin(self, mbs: Any, t: float) -> None:
@@ -297,19 +300,21 @@ class MultiPhiBody:
         """
         here, t = self.coordinates, self.time
         stepped, (q, q_t, q_tt) = here.stepped, here.views
-        closed, entered = here.stored()
-        if closed != stepped.closed:  # the accelerations have been computed with stale matrices
-            stepped = self._enter(mbs, closed)
+        states, entered, held = here.stored()
+        if states != stepped.states or not np.array_equal(held, here.held):  # accelerations are of stale matrices
+            here.held, stepped = held, self._stepped(states)
+            here.enter(mbs, stepped, self.force_vector(stepped))
             if not alone:
                 q_tt[:] = stepped.acceleration(q, q_t, self._acting(mbs, step)[: self._size])
-        force = self.own_forces(closed, np.array([t]))[0] if alone else here.force(here.read())[: self._size]
+        force = self.own_forces(states, np.array([t]))[0] if alone else here.force(here.read())[: self._size]
         if fresh:
             q_t += stepped.from_force @ force
         if fresh or alone:
             q_tt[:] = stepped.acceleration(q, q_t, force)
-        here.write(here.stepped, here.views)
-        r, eta_t = stepped.loaded.level.modes, stepped.velocity(q, q_t, force)
-        state = State(self._own.levels.level(closed), q[:r].copy(), eta_t[:r], entered)
+        here.write(stepped, held, here.views)
+        r, eta_t = stepped.modes, stepped.velocity(q, q_t, force)
+        xi, xi_t = np.concatenate([q[:r], held]), np.concatenate([eta_t[:r], 0 * held])
+        state = State(self._own.levels.level(states), xi, xi_t, entered)
         return replace(state, phases=self._own.phases_of(state, t))
 
     def _acting(self, mbs: Any, step: float) -> np.ndarray:
@@ -378,14 +383,8 @@ class MultiPhiBody:
 
     # ------------------------------------------------------------------ levels in Exudyn
 
-    def _enter(self, mbs: Any, closed: tuple[int, ...]) -> SteppedLevel:
-        """Make a level that of the dynamic solver at work."""
-        stepped = self._stepped(closed)
-        self.coordinates.enter(mbs, stepped, self.force_vector(stepped))
-        return stepped
-
     def _choose_test(self) -> None:
-        self._test = self._tests.get_or_build(self._state.closed, self._new_test)
+        self._test = self._tests.get_or_build(self._state.states, self._new_test)
 
     def _new_test(self) -> StepTest:
         here = self.coordinates
@@ -393,5 +392,5 @@ class MultiPhiBody:
         conditions = self._own.conditions(here.stepped, self._step, here.direct(here.stepped))
         return StepTest(conditions, self._step, self._rounding, (*here.views, here.multipliers), places)
 
-    def _stepped(self, closed: tuple[int, ...]) -> SteppedLevel:
-        return self._stepped_levels.get_or_build(closed, lambda: self._own.stepped(closed, self.matched_step))
+    def _stepped(self, states: tuple[int, ...]) -> SteppedLevel:
+        return self._stepped_levels.get_or_build(states, lambda: self._own.stepped(states, self.matched_step))

@@ -19,7 +19,8 @@ Under loads that vary, s of xi = (eta, w), linear interpolation is off by at mos
 p = P w + Q w' the modal force. The channels enter by bounds that hold for the whole run; a kink of a sampled course
 counts as the second derivative 2 |jump of w'| / h. Steps in which a course itself jumps are never taken for clear.
 
-Either is a matrix times x = (q, q', q'', 1, f, w, w') at the ends. Exudyn's own state is read where it stands.
+Either is a matrix times x = (q, q', q'', 1, f, places that links hold, w, w') at the ends. Exudyn's own state is read
+where it stands.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ __all__ = ["Conditions", "StepTest", "driven_conditions", "jump_times", "plain_c
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a contact's function: what no test needs to tell from zero
 
 TIME, STEP, ROUNDING, CLEARANCE, SPEED, TOLD = range(6)  # numbers
-SIZE, POINTS, CHANNELS, LATER, BEHIND, ALL, DIRECT, START, END, MATRIX, NORM, MULTIPLIERS = range(12)  # ints
+SIZE, POINTS, HELD, CHANNELS, LATER, BEHIND, ALL, DIRECT, START, END, MATRIX, NORM, MULTIPLIERS = range(13)  # ints
 
 
 @compiled
@@ -61,7 +62,7 @@ def step_is_clear(
         numbers[x + 2 * s + i] = q_tt[i]
     for k in range(ints[POINTS]):
         numbers[x + 3 * s + 1 + k] = multipliers[ints[ints[MULTIPLIERS] + k]]
-    width, square, row = 3 * s + 1 + ints[POINTS] + ints[CHANNELS], 0.0, ints[NORM]
+    width, square, row = 3 * s + 1 + ints[POINTS] + ints[HELD] + ints[CHANNELS], 0.0, ints[NORM]
     for _ in range(2 * s):
         total = 0.0
         for i in range(3 * s):
@@ -112,7 +113,7 @@ class Conditions:
     """What has to exceed |norm (q, q', q'')| in one level, as rows of x, see the module's docstring.
 
     behind, both, ahead: (.., n), for the step before a state, for either, for the step after it. norm: S z' (2 s, 3 s).
-    points, channels: how many entries of x are f, and w with w'. direct: whether f counts.
+    points, held, channels: how many entries of x are f, held places, and w with w'. direct: whether f counts.
     """
 
     behind: np.ndarray
@@ -120,6 +121,7 @@ class Conditions:
     ahead: np.ndarray
     norm: np.ndarray
     points: int
+    held: int
     channels: int
     direct: bool
 
@@ -147,7 +149,8 @@ class StepTest:
         self._numbers = np.concatenate([np.zeros(matrix), self._matrix.ravel(), self._norm.ravel()])
         self._numbers[[STEP, ROUNDING, TIME]] = step, rounding, math.nan
         self._numbers[[first + 3 * size, first + width + 3 * size]] = 1.0
-        sizes = size, conditions.points, conditions.channels, behind, behind + both, count, int(conditions.direct)
+        entries = conditions.points, conditions.held, conditions.channels
+        sizes = size, *entries, behind, behind + both, count, int(conditions.direct)
         starts = first, first + width, matrix, matrix + count * width, MULTIPLIERS + 1
         self._ints = np.array([*sizes, *starts, *places], dtype=np.int64)
         self._kept = tuple(views)
@@ -160,14 +163,16 @@ class StepTest:
 
     @property
     def start(self) -> np.ndarray:
-        """A copy of x at the start of the present step, without channels."""
+        """A copy of (q, q', q'', 1, f) at the start of the present step."""
         first = self._ints[START]
-        return self._numbers[first : first + self._width - self._ints[CHANNELS]].copy()
+        return self._numbers[first : first + 3 * self._ints[SIZE] + 1 + self._ints[POINTS]].copy()
 
     def begin(self, time: float, x: np.ndarray, armed: bool) -> None:
         """A step begins at a time [s] with x; what ends a phase that is not armed is looked for exactly."""
-        first, numbers = self._ints[START], self._numbers
+        first, end, numbers = self._ints[START], self._ints[END], self._numbers
         numbers[first : first + self._width] = x
+        kept = slice(3 * self._ints[SIZE] + 1 + self._ints[POINTS], self._width - self._ints[CHANNELS])
+        numbers[end + kept.start : end + kept.stop] = x[kept]
         speed = self._norm.dot(x[: self._norm.shape[1]])
         clearance = np.min(self._matrix[self._later :].dot(x), initial=math.inf) if armed else -math.inf
         numbers[TIME], numbers[CLEARANCE], numbers[SPEED] = time, clearance, math.sqrt(speed.dot(speed))
@@ -184,16 +189,18 @@ class StepTest:
 
 def plain_conditions(stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> Conditions:
     """For the functions ``rows`` (c,) in one level, and steps of length ``step`` [s]; direct: L (c, m) for them."""
-    along, rate = _padded(stepped, rows, 0)
+    s, places = stepped.size, stepped.loaded.excitation.channels
+    (along, held), (rate, _) = (np.split(part, [s], axis=1) for part in _padded(stepped, rows, places))
     none = np.zeros_like(along)
     value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
     constants = np.array([row.constant for row in rows]).reshape(-1, 1)
     scales = _scales(stepped, along, rate, constants[:, 0], step)[:, None]
     behind, both, ahead = (
-        np.hstack([functions @ stepped.physical, constants, direct]) / scales
+        np.hstack([functions @ stepped.physical, constants, direct, held]) / scales
         for functions in (value - third, value, value + third)
     )
-    return Conditions(behind, both, ahead, _energy_norm(stepped), direct.shape[1], 0, bool(np.any(direct)))
+    norm, points = _energy_norm(stepped), direct.shape[1]
+    return Conditions(behind, both, ahead, norm, points, places, 0, bool(np.any(direct)))
 
 
 def _scales(
@@ -215,7 +222,7 @@ def _least(along: np.ndarray, rate: np.ndarray, constants: np.ndarray, step: flo
 
 def _padded(stepped: SteppedLevel, rows: list[Row], channels: int) -> tuple[np.ndarray, np.ndarray]:
     """P and R (c, s + q) of functions."""
-    modes, size, count = stepped.loaded.level.modes, stepped.size, len(rows)
+    modes, size, count = stepped.modes, stepped.size, len(rows)
     padded = np.zeros((2, count, size + channels))
     for part, values in zip(padded, ([row.position for row in rows], [row.rate for row in rows]), strict=True):
         found = np.reshape(values, (count, modes + channels))
@@ -257,19 +264,22 @@ def _gains(stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, power: in
 
 def driven_conditions(stepped: SteppedLevel, level: LoadedLevel, rows: list[Row], step: float) -> Conditions:
     """For the functions ``rows`` (c,) of xi in one level, and steps of length ``step`` [s]."""
-    s, q, share = stepped.size, level.excitation.channels, step**2 / 8
-    along, rate = _padded(stepped, rows, q)
+    s, q, share = stepped.size, level.excitation.prescribed, step**2 / 8
+    along, rate = _padded(stepped, rows, level.excitation.channels)
+    (along, held), rate = np.split(along, [s + q], axis=1), rate[:, : s + q]
     modal = np.hstack([along[:, :s], rate[:, :s]])
     constants = np.array([row.constant for row in rows]).reshape(-1)
     first, second, third = (np.array(bounds) for bounds in zip(*_bounds(level.excitation, step), strict=True))
-    forced = float(np.linalg.norm(np.abs(level.channels.force) @ first + np.abs(level.channels.force_rate) @ second))
+    force, force_rate = np.abs(level.channels.force[:, :q]), np.abs(level.channels.force_rate[:, :q])
+    forced = float(np.linalg.norm(force @ first + force_rate @ second))
     gains = _gains(stepped, along[:, :s], rate[:, :s], 1) * _swell(stepped, step)
     extra = np.linalg.norm(rate[:, :s], axis=1) * forced + step * forced * gains
     extra += np.abs(along[:, s:]) @ second + np.abs(rate[:, s:]) @ third
     scales = np.maximum(share * gains, _least(along, rate, constants, step))[:, None]
     value = np.hstack([modal, np.zeros((len(rows), s))]) @ stepped.physical
-    both = np.hstack([value, (constants - share * extra)[:, None], along[:, s:], rate[:, s:]]) / scales
-    return Conditions(both[:0], both, both[:0], _energy_norm(stepped), 0, 2 * q, direct=False)
+    both = np.hstack([value, (constants - share * extra)[:, None], held, along[:, s:], rate[:, s:]]) / scales
+    norm, places = _energy_norm(stepped), held.shape[1]
+    return Conditions(both[:0], both, both[:0], norm, 0, places, 2 * q, direct=False)
 
 
 def jump_times(excitation: Excitation) -> np.ndarray:

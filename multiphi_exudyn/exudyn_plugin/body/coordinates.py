@@ -8,7 +8,7 @@ connectors of the system on the body's node and, as forces f (m,) on points, on 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,14 +16,14 @@ import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import SystemMatrices
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
-__all__ = ["SAME_STEP", "Coordinates", "flags_of", "matrices"]
+__all__ = ["SAME_STEP", "Coordinates", "matrices"]
 
-PHASES = tuple(Phase)
 ONE = np.ones(1)  # the entry of x that its constants belong to
 SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
 
@@ -40,14 +40,27 @@ class Coordinates:
     """Coordinates (s,) of one body. items: its typed indices. stepped: see the module's docstring.
 
     interface: its interface coordinates or None. surroundings: the system around them, views: q, q', q'' in the
-    system's current state, multipliers: all those of the system, during a run. most: levels of which Exudyn's own
-    matrices are kept. matched: whether M differs among levels. rigid: whether the body has contacts that strike.
+    system's current state, multipliers: all those of the system, during a run. held: places (h,) that links hold, as
+    the interface has them. layout: of the data node. most: levels of which Exudyn's own matrices are kept. matched:
+    whether M differs among levels. rigid: whether links of the body become rigid. slips: whether links have held
+    places. foreseen: whether what happens at an event depends on the forces that follow it, as reactions do, and
+    accelerations that say which way something slips.
     """
 
-    def __init__(self, items: dict[str, Any], stepped: SteppedLevel, most: int, matched: bool) -> None:
+    def __init__(
+        self,
+        items: dict[str, Any],
+        stepped: SteppedLevel,
+        held: np.ndarray,
+        layout: LevelData,
+        most: int,
+        matched: bool,
+    ) -> None:
         self.items = items
-        self.stepped = stepped
+        self.stepped, self.held, self.layout = stepped, held, layout
         self.rigid = bool(np.any(np.isinf(stepped.loaded.level.base.stiffnesses)))
+        self.slips = layout.places > 0
+        self.foreseen = self.rigid or self.slips
         self._matched = matched
         self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](most)
         self.interface: Interface | None = None
@@ -95,22 +108,23 @@ class Coordinates:
         s = self.stepped.size
         return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
-    def write(self, stepped: SteppedLevel, values: Iterable[np.ndarray]) -> None:
-        """Write q, q', q'' (s,) in a level, and what follows from them on the interface."""
+    def write(self, stepped: SteppedLevel, held: np.ndarray, values: Iterable[np.ndarray]) -> None:
+        """Write q, q', q'' (s,) in a level with places that links hold (h,), and what follows on the interface."""
         for view, value in zip(self.views, values, strict=True):
             view[:] = value
         if self.interface is not None:
-            self.interface.write(stepped, self.views)
+            self.interface.write(stepped, held, self.views)
 
     def load(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
         """Give the system the matrices of a level, and the force (s,) of the body's own that now acts in it."""
         self.stepped = stepped
-        prepared = self._prepared.get_or_build(stepped.closed, lambda: _containers(stepped))
+        links = stepped.loaded.level.indices
+        prepared = self._prepared.get_or_build(links, lambda: _containers(stepped))
         for parameter, value in prepared.items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
         if self.interface is not None:
-            self.interface.load(stepped)
+            self.interface.load(stepped, self.held)
 
     def enter(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
         """``load`` within a run of the dynamic solver."""
@@ -118,6 +132,12 @@ class Coordinates:
         if self._matched:  # a solver may take the mass matrix for constant and keep it
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
         mbs.solverSignalJacobianUpdate = True
+
+    def enter_with(self, mbs: Any, stepped: SteppedLevel, held: np.ndarray, force: np.ndarray) -> None:
+        """``enter`` a level with places that links hold (h,), where either is another than now."""
+        if stepped.states != self.stepped.states or not np.array_equal(held, self.held):
+            self.held = held
+            self.enter(mbs, stepped, force)
 
     def applied(self, mbs: Any) -> np.ndarray:
         """p (s,) in the present state of the system, of a body without interface."""
@@ -156,28 +176,17 @@ class Coordinates:
     def direct(self, stepped: SteppedLevel) -> np.ndarray:
         """L (k, m) in a level: L f is what the closed contacts carry of f beside its modes' share."""
         if self.interface is None:
-            return np.zeros((len(stepped.closed), 0))
+            return np.zeros((len(stepped.loaded.level.indices), 0))
         return self.interface.of(stepped).direct
 
-    def store(self, flags: Sequence[float]) -> None:
-        """Write closed contacts and phases into the data node."""
+    def store(self, data: np.ndarray) -> None:
+        """Write the level data of a state into the data node."""
         if "nGenericData" in self.items:
-            self._data[:] = flags
+            self._data[:] = data
 
-    def stored(self) -> tuple[tuple[int, ...], tuple[Phase, ...]]:
-        """Closed contacts and phases from the data node."""
-        if "nGenericData" not in self.items:
-            return (), ()
-        closed, phases = np.split(self._data, 2)
-        return tuple(np.flatnonzero(closed > 0.5).tolist()), tuple(PHASES[round(p)] for p in phases.tolist())
-
-
-def flags_of(closed: tuple[int, ...], phases: Sequence[Phase]) -> list[float]:
-    """Coordinates of the data node."""
-    flags = [0.0] * len(phases) + [float(PHASES.index(phase)) for phase in phases]
-    for contact in closed:
-        flags[contact] = 1.0
-    return flags
+    def stored(self) -> tuple[tuple[int, ...], tuple[Phase, ...], np.ndarray]:
+        """States, phases and held places from the data node."""
+        return self.layout.read(self._data if "nGenericData" in self.items else np.zeros(0))
 
 
 def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:

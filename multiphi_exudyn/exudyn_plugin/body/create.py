@@ -13,18 +13,20 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.coordinates import flags_of, matrices
+from multiphi_exudyn.exudyn_plugin.body.coordinates import matrices
 from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface, interface_rows
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.simulate import Run
+from multiphi_exudyn.time.simulate import Run, started
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
 
@@ -42,11 +44,13 @@ def CreateMultiPhiBody(
     interface: Iterable[str] | Mapping[str, At] = (),
     show: bool = True,
     drawing: Drawing | None = None,
+    start: Trajectory | Equilibrium | None = None,
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
 
     mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``.
+    displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``. start: as there; where it
+    is a trajectory its final state is handed on whole, and time begins anew.
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
     stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
@@ -73,11 +77,20 @@ def CreateMultiPhiBody(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
-    model.need_contacts("model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
-    body = MultiPhiBody(name, _motion(model, displacement, velocity, loads), loads, PROVISIONAL, matchedStepSize)
+    body = MultiPhiBody(
+        name,
+        _motion(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True)),
+        loads,
+        PROVISIONAL,
+        matchedStepSize,
+    )
+    moving = [contact for contact in model.contacts if contact.velocity]
+    if rows and moving:
+        name, speed = moving[0].name, moving[0].velocity
+        raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")
     if rows and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
@@ -105,21 +118,16 @@ def _check_step(step: float | None) -> None:
         raise MultiPhiValueError(f"matchedStepSize: got {step!r}, need a step size > 0 s or None")
 
 
-def _motion(
-    model: MultiPhiModel,
-    displacement: np.ndarray | None,
-    velocity: np.ndarray | None,
-    loads: Sequence[Load],
-) -> Motion:
+def _motion(run: Run) -> Motion:
     """A motion at its start, checked as ``simulate`` checks it."""
-    motion = Run(model, PROVISIONAL, displacement, velocity, loads).begun()
+    motion = started(run).begun()
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion
 
 
 def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None) -> dict[str, Any]:
-    stepped, (q, q_t) = body.stepped_level(body.state.closed), body.start
+    stepped, (q, q_t) = body.stepped_level(body.state.states), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
             name=f"Node:{body.name}",
@@ -141,7 +149,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
         )
     )
     if body.model.contacts:
-        values = flags_of(body.state.closed, body.state.phases)
+        values = body.coordinates.layout.of(body.state)
         items["nGenericData"] = mbs.AddNode(
             NodeGenericData(
                 name=f"Node:{body.name}.level", initialCoordinates=values, numberOfDataCoordinates=len(values)
@@ -152,5 +160,6 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
 
 def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, rows, body.model.most_levels)
-    interface.add(body.items["nGenericODE2"], body.stepped_level(body.state.closed), *body.start)
+    stepped = body.stepped_level(body.state.states)
+    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors

@@ -131,14 +131,13 @@ def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.nda
     outputs, shown = exu.OutputVariableType, exu.ConfigurationType.Visualization
     kinds = outputs.Coordinates, outputs.Coordinates_t, outputs.Coordinates_tt
     stored = [np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericODE2"], kind, shown)) for kind in kinds]
-    closed = np.zeros(0, bool)
+    data = np.zeros(0)
     if "nGenericData" in body.items:
-        values = mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, shown)
-        closed = values[: len(body.model.contacts)] > 0.5
+        data = np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, shown))
     time = np.array([mbs.systemData.GetTime(shown)])
     none = np.zeros((body.coordinates.points, 1))  # forces on points are not drawn
-    moved, *_ = rebuilt(body, rows, closed[None, :], time, np.concatenate(stored)[None, :], none)
-    return moved[:, 0], closed
+    moved, *_ = rebuilt(body, rows, data[None, :], time, np.concatenate(stored)[None, :], none)
+    return moved[:, 0], body.coordinates.layout.states(data) == 1
 
 
 def _bars(line: np.ndarray, radius: float) -> list[dict[str, Any]]:

@@ -40,10 +40,10 @@ class BodyInStep(Protocol):
     model: MultiPhiModel
     coordinates: Coordinates
 
-    def stepped_level(self, closed: tuple[int, ...]) -> SteppedLevel:
-        """The level of closed contacts as the solver has it."""
+    def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
+        """The level of elements in these states as the solver has it."""
 
-    def own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+    def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """(p, f) of its own varying loads at a time [s], in a level."""
 
 
@@ -86,30 +86,30 @@ def exact_step(body: BodyInStep, mbs: Any, motion: ExactMotion, step: Step) -> O
     """Do a step again, exactly, and write what came out if anything happened in it."""
     here, start = body.coordinates, step.state
     own = here.stepped
-    given = body.own_force(start.closed, step.begun) + body.own_force(start.closed, step.time)
+    given = body.own_force(start.states, step.begun) + body.own_force(start.states, step.time)
     force = _significant(here, (here.force(step.before) + here.force(step.after) - given) / 2, step.after)
     around = surroundings_of(body, step.after)
     _check_driven(body, around, step.after)
     state = _start_of(body, step, force)
-    motion.hold(_acting(body, lambda closed: around.told(force, own, closed)), around.inertia)
-    first = motion.advance(state, step.begun, step.time, stop=True, trial=here.rigid)
+    motion.hold(_acting(body, lambda states: around.told(force, own, states)), around.inertia)
+    first = motion.advance(state, step.begun, step.time, stop=True, trial=here.foreseen)
     if not first.changed:
         if step.jumped:
             _write(body, mbs, first.state, force, step.time)
         return Outcome(replace(first.state, level=start.level), (), disturbed=False, most=step.most)
     instant = Instant(first.time, step.time, step.length, first.before, first.state)
     present, change = around.changed_by(mbs, instant, force)
-    there = around.at_event(instant)
-    later = _Later(body, there, _significant(here, present, step.after), body.stepped_level(first.state.closed))
-    if here.rigid:  # a reaction, and with it what an impact leaves closed, depends on the forces that follow
-        motion.hold(_acting(body, lambda c: force if c == start.closed else later.force(c)), there.inertia)
+    there = around.at_event(instant, force)
+    later = _Later(body, there, _significant(here, present, step.after), body.stepped_level(first.state.states))
+    if here.foreseen:  # reactions and accelerations, and with them who holds after it, depend on the forces that follow
+        motion.hold(_acting(body, lambda s: force if s == start.states else later.force(s)), there.inertia)
         first = motion.advance(state, step.begun, step.time, stop=True)
-    end = _last_part(body, motion, first, later, step.time)
-    _write(body, mbs, end.state, later.force(end.state.closed), step.time)
-    events, most = (*first.events, *(() if end is first else end.events)), step.most
+    end, later = _last_part(body, motion, first, later, step.time)
+    _write(body, mbs, end.state, later.force(end.state.states), step.time)
+    events, most = end.events, step.most
     if here.interface is not None:
         reached = there.settled(mbs, instant, change)
-        missed = reached - later.force(end.state.closed)
+        missed = reached - later.force(end.state.states)
         most = _check_resolved(body, there, step, instant, own, end.state, missed)
         _write(body, mbs, end.state, reached, step.time)
     return Outcome(end.state, events, disturbed=here.interface is not None, most=most)
@@ -124,17 +124,32 @@ class _Later:
     present: np.ndarray
     entered: SteppedLevel
 
-    def force(self, closed: tuple[int, ...]) -> np.ndarray:
+    def force(self, states: tuple[int, ...]) -> np.ndarray:
         """(p, f) in a level."""
-        return self.around.told(self.present, self.entered, closed)
+        return self.around.told(self.present, self.entered, states)
+
+    def at(self, state: State) -> _Later:
+        """The same from another instant on, right before which the body is in ``state``."""
+        present = self.force(state.states)
+        around = self.around.deciding(state, present)
+        return _Later(self.body, around, present, self.body.stepped_level(state.states))
 
 
-def _last_part(body: BodyInStep, motion: ExactMotion, first: Reached, later: _Later, until: float) -> Reached:
-    """From the event to the end of the step."""
-    if not first.time < until:
-        return first
-    motion.hold(_acting(body, later.force), later.around.inertia)
-    return motion.advance(first.state, first.time, until)
+def _last_part(
+    body: BodyInStep, motion: ExactMotion, first: Reached, later: _Later, until: float
+) -> tuple[Reached, _Later]:
+    """From the event to the end of the step, with all events; what then acts."""
+    reached, slips = first, body.coordinates.slips
+    while reached.time < until:
+        motion.hold(_acting(body, later.force), later.around.inertia)
+        found = motion.advance(reached.state, reached.time, until, stop=slips, trial=slips)
+        if slips:
+            if found.changed:
+                later = later.at(found.before)
+                motion.hold(_acting(body, later.force), later.around.inertia)
+            found = motion.advance(reached.state, reached.time, until, stop=True)
+        reached = replace(found, events=(*reached.events, *found.events))
+    return reached, later
 
 
 def _acting(body: BodyInStep, force_in: Callable[[tuple[int, ...]], np.ndarray]) -> Callable[[tuple[int, ...]], Acting]:
@@ -142,29 +157,28 @@ def _acting(body: BodyInStep, force_in: Callable[[tuple[int, ...]], np.ndarray])
     here = body.coordinates
     size = here.stepped.size
 
-    def acting(closed: tuple[int, ...]) -> Acting:
-        force = force_in(closed)
-        return Acting(force[:size], here.direct(body.stepped_level(closed)) @ force[size:])
+    def acting(states: tuple[int, ...]) -> Acting:
+        force = force_in(states)
+        return Acting(force[:size], here.direct(body.stepped_level(states)) @ force[size:])
 
     return acting
 
 
 def _start_of(body: BodyInStep, step: Step, force: np.ndarray) -> State:
     """The state at the start of a step, in which a mean force acts."""
-    here, closed = body.coordinates, step.state.closed
-    q, q_t, _ = here.split(step.before)
-    acting = (force + body.own_force(closed, step.begun))[: here.stepped.size]
-    r = step.state.level.level.modes
-    return replace(step.state, displacement=q[:r], velocity=body.stepped_level(closed).velocity(q, q_t, acting)[:r])
+    here, held = body.coordinates, step.state.held
+    stepped, (q, q_t, _) = body.stepped_level(step.state.states), here.split(step.before)
+    acting, r = (force + body.own_force(stepped.states, step.begun))[: here.stepped.size], stepped.modes
+    xi, xi_t = (np.concatenate(parts) for parts in ((q[:r], held), (stepped.velocity(q, q_t, acting)[:r], 0 * held)))
+    return replace(step.state, displacement=xi, velocity=xi_t)
 
 
 def _write(body: BodyInStep, mbs: Any, state: State, force: np.ndarray, time: float) -> None:
     """Put a state at the end of a step into the system, with the acceleration under forces (p, f)."""
-    here, own = body.coordinates, body.own_force(state.closed, time)
-    stepped = body.stepped_level(state.closed)
-    if stepped.closed != here.stepped.closed:
-        here.enter(mbs, stepped, stepped.drive + own[: stepped.size])
-    here.write(stepped, stepped.state(state.displacement, state.velocity, (force + own)[: stepped.size]))
+    here, own = body.coordinates, body.own_force(state.states, time)
+    stepped = body.stepped_level(state.states)
+    here.enter_with(mbs, stepped, state.held, stepped.drive + own[: stepped.size])
+    here.write(stepped, state.held, stepped.state(state.displacement, state.velocity, (force + own)[: stepped.size]))
 
 
 def _significant(here: Coordinates, force: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -184,9 +198,9 @@ def _check_driven(body: BodyInStep, around: Surroundings, x: np.ndarray) -> None
     if around.inertia is None or not here.rigid:
         return
     loaded = here.stepped.loaded
-    eta = here.split(x)[0][: loaded.level.modes]
+    xi = np.concatenate([here.split(x)[0][: here.stepped.modes], here.held])
     for i in around.inertia.held - set(loaded.level.indices):
-        terms = np.append(loaded.level.gap_rows[i] * eta, loaded.gap_constants[i])
+        terms = np.append(loaded.level.gap_rows[i] * xi, loaded.gap_constants[i])
         if np.sum(terms) < -DRIVEN * np.sum(np.abs(terms)):
             name = body.model.contacts[i].name
             raise NumericalFailure(f"body {body.name!r}: what is tied to it drives contact {name!r} into its stop")
@@ -206,14 +220,13 @@ def _check_resolved(
     That is where the force (p, f) that it missed in the end would have done a work that counts, or where body and
     attached masses are left with more than twice the energy they had.
     """
-    eta, eta_t = instant.before
-    before = replace(step.state, level=own.loaded, displacement=eta, velocity=eta_t)
-    bent = 0.5 * float(np.abs(own.loaded.level.squares) @ eta**2)
+    before = instant.before
+    bent = 0.5 * float(np.abs(own.loaded.level.squares) @ before.displacement**2)
     had = around.kinetic(before)
     most = max(step.most, had + bent)
     doubtful = around.kinetic(state) + state.potential - had - before.potential
-    if state.closed == instant.after.closed:
-        moved = state.displacement - instant.after.displacement
+    if state.states == instant.after.states:
+        moved = (state.displacement - instant.after.displacement)[: state.level.modal.modes]
         doubtful = max(doubtful, abs(float(missed[: len(moved)] @ moved)) / (2 * UNRESOLVED))
     if doubtful > most:
         raise NumericalFailure(

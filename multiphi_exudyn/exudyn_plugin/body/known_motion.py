@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Event, Phase, State, event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.time.motion import Motion
@@ -27,7 +28,8 @@ PHASES = tuple(Phase)
 class Moments:
     """States of one level at k times, ``places`` among those that were asked for.
 
-    displacement, velocity: eta, eta' (k, r). phases: numbers (k, c) of those with which the level was entered.
+    displacement, velocity: xi, xi' (k, r + h), held places behind eta. phases: numbers (k, e) of those with which the
+    level was entered.
     """
 
     places: np.ndarray
@@ -42,7 +44,8 @@ class Stretch:
     """A motion up to ``end`` [s]. last: the state there. events: in it, at event_times (k,) [s], where truncation took
     the energies truncated (k,) [J].
 
-    failure: why nothing is known beyond its end, or "". phases (n, c): of all segments, in numbers.
+    failure: why nothing is known beyond its end, or "". phases (n, e): of all segments, in numbers. alone:
+    levels under static loads alone.
     """
 
     end: float
@@ -53,6 +56,7 @@ class Stretch:
     failure: str
     segments: Segments
     phases: np.ndarray
+    alone: LoadedLevels
 
     @functools.cached_property
     def changes(self) -> np.ndarray:
@@ -68,11 +72,20 @@ class Stretch:
         for number in np.unique(numbers).tolist():
             own, level = numbers == number, self.segments.levels[number]
             eta, eta_t = states[:, own, : level.level.modes]
-            yield _moments(known[own], level, eta, eta_t, self.phases[owners[own]])
+            yield self._moments(known[own], level, eta, eta_t, self.phases[owners[own]])
         places = np.flatnonzero(times >= self.end)
         if len(places):
             eta, eta_t = (np.tile(x, (len(places), 1)) for x in (self.last.displacement, self.last.velocity))
-            yield _moments(places, self.last.level, eta, eta_t, _numbers([self.last.phases] * len(places)))
+            yield self._moments(places, self.last.level, eta, eta_t, _numbers([self.last.phases] * len(places)))
+
+    def _moments(
+        self, places: np.ndarray, level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, phases: np.ndarray
+    ) -> Moments:
+        """In the level under static loads alone."""
+        r = level.modal.modes
+        given = slice(r, r + level.excitation.prescribed)
+        alone = self.alone.level(level.states)
+        return Moments(places, alone, np.delete(xi, given, axis=1), np.delete(xi_t, given, axis=1), phases)
 
     def levels(self, until: float) -> Iterator[tuple[Level, float]]:
         """Levels entered up to a time [s], with the largest energy [J] there."""
@@ -98,16 +111,8 @@ class KnownMotion:
         events = trajectory.events
         times, _, _, truncated = event_table(events, motion.model.index).T
         given = motion.state, motion.message, listed(trajectory.segments), motion.record.standings()
-        return Stretch(motion.time, events, times, truncated, *given)
+        return Stretch(motion.time, events, times, truncated, *given, motion.levels.alone)
 
 
 def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:
     return np.array([[PHASES.index(phase) for phase in each] for each in phases], dtype=np.int8)
-
-
-def _moments(
-    places: np.ndarray, level: LoadedLevel, displacement: np.ndarray, velocity: np.ndarray, phases: np.ndarray
-) -> Moments:
-    """In the coordinates eta of the level under static loads alone."""
-    r = level.modal.modes
-    return Moments(places, level.alone, displacement[:, :r], velocity[:, :r], phases)

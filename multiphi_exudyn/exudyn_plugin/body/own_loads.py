@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.exits import signal_rows
+from multiphi_exudyn.events.exits import exits_of, signal_rows
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import (
@@ -36,30 +36,31 @@ CHUNK = 256  # steps whose channels are evaluated at once
 class OwnLoads:
     """Loads on a body of ``size`` coordinates from a time until ``end`` [s].
 
-    loaded: the levels under all of them. levels: those under the static ones.
+    loaded: the levels under all of them. levels: those under the static ones. varies: whether any varies in time, or a
+    surface that elements rub on moves.
     """
 
     def __init__(self, model: MultiPhiModel, loads: Sequence[Load], size: int, time: float, end: float) -> None:
         self.excitation = Excitation.of(model, loads, end, FINER)
         self.loaded = levels_of(model, self.excitation, time, end)
-        self.varies = self.excitation.channels > 0
+        self.varies = self.excitation.prescribed > 0
         self.levels = self.loaded.alone
         self._size = size
         self._jumps = jump_times(self.excitation) if self.varies else np.zeros(0)
         self._step = self._begun = math.nan
-        self._values = np.zeros((0, 2, self.excitation.channels))
+        self._values = np.zeros((0, 2, self.excitation.prescribed))
 
     def take_step(self, step: float) -> None:
         """Steps are of this length [s] from now on."""
         self._step = step
 
-    def forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+    def forces(self, states: tuple[int, ...], times: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) at times (k,) [s], in a level."""
-        return self._forces(closed, self.excitation.values(times))
+        return self._forces(states, self.excitation.values(times))
 
-    def force_at(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+    def force_at(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """The same (s,) at the end of a step."""
-        return self._forces(closed, self._channels(time)[None])[0] if self.varies else np.zeros(self._size)
+        return self._forces(states, self._channels(time)[None])[0] if self.varies else np.zeros(self._size)
 
     def channels_at(self, time: float) -> np.ndarray:
         """w, w' (2 q,) at the end of a step, of which many are evaluated at once."""
@@ -71,50 +72,52 @@ class OwnLoads:
         return first < len(self._jumps) and bool(self._jumps[first] <= end + rounding)
 
     def shown(
-        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, time: np.ndarray
+        self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, held: np.ndarray, time: np.ndarray
     ) -> tuple[LoadedLevel, np.ndarray, np.ndarray]:
-        """Level and coordinates xi, xi' (r + q, k) in which configurations and forces at times (k,) are read."""
-        w, w_t = self.excitation.values(time).transpose(1, 2, 0)
-        return self.loaded.level(stepped.closed), np.vstack([eta, w]), np.vstack([eta_t, w_t])
+        """Level and coordinates xi, xi' (r + q, k) in which configurations and forces at times (k,) are read.
 
-    def stepped(self, closed: tuple[int, ...], step: float | None) -> SteppedLevel:
+        held: places (h, k) that links hold.
+        """
+        w, w_t = self.excitation.values(time).transpose(1, 2, 0)
+        return self.loaded.level(stepped.states), np.vstack([eta, w, held]), np.vstack([eta_t, w_t, 0 * held])
+
+    def stepped(self, states: tuple[int, ...], step: float | None) -> SteppedLevel:
         """The level under the static loads as a solver takes it; step [s]: to which it is matched, or None."""
         levels = self.levels
         return levels.further(
-            closed, ("stepped", step), lambda: SteppedLevel.of(levels.level(closed), self._size, step)
+            states, ("stepped", step), lambda: SteppedLevel.of(levels.level(states), self._size, step)
         )
 
     def conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
-        """What a step has to meet to be clear in a level; direct: L (k, m) of its closed contacts."""
+        """What a step has to meet to be clear in a level; direct: L (k, m) of its links."""
         key = "conditions", stepped.step, step, direct.shape, direct.tobytes()
-        return self.loaded.further(stepped.closed, key, lambda: self._conditions(stepped, step, direct))
+        return self.loaded.further(stepped.states, key, lambda: self._conditions(stepped, step, direct))
 
     def _conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
-        closed, level = stepped.closed, self.loaded.level(stepped.closed)
-        ends = self.loaded.ends(closed)
-        rows = [row for contact, row in enumerate(signal_rows(level)) if contact in ends]
+        level, ends = self.loaded.level(stepped.states), self.loaded.ends(stepped.states)
+        ways = [(*way, row) for way, row in zip(exits_of(level), signal_rows(level), strict=True) if way[0] in ends]
+        rows = [row for *_, row in ways]
         if self.varies:
             return driven_conditions(stepped, level, rows, step)
-        carried = np.zeros((len(rows), direct.shape[1]))
-        for k, contact in enumerate(ends):
-            if contact in closed:
-                carried[k] = direct[closed.index(contact)]
+        carried, links = np.zeros((len(rows), direct.shape[1])), level.level.indices
+        for k, (element, exit_, _) in enumerate(ways):
+            if exit_.force:
+                carried[k] = exit_.force * direct[links.index(element)]
         return plain_conditions(stepped, rows, step, carried)
 
     def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:
         """Phases of a state that was entered with others: who has risen since is armed again."""
-        level, xi, xi_t, reach = self.loaded.level(state.closed), state.displacement, state.velocity, state.reach
-        drive = self.excitation.drive(time)
-        xi, xi_t = np.concatenate([xi, drive.values[0]]), np.concatenate([xi_t, drive.values[1]])
-        reach = np.concatenate([reach, drive.sizes[0]])
+        level, r, drive = self.loaded.level(state.states), state.level.modal.modes, self.excitation.drive(time)
+        given = (state.displacement, drive.values[0]), (state.velocity, drive.values[1]), (state.reach, drive.sizes[0])
+        xi, xi_t, reach = (np.concatenate([x[:r], w, x[r:]]) for x, w in given)
         signs = (row.sign(xi, xi_t, reach) for row in signal_rows(level))
         return tuple(Phase.ARMED if sign > 0 else phase for sign, phase in zip(signs, state.phases, strict=True))
 
-    def _forces(self, closed: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+    def _forces(self, states: tuple[int, ...], values: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) of w, w' (k, 2, q) in a level."""
-        level, forces = self.loaded.level(closed), np.zeros((len(values), self._size))
-        channels = level.channels
-        forces[:, : level.modal.modes] = values[:, 0] @ channels.force.T + values[:, 1] @ channels.force_rate.T
+        level, forces, q = self.loaded.level(states), np.zeros((len(values), self._size)), values.shape[2]
+        force, rate = level.channels.force[:, :q], level.channels.force_rate[:, :q]
+        forces[:, : level.modal.modes] = values[:, 0] @ force.T + values[:, 1] @ rate.T
         return forces
 
     def _channels(self, t: float) -> np.ndarray:

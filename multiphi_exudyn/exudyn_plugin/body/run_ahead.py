@@ -110,10 +110,10 @@ class RunAhead:
     def _write(self, mbs: Any) -> None:
         stops, k, here = self._stops, self._place, self._body.coordinates
         stepped, self._state = stops.levels[k], stops.states[k]
-        if stepped.closed != here.stepped.closed:
-            here.enter(mbs, stepped, stepped.drive)
-        here.write(stepped, self._state)
-        here.store(stops.flags[k])
+        held = here.layout.held(stops.data[k])
+        here.enter_with(mbs, stepped, held, stepped.drive)
+        here.write(stepped, held, self._state)
+        here.store(stops.data[k])
         self._done, self._place = stops.done[k], k + 1
 
     def _next(self) -> float:
@@ -147,7 +147,7 @@ class RunAhead:
             )
 
     def _steps_of(self, stepped: SteppedLevel) -> UndisturbedSteps:
-        return self._steps.get_or_build(stepped.closed, lambda: UndisturbedSteps(stepped, self._step))
+        return self._steps.get_or_build(stepped.states, lambda: UndisturbedSteps(stepped, self._step))
 
     # ------------------------------------------------------------------ what comes
 

@@ -2,11 +2,15 @@
 
     x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (level.py), and L f
 
-Exudyn's own node sensors record eta, its derivatives and the level, and cost next to nothing during a run.
+and of elements with held places T = -lambda, less what they push, and how far their patches have gone.
+
+Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing
+during a run.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +20,7 @@ import numpy as np
 from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.events.exits import state_of
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
@@ -35,7 +40,8 @@ class BodyHistories:
 
     time (k,) [s]; points: name -> displacement (k,) [m]; velocities: name -> (k,) [m/s]; gaps: contact -> (k,) [m];
     contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> [(closed at, opened at), ...] [s];
-    closed: contact -> (k,) bool; events and warnings as in a Trajectory.
+    closed: contact -> (k,) bool; friction_force: friction -> T (k,) [N]; slip: friction -> (k,) [m];
+    stick_intervals: friction -> (m, 2) [s]; events and warnings as in a Trajectory.
     """
 
     time: np.ndarray
@@ -45,6 +51,9 @@ class BodyHistories:
     contact_force: Mapping[str, np.ndarray]
     contact_intervals: Mapping[str, list[tuple[float, float]]]
     closed: Mapping[str, np.ndarray]
+    friction_force: Mapping[str, np.ndarray]
+    slip: Mapping[str, np.ndarray]
+    stick_intervals: Mapping[str, np.ndarray]
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
 
@@ -81,22 +90,27 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     if len(time) == 0:
         raise MultiPhiValueError("sensors: got no stored data, need a run of SolveDynamic before")
     bodies_of(mbs).check_called(float(time[-1]))
-    contacts = [contact.name for contact in body.model.contacts]
-    flags = table["sLevel"][:, 1 : 1 + len(contacts)] > 0.5 if contacts else np.zeros((len(time), 0), bool)
+    data = table["sLevel"][:, 1:] if "sLevel" in table else np.zeros((len(time), 0))
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in RECORDED])
-    values = rebuilt(body, rows, flags, time, stored, np.reshape(on_points, (len(on_points), len(time))))
+    values = rebuilt(body, rows, data, time, stored, np.reshape(on_points, (len(on_points), len(time))))
+    moved, rates, gaps, forces, patches = values
+    contacts = {c.name: i for i, c in enumerate(body.model.contacts) if not c.held}
+    frictions = {c.name: i for i, c in enumerate(body.model.contacts) if c.held}
     return BodyHistories(
         time=time,
-        points=dict(zip(names, values[0], strict=True)),
-        velocities=dict(zip(names, values[1], strict=True)),
-        gaps=dict(zip(contacts, values[2], strict=True)),
-        contact_force=dict(zip(contacts, values[3], strict=True)),
-        contact_intervals={
-            c: _intervals(body.events, c, bool(f[0]), time) for c, f in zip(contacts, flags.T, strict=True)
+        points=dict(zip(names, moved, strict=True)),
+        velocities=dict(zip(names, rates, strict=True)),
+        gaps={name: gaps[i] for name, i in contacts.items()},
+        contact_force={name: forces[i] for name, i in contacts.items()},
+        contact_intervals={name: _intervals(body, i, data, time) for name, i in contacts.items()},
+        closed={name: _holds(body, i, data) for name, i in contacts.items()},
+        friction_force={name: -forces[i] for name, i in frictions.items()},
+        slip={name: patches[i] - patches[i, 0] for name, i in frictions.items()},
+        stick_intervals={
+            name: np.array(_intervals(body, i, data, time)).reshape(-1, 2) for name, i in frictions.items()
         },
-        closed=dict(zip(contacts, flags.T, strict=True)),
         events=tuple(body.events),
         warnings=body.warnings,
     )
@@ -112,40 +126,55 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
 def rebuilt(
     body: MultiPhiBody,
     rows: np.ndarray,
-    flags: np.ndarray,
+    data: np.ndarray,
     time: np.ndarray,
     stored: np.ndarray,
     on_points: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Displacements and velocities of points, gaps and contact forces, each (.., k), level by level.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Displacements and velocities of points, gaps, forces along +h and patches of elements, each (.., k).
 
-    on_points: f (m, k).
+    data: of the levels (k, width), one after the other of which they are rebuilt. on_points: f (m, k). A patch is where
+    an element with a held place touches: that place while the link holds, and while it slips what it would be.
     """
-    k, contacts = len(stored), flags.shape[1]
-    moved, rates = np.zeros((2, len(rows), k))
-    gaps, forces = np.zeros((2, contacts, k))
+    layout, elements = body.coordinates.layout, body.model.contacts
+    k, all_states = len(stored), layout.states(data)
+    moved, velocities = np.zeros((2, len(rows), k))
+    gaps, forces, patches = np.zeros((3, len(elements), k))
     in_base = rows @ body.model.base.modes.shapes
-    for closed in np.unique(flags, axis=0):
-        here = np.flatnonzero(np.all(flags == closed, axis=1))
-        stepped = body.stepped_level(np.flatnonzero(closed).tolist())
-        r, physical = stepped.loaded.level.modes, stepped.physical @ stored[here].T
+    for states in np.unique(all_states, axis=0):
+        here = np.flatnonzero(np.all(all_states == states, axis=1))
+        stepped, held = body.stepped_level(states.tolist()), layout.held(data[here]).T
+        r, physical = stepped.modes, stepped.physical @ stored[here].T
         eta, eta_t = physical[:r], physical[stepped.size : stepped.size + r]
-        loaded, xi, xi_t = body.shown(stepped, eta, eta_t, time[here])
+        loaded, xi, xi_t = body.shown(stepped, eta, eta_t, held, time[here])
         own, rest = loaded.level, loaded.asymptotic
         moved[:, here] = in_base @ (own.vectors @ xi + rest.configuration[:, None])
-        rates[:, here] = in_base @ own.vectors @ xi_t
+        velocities[:, here] = in_base @ own.vectors @ xi_t
         gaps[:, here] = own.gap_rows @ xi + loaded.gap_constants[:, None]
         pushed = own.force_rows @ xi + own.force_rate_rows @ xi_t + rest.forces[:, None]
         pushed += body.coordinates.direct(stepped) @ on_points[:, here]
         forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
-    return moved, rates, gaps, forces
+        for i, state in enumerate(state_of(loaded, i) for i in range(len(elements))):
+            forces[i, here] += state.push
+            patches[i, here] = 0.0 if state.holds else gaps[i, here] - state.stretch
+        patches[list(body.model.held), here[:, None]] += held.T
+    return moved, velocities, gaps, forces, patches
 
 
-def _intervals(events: list[Event], contact: str, closed: bool, time: np.ndarray) -> list[tuple[float, float]]:
-    """[(closed at, opened at), ...] [s] from events; ``closed``: how it starts; instants are left out."""
-    changes = [event.time for event in events if event.contact == contact]
-    if closed and not (changes and changes[0] <= time[0]):
-        changes.insert(0, float(time[0]))
-    if len(changes) % 2:
-        changes.append(float(time[-1]))
-    return [(a, b) for a, b in zip(changes[::2], changes[1::2], strict=True) if b > a]
+def _holds(body: MultiPhiBody, element: int, data: np.ndarray) -> np.ndarray:
+    """When (k,) the link of an element holds."""
+    holds = np.array([state.holds for state in body.model.contacts[element].states])
+    return np.asarray(holds[body.coordinates.layout.states(data)[:, element]])
+
+
+def _intervals(body: MultiPhiBody, element: int, data: np.ndarray, time: np.ndarray) -> list[tuple[float, float]]:
+    """[(from, to), ...] [s] in which the link of an element holds, from events; instants are left out."""
+    contact, end = body.model.contacts[element], float(time[-1])
+    holding = {state.event for state in contact.states if state.holds}
+    changes = [(e.time, e.kind in holding) for e in body.events if e.contact == contact.name]
+    changes = [(float(time[0]), bool(_holds(body, element, data)[0])), *changes, (end, False)]
+    found = list[tuple[float, float]]()
+    for (start, holds), (until, _) in itertools.pairwise(changes):
+        if holds and until > start:
+            found.append((start, until))
+    return found

@@ -11,7 +11,7 @@ with the exact state at t_k, and with the one that Exudyn's own steps make of th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -44,10 +44,10 @@ class KnownBody(Protocol):
     def check_matched(self, step: float) -> None:
         """Raises where steps of this length [s] are not those to which its modes are matched."""
 
-    def stepped_level(self, closed: Sequence[int]) -> SteppedLevel:
-        """The level of closed contacts as the solver has it."""
+    def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
+        """The level of elements in these states as the solver has it."""
 
-    def own_forces(self, closed: tuple[int, ...], times: np.ndarray) -> np.ndarray:
+    def own_forces(self, states: tuple[int, ...], times: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
 
 
@@ -70,7 +70,7 @@ class Departure:
 class Stops:
     """n stops. times: [s]; due: a step that ends at this time [s] or later is the stop. indices: of these steps.
 
-    done: how many changes of the stretch are then behind. levels, states (n, 3, s): what is written; flags (n, 2 c):
+    done: how many changes of the stretch are then behind. levels, states (n, 3, s): what is written; data (n, width):
     what goes into the data node. expected (n, s): q that Exudyn has before, largest (n,): how far the modes have gone
     so far.
     """
@@ -81,7 +81,7 @@ class Stops:
     done: list[int]
     levels: list[SteppedLevel]
     states: np.ndarray
-    flags: np.ndarray
+    data: np.ndarray
     expected: np.ndarray
     largest: list[float]
 
@@ -107,17 +107,17 @@ def stops_of(
     due = times - SAME_PLACE * start.step
     if not (body.varies or missed):
         due = np.minimum(due, coming[first])
-    levels, states, flags = _states(body, stretch, times)
+    levels, states, data = _states(body, stretch, times)
     done = start.done + np.searchsorted(places, stops, side="right")
     expected, reached = _expected(start, stops, levels, states, steps_of)
     largest = np.maximum.accumulate(reached).tolist()
     given = times.tolist(), due.tolist(), (start.index + stops).tolist(), done.tolist()
-    return Stops(*given, levels, states, flags, expected, largest)
+    return Stops(*given, levels, states, data, expected, largest)
 
 
 def swings(stepped: SteppedLevel, states: np.ndarray) -> np.ndarray:
     """How far the modes go (k,) from states (q, q', q'') (k, 3, s): the largest of |q| and |q'| / omega."""
-    omega = stepped.loaded.level.omega
+    omega = stepped.loaded.modal.omega
     periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
     ways = np.abs(states[:, 1, : len(omega)]) * periods
     return np.asarray(np.maximum(_largest(states[:, 0]), _largest(ways)))
@@ -128,19 +128,17 @@ def _largest(rows: np.ndarray) -> np.ndarray:
 
 
 def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray]:
-    """Levels, states (n, 3, s) and flags (n, 2 c) at times (n,) [s], the phases as on entering the level."""
-    here, count = body.coordinates.stepped, len(times)
-    levels, states = [here] * count, np.empty((count, 3, here.size))
-    flags = np.zeros((count, 2 * len(body.model.contacts)))
+    """Levels, states (n, 3, s) and data (n, width) at times (n,) [s], the phases as on entering the level."""
+    here, layout, count = body.coordinates.stepped, body.coordinates.layout, len(times)
+    levels, states, data = [here] * count, np.empty((count, 3, here.size)), np.zeros((count, layout.width))
     for moments in stretch.at(times) if count else ():
-        places, closed = moments.places, moments.level.level.indices
-        stepped, forces = body.stepped_level(closed), body.own_forces(closed, times[places])
-        states[places] = stepped.states(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
-        flags[np.ix_(places, np.array(closed, dtype=int))] = 1.0
-        flags[places, flags.shape[1] // 2 :] = moments.phases
+        places, own = moments.places, moments.level.states
+        stepped, forces = body.stepped_level(own), body.own_forces(own, times[places])
+        states[places] = stepped.shown(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
+        data[places] = layout.rows(own, moments.phases, moments.displacement[:, stepped.modes :])
         for place in places.tolist():
             levels[place] = stepped
-    return levels, states, flags
+    return levels, states, data
 
 
 def _expected(
@@ -155,8 +153,8 @@ def _expected(
     before, counts = np.concatenate([start.state[None], states[:-1]]), np.diff(stops, prepend=0)
     found, given = np.empty((len(stops), start.level.size)), [start.level, *levels[:-1]]
     ways = np.empty(len(stops))
-    numbers = {stepped.closed: (number, stepped) for number, stepped in enumerate(given)}
-    number = np.array([numbers[stepped.closed][0] for stepped in given])
+    numbers = {stepped.states: (number, stepped) for number, stepped in enumerate(given)}
+    number = np.array([numbers[stepped.states][0] for stepped in given])
     for mark, stepped in numbers.values():
         here = number == mark
         found[here] = steps_of(stepped).after(before[here], counts[here])[:, 0]

@@ -9,11 +9,13 @@ solved for, and reactions of rigid contacts are followed by forces on the points
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import PointInertia, Reactions
@@ -28,22 +30,22 @@ class BodyAmongOthers(Protocol):
 
     coordinates: Coordinates
 
-    def stepped_level(self, closed: tuple[int, ...]) -> SteppedLevel:
-        """The level of closed contacts as the solver has it."""
+    def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
+        """The level of elements in these states as the solver has it."""
 
-    def own_force(self, closed: tuple[int, ...], time: float) -> np.ndarray:
+    def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """(p, f) of its own varying loads at a time [s], in a level."""
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Of the first event in a step of length ``step`` that ends at ``end``: its time [s], eta and eta' (r,) right
-    before, the state right after."""
+    """Of the first event in a step of length ``step`` that ends at ``end``: its time [s], the states right
+    before and right after."""
 
     time: float
     end: float
     step: float
-    before: tuple[np.ndarray, np.ndarray]
+    before: State
     after: State
 
     @property
@@ -67,13 +69,13 @@ class Surroundings:
     inertia: PointInertia | None
     reactions: Reactions | None
 
-    def told(self, force: np.ndarray, given: SteppedLevel, closed: tuple[int, ...]) -> np.ndarray:
-        """(p, f) of one level in another, with the forces that follow from other reactions of rigid contacts."""
-        here, wanted = self.body.coordinates, self.body.stepped_level(closed)
+    def told(self, force: np.ndarray, given: SteppedLevel, states: tuple[int, ...]) -> np.ndarray:
+        """(p, f) of one level in another, with the forces that follow from those of other elements."""
+        here, wanted = self.body.coordinates, self.body.stepped_level(states)
         carried = here.carried(force, given, wanted)
         if self.reactions is None or here.interface is None:
             return carried
-        change = self.reactions.at(closed) - self.reactions.at(given.closed)
+        change = self.reactions.at(wanted.loaded) - self.reactions.at(given.loaded)
         return carried + np.concatenate([change @ here.interface.of(wanted).rows, change])
 
     def changed_by(self, mbs: Any, instant: Instant, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -82,32 +84,46 @@ class Surroundings:
         That is of accelerations (n,) where something hangs on the points, else of forces (n,).
         """
         body, here, after = self.body, self.body.coordinates, instant.after
-        own, entered = here.stepped, body.stepped_level(after.closed)
-        given, there = body.own_force(own.closed, instant.end), body.own_force(after.closed, instant.end)
-        here.write(own, own.state(*instant.before, (force + given)[: own.size]))
+        own, entered = here.stepped, body.stepped_level(after.states)
+        given, there = body.own_force(own.states, instant.end), body.own_force(after.states, instant.end)
+        before = instant.before
+        here.write(own, before.held, own.state(before.displacement, before.velocity, (force + given)[: own.size]))
         shown = entered.state(
-            after.displacement, after.velocity, (self.told(force, own, after.closed) + there)[: own.size]
+            after.displacement, after.velocity, (self.told(force, own, after.states) + there)[: own.size]
         )
         if self.inertia is None or self.system is None or self.hanging is None:
             felt = here.felt(mbs, own)
-            here.write(entered, shown)
+            here.write(entered, after.held, shown)
             changed = here.felt(mbs, entered)
         else:
             left, felt = self.system.present(), here.seen(self.system.accelerations(instant.step))
-            if entered.closed != own.closed:
-                here.enter(mbs, entered, entered.drive)
-            here.write(entered, shown)
+            here.enter_with(mbs, entered, after.held, entered.drive)
+            here.write(entered, after.held, shown)
             self.system.follow(self.hanging, left)
             changed = here.seen(self.system.accelerations(instant.step))
         return changed.acting + here.carried(force - felt.acting, own, entered), changed.whole - felt.whole
 
-    def at_event(self, instant: Instant) -> Surroundings:
-        """The same with what hung on the points at the event: joints may have turned since."""
+    def at_event(self, instant: Instant, force: np.ndarray) -> Surroundings:
+        """The same with what hung on the points at the event: joints may have turned since. force: (p, f) before it."""
         here = self.body.coordinates
-        if self.system is None or self.inertia is None or not here.rigid:
+        if self.system is None or self.inertia is None or not here.foreseen:
             return self
         hanging = self.system.hanging(self.unmoved, here.stepped.mass, instant.elapsed)
-        return replace(self, hanging=hanging, inertia=_inertia(self.body, hanging))
+        found = replace(self, hanging=hanging, inertia=_inertia(self.body, hanging))
+        return found.deciding(instant.before, force)
+
+    def deciding(self, state: State, force: np.ndarray) -> Surroundings:
+        """The same with the forces that go with others in another level right after a state, in which (p, f) acts.
+
+        Stick and slip exclude each other only if they are told from one acceleration.
+        """
+        if self.hanging is None or self.inertia is None or not self.body.coordinates.slips:
+            return self
+        own, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
+        x, v = state.displacement, state.velocity
+        eta_tt = state.level.asymptotic.drive + force[:r] - own.damping @ v[:r] - own.squares * x[:r]
+        reactions = _reactions_of(self.body, self.hanging, state.level, (x, v, eta_tt), force[s:])
+        return replace(self, reactions=reactions)
 
     def settled(self, mbs: Any, instant: Instant, change: np.ndarray) -> np.ndarray:
         """(p, f) at the end of the step, where all has followed the body since the event; change: what it changed."""
@@ -127,7 +143,7 @@ class Surroundings:
         """Kinetic energy [J] of the body and of what its points carry."""
         if self.hanging is None or self.inertia is None:
             return state.kinetic
-        speeds = _rows_in(self.body, state.closed) @ state.velocity
+        speeds = _rows_in(self.body, state.states) @ state.velocity[: state.level.modal.modes]
         return state.kinetic + 0.5 * float(speeds @ self.hanging.attached.mass @ speeds)
 
 
@@ -140,16 +156,25 @@ def surroundings_of(body: BodyAmongOthers, x: np.ndarray) -> Surroundings:
     unmoved = system.present()
     hanging = system.hanging(unmoved, here.stepped.mass)
     inertia = _inertia(body, hanging)
-    if inertia is None or not here.rigid:
+    if inertia is None or not here.foreseen:
         return Surroundings(body, system, unmoved, hanging, inertia, None)
-    level, closed = here.stepped.loaded.level, here.stepped.closed
     physical = here.stepped.physical @ np.concatenate(here.split(x))
-    eta, eta_t, eta_tt = (part[: level.modes] for part in np.split(physical, 3))
-    carried = here.stepped.loaded.asymptotic.forces + here.direct(here.stepped) @ here.interface.forces
-    pushed = carried + level.force_rows @ eta + level.force_rate_rows @ eta_t
-    rows = here.interface.in_base(level.base)
-    reactions = Reactions(hanging.attached, level.base, rows, level.vectors @ eta_tt, closed, pushed)
+    eta, eta_t, eta_tt = (part[: here.stepped.modes] for part in np.split(physical, 3))
+    motion = np.concatenate([eta, here.held]), np.concatenate([eta_t, 0 * here.held]), eta_tt
+    reactions = _reactions_of(body, hanging, here.stepped.loaded, motion, here.interface.forces)
     return Surroundings(body, system, unmoved, hanging, inertia, reactions)
+
+
+def _reactions_of(
+    body: BodyAmongOthers, hanging: Hanging, loaded: LoadedLevel, motion: Sequence[np.ndarray], points: np.ndarray
+) -> Reactions:
+    """Forces that follow those of elements; motion: xi, xi', eta'' in a level; points: f (m,)."""
+    (x, v, eta_tt), level, here = motion, loaded.level, body.coordinates
+    assert here.interface is not None
+    carried = loaded.asymptotic.forces + here.direct(body.stepped_level(loaded.states)) @ points
+    pushed = carried + level.force_rows @ x + level.force_rate_rows @ v
+    rows = here.interface.in_base(level.base)
+    return Reactions(hanging.attached, level.base, rows, loaded.modal.vectors @ eta_tt, loaded, pushed)
 
 
 def _inertia(body: BodyAmongOthers, hanging: Hanging) -> PointInertia | None:
@@ -157,11 +182,11 @@ def _inertia(body: BodyAmongOthers, hanging: Hanging) -> PointInertia | None:
     if hanging.only_forces or interface is None:
         return None
     base = body.coordinates.stepped.loaded.level.base
-    return PointInertia(hanging.attached, base, interface.in_base(base), lambda closed: _rows_in(body, closed))
+    return PointInertia(hanging.attached, base, interface.in_base(base), lambda states: _rows_in(body, states))
 
 
-def _rows_in(body: BodyAmongOthers, closed: tuple[int, ...]) -> np.ndarray:
+def _rows_in(body: BodyAmongOthers, states: tuple[int, ...]) -> np.ndarray:
     """R (m, r) in a level."""
-    stepped, interface = body.stepped_level(closed), body.coordinates.interface
+    stepped, interface = body.stepped_level(states), body.coordinates.interface
     assert interface is not None
-    return interface.of(stepped).rows[:, : stepped.loaded.level.modes]
+    return interface.of(stepped).rows[:, : stepped.modes]

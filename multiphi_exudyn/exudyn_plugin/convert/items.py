@@ -1,7 +1,8 @@
 """Items of an Exudyn system, as GetObject and GetLoad tell them, and what a reduction makes of each.
 
 Contacts of a model are ObjectContactCoordinate with a linear law and the limit stops of
-ObjectConnectorCoordinateSpringDamperExt; everything else is a matrix, a constraint, a load, or left out with a reason.
+ObjectConnectorCoordinateSpringDamperExt, its friction that of the latter (frictions.py); everything else is a matrix,
+a constraint, a load, or left out with a reason.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ __all__ = [
     "Item",
     "grouped",
     "has_contact",
+    "has_friction",
     "has_stops",
     "is_constraint",
     "is_curved",
@@ -32,11 +34,12 @@ __all__ = [
 INACTIVE = "not active"
 HELD_GAP = "constraints hold its gap"
 HELD_GAPS = "constraints hold the gaps of its limit stops"
-IDLE = (INACTIVE, HELD_GAP, HELD_GAPS)  # reasons for which leaving an item out changes no motion
+HELD_FRICTION = "constraints hold the coordinate of its friction"
+IDLE = (INACTIVE, HELD_GAP, HELD_GAPS, HELD_FRICTION)  # reasons for which leaving an item out changes no motion
 NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"
-_FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor", "stickingStiffness")
+_FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor")
 _LINEAR = {"Mass1D", "RotationalMass1D", "MassPoint", "MassPoint2D", "ConnectorCoordinateSpringDamper", _EXT}
 _LINEAR |= {"GenericODE2"}
 _ONE_SIDED = {
@@ -65,6 +68,12 @@ def has_stops(item: Mapping[str, Any]) -> bool:
 def has_contact(item: Mapping[str, Any]) -> bool:
     """True for an active object that gives the model one contact or two."""
     return _is_active(item) and (has_stops(item) or (_is_contact(item) and not _refusal(item)))
+
+
+def has_friction(item: Mapping[str, Any]) -> bool:
+    """True for an active connector with friction of its own law."""
+    rubs = item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION)
+    return rubs and _is_active(item) and not user_function(item)
 
 
 def is_constraint(item: Mapping[str, Any]) -> bool:
@@ -101,16 +110,18 @@ def value_key(load: Mapping[str, Any]) -> str:
 
 
 def taken_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> Iterator[Item]:
-    """Objects of the model; contacts: the names of its contacts."""
+    """Objects of the model; contacts: the names of its contacts and frictions."""
     for i, item in enumerate(objects):
         if _is_active(item) and (not _is_contact(item) or item["name"] in contacts):
             yield _object_item(i, item, _became(item, contacts))
 
 
-def left_out_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> Iterator[tuple[Item, str]]:
-    """Objects that are no part of the model, or not as a whole, with the reason."""
+def left_out_objects(
+    objects: Sequence[Mapping[str, Any]], contacts: Collection[str], frictions: Mapping[int, str]
+) -> Iterator[tuple[Item, str]]:
+    """Objects that are no part of the model, or not as a whole, with the reason; frictions: reasons of theirs."""
     for i, item in enumerate(objects):
-        reason = _reason(item, contacts)
+        reason = _reason(item, contacts, frictions.get(i, ""))
         if reason:
             yield _object_item(i, item), reason
 
@@ -172,7 +183,7 @@ def _refusal(item: Mapping[str, Any]) -> str:
     return ""
 
 
-def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
+def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str) -> str:
     """Why an object, or a part of it, is left out; empty if it is not."""
     if not _is_active(item):
         return INACTIVE
@@ -180,8 +191,10 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return _refusal(item) or HELD_GAP
     if has_stops(item) and not _stops(item, contacts):
         return HELD_GAPS
-    if item["objectType"] == _EXT and any(float(item[name]) for name in _FRICTION):
-        return "friction"
+    if friction:
+        return friction
+    if has_friction(item) and item["name"] not in contacts:
+        return HELD_FRICTION
     if item["objectType"] in _ONE_SIDED:
         return _ONE_SIDED[item["objectType"]]
     if is_constraint(item) and (user_function(item).startswith("offset") or _prescribes_velocity(item)):
@@ -202,11 +215,13 @@ def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
         return "ground"
     if is_constraint(item):
         return "constraint, its directions taken out"
-    stops = _stops(item, contacts)
-    if not stops:
-        return _matrices(item)
-    law = f"{item['limitStopsStiffness']:g} N/m{_damper(item['limitStopsDamping'])}"
-    return f"{_matrices(item)}; contacts {', '.join(stops)}, {law}"
+    parts = [_matrices(item)]
+    if stops := _stops(item, contacts):
+        law = f"{item['limitStopsStiffness']:g} N/m{_damper(item['limitStopsDamping'])}"
+        parts.append(f"contacts {', '.join(stops)}, {law}")
+    if has_friction(item) and item["name"] in contacts:
+        parts.append(f"friction, {item['dynamicFrictionForce']:g} N by a bristle of {item['stickingStiffness']:g} N/m")
+    return "; ".join(parts)
 
 
 def _stops(item: Mapping[str, Any], contacts: Collection[str]) -> list[str]:

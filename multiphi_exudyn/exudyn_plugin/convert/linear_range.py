@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Extent, Linearisation
+from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
@@ -101,7 +103,7 @@ class LinearRange:
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
         extent = Extent(reach, float(np.max(sizes)), float(np.max(speeds) / np.max(sizes)))
-        known = [contact.name for contact in trajectory.model.contacts if contact.name in linear.contacts]
+        known = [contact for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.beside(self._mbs) as compared:
             errors = [
                 compared.error(
@@ -110,7 +112,7 @@ class LinearRange:
                     extent,
                     TOLERANCE,
                     t,
-                    {name: float(trajectory.contact_force(name, t)) for name in known},
+                    {contact.name: _pushing(trajectory, contact, t) for contact in known},
                 )
                 for t in times
             ]
@@ -175,6 +177,13 @@ class LinearLimits:
         if self._reason:
             return RangeCheck(samples, np.zeros(SAMPLES), self._reason)
         return RangeCheck(samples, TOLERANCE * np.max(np.abs(self._rows @ z) / self._limits[:, None], axis=0))
+
+
+def _pushing(trajectory: Trajectory, contact: Contact, t: float) -> float:
+    """Force [N] along its direction that a contact, or a friction, exerts on the structure at t [s]."""
+    if isinstance(contact, Friction):
+        return -float(trajectory.friction_force(contact.name, t))
+    return float(trajectory.contact_force(contact.name, t))
 
 
 def _sampled(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

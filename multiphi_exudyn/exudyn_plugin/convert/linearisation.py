@@ -96,9 +96,10 @@ class Compared:
         time: float = 0.0,
         contacts: Mapping[str, float] | None = None,
     ) -> float:
-        """The error at displacement and velocity (n,), at a time [s] of the run, under contact forces [N] by name.
+        """The error at displacement and velocity (n,), at a time [s] of the run.
 
-        enough: an error that is small; stiff modes relax only as long as it is larger.
+        contacts: forces [N] of contacts and frictions by name. enough: an error that is small; stiff modes relax only
+        as long as it is larger.
         """
         linear = self._linear
         nothing = np.zeros(len(linear.displacement))

@@ -1,6 +1,6 @@
-"""Reduction of an Exudyn system: its linearisation at the current state, its contacts and stops, as a model.
+"""Reduction of an Exudyn system: its linearisation at the current state, its contacts, stops and friction, as a model.
 
-    q = q_0 + S z,   M z'' + C z' + K z = p + (contact forces),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
+    q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
 q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
 friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
@@ -21,6 +21,7 @@ import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.convert.frictions import frictions_of
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, smooth
 from multiphi_exudyn.exudyn_plugin.convert.items import (
     Item,
@@ -43,6 +44,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Load
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -113,7 +115,8 @@ def reduce(
 
     modes: of every level, as in MultiPhiModel; a number the system does not have means all of them.
     points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
-    ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``.
+    ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``; friction is that of
+    the latter where it is the law of ``mp.Friction``, with the object's name.
 
     strict: whether to refuse a system of which something is left out, instead of a warning of every run.
 
@@ -128,7 +131,11 @@ def reduce(
             linear = linearised(mbs, now)
             varying = timed_loads(mbs, loads, now)
         rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
-        full_contacts = [c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i])]
+        frictions = frictions_of(mbs, objects)
+        full_contacts: list[UnilateralContact | Friction] = [
+            c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i])
+        ]
+        full_contacts += [friction for friction in frictions.values() if isinstance(friction, Friction)]
     full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
     timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
     own = linear.damping if np.any(linear.damping) else None
@@ -139,7 +146,7 @@ def reduce(
     names = {c.name for c in moving}
     taken = (*taken_objects(objects, names), *_taken_loads(loads, timed))
     left_out = (
-        *left_out_objects(objects, names),
+        *left_out_objects(objects, names, {i: reason for i, reason in frictions.items() if isinstance(reason, str)}),
         *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
         *left_out_functions(mbs),
     )

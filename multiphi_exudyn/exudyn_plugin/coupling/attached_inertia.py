@@ -22,13 +22,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.events.exits import state_of
 from multiphi_exudyn.events.impact import IMMOVABLE
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
 
 __all__ = ["AttachedInertia", "PointInertia", "Reactions"]
 
 ROUND_OFF = 1e-15  # of the largest singular value: below it one is zero
-RowsIn = Callable[[tuple[int, ...]], np.ndarray]  # R (m, r) by the closed contacts of a level
+RowsIn = Callable[[tuple[int, ...]], np.ndarray]  # R (m, r) by the states of a level
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class AttachedInertia:
 
     def immovable(self, base: ModalBase, in_base: np.ndarray) -> set[int]:
         """Rigid contacts that cannot move for what is attached."""
-        rigid = np.flatnonzero(np.isinf(base.stiffnesses))
+        rigid = _striking(base)
         directions = base.directions[:, rigid]
         moved = directions + in_base.T @ self.reactions(in_base, directions)
         left = np.sum(directions * moved, axis=0) <= IMMOVABLE * np.sum(directions**2, axis=0)
@@ -81,10 +83,10 @@ class AttachedInertia:
 
 
 class Reactions:
-    """Forces on the points of a body that follow from the reactions of closed rigid contacts, at one instant.
+    """Forces on the points of a body that follow from those of its elements at one instant.
 
-    rows: R (m, b) of the points in base coordinates. acceleration: y'' (b,) of the body in the level it is in, where
-    the contacts ``closed`` push with the forces ``reactions`` (k,) [N].
+    These are the reactions of rigid links, and what elements push. rows: R (m, b) of the points in base coordinates.
+    acceleration: y'' (b,) of the body in ``level``, where links hold with the forces ``reactions`` (k,) [N].
     """
 
     def __init__(
@@ -93,32 +95,43 @@ class Reactions:
         base: ModalBase,
         rows: np.ndarray,
         acceleration: np.ndarray,
-        closed: tuple[int, ...],
+        level: LoadedLevel,
         reactions: np.ndarray,
     ) -> None:
         self._attached, self._base, self._rows = attached, base, rows
-        directions, answers = self._answers(closed)
-        pushed = reactions[np.isinf(base.stiffnesses[list(closed)])]
-        self._acceleration = acceleration - (directions + rows.T @ answers) @ pushed  # of the body they let go
+        directions, answers = self._answers(level)
+        pushed = reactions[np.isinf(base.stiffnesses[list(level.level.indices)])]
+        push, answer = self._push(level)
+        held = (directions + rows.T @ answers) @ pushed + push + rows.T @ answer
+        self._acceleration = acceleration - held  # of the body they let go
 
-    def at(self, closed: tuple[int, ...]) -> np.ndarray:
-        """The forces (m,) in a level, beside those of a level without closed rigid contacts."""
-        directions, answers = self._answers(closed)
+    def at(self, level: LoadedLevel) -> np.ndarray:
+        """The forces (m,) in a level, beside those of one without rigid links that hold, and without pushes."""
+        directions, answers = self._answers(level)
+        push, answer = self._push(level)
+        acceleration = self._acceleration + push + self._rows.T @ answer
         mobility, ways = self._attached.mobilities(directions, self._rows)
         moving = mobility > IMMOVABLE
-        pushed = ways[:, moving] @ ((ways[:, moving].T @ (directions.T @ self._acceleration)) / mobility[moving])
-        return np.asarray(-answers @ pushed)
+        pushed = ways[:, moving] @ ((ways[:, moving].T @ (directions.T @ acceleration)) / mobility[moving])
+        return np.asarray(answer - answers @ pushed)
 
-    def _answers(self, closed: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """H (b, k) of the closed rigid contacts, and the forces (m, k) that follow unit reactions."""
-        directions = self._base.directions[:, [i for i in closed if np.isinf(self._base.stiffnesses[i])]]
+    def _answers(self, level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
+        """H (b, k) of the rigid links that hold, and the forces (m, k) that follow unit reactions."""
+        rigid = [i for i in level.level.indices if np.isinf(self._base.stiffnesses[i])]
+        directions = self._base.directions[:, rigid]
         return directions, self._attached.reactions(self._rows, directions)
+
+    def _push(self, level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
+        """What elements push (b,), and the forces (m,) that follow."""
+        pushes = [state_of(level, i).push for i in range(len(level.states))]
+        push = self._base.directions @ np.array(pushes)
+        return push, self._attached.reactions(self._rows, push)
 
 
 class PointInertia:
     """What hangs on the points of a body during a step, as its levels see it (modal_force.py).
 
-    in_base: R (m, b) of the points in base coordinates. rows_in: R (m, r) by the closed contacts of a level.
+    in_base: R (m, b) of the points in base coordinates. rows_in: R (m, r) by the states of a level.
     """
 
     independence = math.sqrt(IMMOVABLE)
@@ -132,9 +145,9 @@ class PointInertia:
         """Contacts that cannot move for what is attached: what is left of their gaps is round-off of constraints."""
         return self._attached.immovable(self._base, self._in_base)
 
-    def mobility(self, closed: tuple[int, ...]) -> np.ndarray:
+    def mobility(self, states: tuple[int, ...]) -> np.ndarray:
         """F (r, r) of a level's B = F F^T."""
-        rows, impedance = self._rows_in(closed), self._impedance(closed)
+        rows, impedance = self._rows_in(states), self._impedance(states)
         shares, ways = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ (impedance + impedance.T) @ rows / 2)
         return np.asarray(ways * np.sqrt(np.maximum(shares, 0.0)))
 
@@ -145,7 +158,7 @@ class PointInertia:
 
     def directions(self, units: np.ndarray) -> np.ndarray:
         """Vectors (c, b) whose products are u.B u', of the directions u (c, b) of contacts; zero for compliant ones."""
-        rigid, found = np.flatnonzero(np.isinf(self._base.stiffnesses)), np.zeros_like(units)
+        rigid, found = _striking(self._base), np.zeros_like(units)
         directions = units[rigid].T
         moved = directions + self._in_base.T @ self._attached.reactions(self._in_base, directions)
         products = directions.T @ moved
@@ -154,7 +167,13 @@ class PointInertia:
         found[rigid, : left.shape[1]] = left
         return found
 
-    def _impedance(self, closed: tuple[int, ...]) -> np.ndarray:
-        if closed not in self._impedances:
-            self._impedances[closed] = self._attached.impedance(self._rows_in(closed))
-        return self._impedances[closed]
+    def _impedance(self, states: tuple[int, ...]) -> np.ndarray:
+        if states not in self._impedances:
+            self._impedances[states] = self._attached.impedance(self._rows_in(states))
+        return self._impedances[states]
+
+
+def _striking(base: ModalBase) -> np.ndarray:
+    """Positions of the elements that are struck where their links begin to hold."""
+    held = np.array([contact.held for contact in base.contacts], bool)
+    return np.flatnonzero(np.isinf(base.stiffnesses) & ~held)

@@ -31,13 +31,13 @@ ROOM = 32  # segments of a step that are recorded before they are taken
 class Reached:
     """state at ``time`` [s]; changed: whether anything happened on the way, and the events, not of a trial.
 
-    before: eta, eta' (r,) right before the last instant.
+    before: the state right before the last instant.
     """
 
     time: float
     state: State
     changed: bool
-    before: tuple[np.ndarray, np.ndarray]
+    before: State
     events: tuple[Event, ...]
 
 
@@ -58,13 +58,16 @@ class ExactMotion:
         self._decisions, self._last_decision = 0, time
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
-        """From now on these forces act, by the closed contacts of a level, and this hangs on the structure."""
+        """From now on these forces act, by the states of a level, and this hangs on the structure."""
         if self._arrays.full:
             self._forces.forget()
         self._forces.hold(acting, inertia)
 
     def advance(self, state: State, time: float, until: float, stop: bool = False, trial: bool = False) -> Reached:
-        """From a state at a time [s] until another; stop: no further than an event; trial: it is done once more."""
+        """From a state at a time [s] until another; stop: no further than an event; trial: it is done once more.
+
+        A trial that fails ends there, in the state right before.
+        """
         arrays = self._arrays
         level = arrays.level(state.level.states)
         arrays.begin_record()
@@ -81,8 +84,7 @@ class ExactMotion:
         if not trial:
             self._take_ring()
         after, end = self._state(a.CURRENT), float(arrays.numbers[a.TIME])
-        before = self._state(a.REACHED) if stop else after
-        return Reached(end, after, changed, (before.displacement, before.velocity), events)
+        return Reached(end, after, changed, self._state(a.REACHED) if stop else after, events)
 
     def _put_ring(self) -> None:
         """The ring of the chatter check into the arrays, which other bodies use too."""
@@ -103,10 +105,10 @@ class ExactMotion:
     def _set_out(self, level: int, state: State, time: float) -> None:
         """A state at a time [s] into the arrays."""
         arrays, centre = self._arrays, self._forces.centre(level)
-        place, speed = state.displacement - centre, state.velocity
-        arrays.numbers[a.TIME] = time
+        r, arrays.numbers[a.TIME] = len(centre), time
+        (eta, held), (eta_t, still) = (np.split(xi, [r]) for xi in (state.displacement, state.velocity))
         w, w_t = arrays.channels.at(arrays.buffers, time)
-        place, speed = np.concatenate([place, w]), np.concatenate([speed, w_t])
+        place, speed = np.concatenate([eta - centre, w, held]), np.concatenate([eta_t, w_t, still])
         arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
 
     def _run(self, until: float, trial: bool) -> tuple[bool, tuple[Event, ...]]:
@@ -122,10 +124,10 @@ class ExactMotion:
                 changed = True
                 events += [] if trial else self._events()
             arrays.begin_record()
-            if answer == a.FAILED:
+            if answer == a.FAILED and not trial:
                 raise self._motion.failure()
             if answer not in (a.FULL, a.NEED):
-                return changed, tuple(events)
+                return changed or answer == a.FAILED, tuple(events)
 
     def _events(self) -> list[Event]:
         """What the loop has recorded, which is then forgotten."""
@@ -137,11 +139,13 @@ class ExactMotion:
         """A state of the run record, under static loads."""
         ints, numbers = self._arrays.ints, self._arrays.numbers
         record = int(ints[place + a.LEVEL])
-        level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].level.indices)
-        r, phases = level.level.modes, ints[ints[place + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-        eta = numbers[ints[place + a.PLACE] :][:r] + self._forces.centre(record)
-        eta_t = numbers[ints[place + a.SPEED] :][:r].copy()
-        return State(level, eta, eta_t, tuple(PHASES[k] for k in phases.tolist()))
+        level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].states)
+        r, phases = level.modal.modes, ints[ints[place + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
+        given = slice(r, r + int(ints[a.PRESCRIBED]))
+        n = r + int(ints[a.CHANNELS])
+        xi, xi_t = (np.delete(numbers[ints[place + part] :][:n], given) for part in (a.PLACE, a.SPEED))
+        xi[:r] += self._forces.centre(record)
+        return State(level, xi, xi_t, tuple(PHASES[k] for k in phases.tolist()))
 
 
 def _forces_in(levels: LoadedLevels) -> HeldForces:

@@ -61,14 +61,19 @@ def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[st
 
 @dataclass(frozen=True)
 class _Reading:
-    """y = R q + c in one level. rows: R (m, s). offset: c (m,).
+    """y = R q + c in one level. rows: R (m, s). offset: c (m,), at places that links hold (h,), constant + moved . w.
 
     direct: L (k, m), what f adds to the forces of the closed contacts beside its modes' share.
     """
 
     rows: np.ndarray
-    offset: np.ndarray
+    constant: np.ndarray
+    moved: np.ndarray
     direct: np.ndarray
+
+    def offset(self, held: np.ndarray) -> np.ndarray:
+        """c (m,)."""
+        return self.constant + self.moved @ held
 
 
 class Interface:
@@ -88,11 +93,11 @@ class Interface:
         self._known: BoundedCache[tuple[int, ...], _Reading] = BoundedCache(most)
         self._mbs = mbs
 
-    def add(self, node: Any, stepped: SteppedLevel, q: np.ndarray, q_t: np.ndarray) -> None:
-        """Add nodes and ties for a body whose node holds q, q' (s,) in a level."""
+    def add(self, node: Any, stepped: SteppedLevel, held: np.ndarray, q: np.ndarray, q_t: np.ndarray) -> None:
+        """Add nodes and ties for a body whose node holds q, q' (s,) in a level, with places that links hold (h,)."""
         found, mbs = self.of(stepped), self._mbs
         own = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node))
-        for name, row, constant in zip(self._names, found.rows, found.offset, strict=True):
+        for name, row, constant in zip(self._names, found.rows, found.offset(held), strict=True):
             point = mbs.AddNode(
                 NodeGenericODE2(
                     name=f"Node:{self._name}.{name}",
@@ -124,15 +129,16 @@ class Interface:
 
     def of(self, stepped: SteppedLevel) -> _Reading:
         """R and c of a level."""
-        return self._known.get_or_build(stepped.closed, lambda: self._read(stepped))
+        return self._known.get_or_build(stepped.states, lambda: self._read(stepped))
 
     def _read(self, stepped: SteppedLevel) -> _Reading:
-        level = stepped.loaded.level
+        loaded = stepped.loaded
+        level = loaded.modal
         rows = np.zeros((len(self._rows), stepped.size))
         in_base = self.in_base(level.base)
         rows[:, : level.modes] = drop_round_off(in_base @ level.vectors, np.abs(in_base) @ np.abs(level.vectors))
         direct = _reactions(level, in_base, rows[:, : level.modes])
-        return _Reading(rows, in_base @ stepped.loaded.asymptotic.configuration, direct)
+        return _Reading(rows, in_base @ loaded.asymptotic.configuration, in_base @ loaded.channels.shapes, direct)
 
     def in_base(self, base: ModalBase) -> np.ndarray:
         """The points (m, b) in base coordinates."""
@@ -150,22 +156,22 @@ class Interface:
         """f (m,) in the system's current state."""
         return np.asarray(self._forces[self.multipliers])
 
-    def load(self, stepped: SteppedLevel) -> None:
-        """Give the ties R and c of a level."""
+    def load(self, stepped: SteppedLevel, held: np.ndarray) -> None:
+        """Give the ties R and c of a level, with places that links hold (h,)."""
         found = self.of(stepped)
-        for tie, row, constant in zip(self.ties, found.rows, found.offset, strict=True):
+        for tie, row, constant in zip(self.ties, found.rows, found.offset(held), strict=True):
             self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
             self._mbs.SetObjectParameter(tie, "offset", [constant])
 
-    def write(self, stepped: SteppedLevel, coordinates: Iterable[np.ndarray]) -> None:
-        """Write y, y', y'' of q, q', q'' (s,)."""
+    def write(self, stepped: SteppedLevel, held: np.ndarray, coordinates: Iterable[np.ndarray]) -> None:
+        """Write y, y', y'' of q, q', q'' (s,), with places that links hold (h,)."""
         found = self.of(stepped)
-        for view, values, constant in zip(self._views, coordinates, (found.offset, 0.0, 0.0), strict=True):
+        for view, values, constant in zip(self._views, coordinates, (found.offset(held), 0.0, 0.0), strict=True):
             view[self.places] = found.rows @ values + constant
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""
-        if given.closed == wanted.closed:
+        if given.states == wanted.states:
             return force
         modal, points = force[: given.size], force[given.size :]
         return np.concatenate([modal + points @ (self.of(wanted).rows - self.of(given).rows), points])

@@ -19,6 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.exits import after, exits_of, way_back
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
@@ -34,7 +35,7 @@ def shift(level: Level, force: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Acting:
-    """What acts in a level: a modal force (s,), and what closed contacts carry of forces on points, L f (k,) [N]."""
+    """What acts in a level: a modal force (s,), and what links that hold carry of forces on points, L f (k,) [N]."""
 
     force: np.ndarray
     reactions: np.ndarray
@@ -45,7 +46,7 @@ class Inertia(Protocol):
 
     independence: float  # of directions of length one that it leaves: what is left beside others if they are redundant
 
-    def mobility(self, closed: tuple[int, ...]) -> np.ndarray:
+    def mobility(self, states: tuple[int, ...]) -> np.ndarray:
         """F (r, r) of a level's B = F F^T."""
 
     def velocity_map(self, source: tuple[int, ...], target: tuple[int, ...], matrix: np.ndarray) -> np.ndarray:
@@ -67,7 +68,7 @@ class _Level:
     ``energy``. exits: their records; elements: theirs. ends: what is looked at; mobility: where F has its place.
     """
 
-    closed: tuple[int, ...]
+    states: tuple[int, ...]
     inverse: np.ndarray
     places: np.ndarray
     constants: np.ndarray
@@ -90,7 +91,7 @@ class HeldForces:
         self._levels = dict[int, _Level]()
         self._shifts = dict[int, np.ndarray]()
         self._offsets = dict[int, np.ndarray]()  # of maps
-        self._rates = dict[int, int]()  # where maps have the velocities of what hangs on the points
+        self._rates = dict[int, tuple[int, int]]()  # where maps have velocities: the plain ones, and of what hangs
         self._entered = dict[int, float]()  # constants, by exit
         self._acting: Callable[[tuple[int, ...]], Acting] = _nothing
         self._inertia: Inertia | None = None
@@ -101,7 +102,7 @@ class HeldForces:
         arrays.held = self
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
-        """From now on these forces act, by the closed contacts of a level."""
+        """From now on these forces act, by the states of a level."""
         arrays, before = self.arrays, self._inertia
         self._acting, self._inertia = acting, inertia
         if self._rigid and not (inertia is None and before is None):
@@ -127,7 +128,7 @@ class HeldForces:
     def change_level(self, level: int) -> None:
         """Give a level the constants that belong to the forces, and the mobility that is left to it."""
         known = self._known(level)
-        ints, numbers, acting = self.arrays.ints, self.arrays.numbers, self._acting(known.closed)
+        ints, numbers, acting = self.arrays.ints, self.arrays.numbers, self._acting(known.states)
         force = acting.force[: len(known.inverse)]
         d = self._shifts[level] = known.inverse * force
         numbers[known.places] = known.constants + known.gains.dot(np.concatenate([force, acting.reactions]))
@@ -151,25 +152,30 @@ class HeldForces:
         numbers[start : start + rows] = offset
         if self._inertia is None:
             if record in self._rates:
-                ints[record + a.RATE_MATRIX] = ints[record + a.MATRIX]
+                ints[record + a.RATE_MATRIX] = self._rates[record][0]
             return
-        ends = self._levels[source].closed, self._levels[target].closed
-        rates = self._inertia.velocity_map(*ends, matrix)
         if record not in self._rates:
-            self._rates[record] = self.arrays.buffers.take("numbers", rates.size)
-        start = self.arrays.ints[record + a.RATE_MATRIX] = self._rates[record]
+            plain = int(ints[record + a.RATE_MATRIX])
+            self._rates[record] = plain, self.arrays.buffers.take("numbers", matrix.size)
+        plain, start = self._rates[record]
+        rates = self.arrays.numbers[plain : plain + matrix.size].reshape(matrix.shape).copy()
+        ends, left = (self._levels[source].states, self._levels[target].states), len(self._shifts[target])
+        rates[:left, :r] = self._inertia.velocity_map(*ends, rates[:left, :r])
+        self.arrays.ints[record + a.RATE_MATRIX] = start
         self.arrays.numbers[start : start + rates.size] = rates.ravel()
 
     def change_entered(self, level: int, exit_: int) -> None:
         """Give the signal of a contact in the level entered alone its constant."""
-        ints, numbers, n = self.arrays.ints, self.arrays.numbers, self._width(level)
-        contact, r = int(ints[exit_ + a.ELEMENT]), len(self._shifts[level])
-        row = int(ints[ints[exit_ + a.ENTERED] + a.ROW])
-        closed = tuple(sorted(set(self._levels[level].closed) ^ {contact}))
+        ints, numbers, n, r = self.arrays.ints, self.arrays.numbers, self._width(level), len(self._shifts[level])
+        loaded, row = self.arrays.loaded[int(ints[level + a.NUMBER])], int(ints[ints[exit_ + a.ENTERED] + a.ROW])
+        element, taken = exits_of(loaded)[(exit_ - int(ints[level + a.EXITS])) // a.EXIT_INTS]
+        back = way_back(loaded, element, taken)
         plain = self._entered.setdefault(exit_, float(numbers[row + 2 * n]))
         numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
-        if contact in closed:
-            numbers[row + 2 * n] += self._acting(closed).reactions[closed.index(contact)]
+        if back.force:
+            entered = after(loaded, element, taken)
+            links = self.arrays.levels.level(entered).level.indices
+            numbers[row + 2 * n] += back.force * self._acting(entered).reactions[links.index(element)]
 
     # ------------------------------------------------------------------ levels
 
@@ -183,7 +189,8 @@ class HeldForces:
 
     def _read(self, level: int) -> _Level:
         arrays = self.arrays
-        own, n, r = arrays.loaded[int(arrays.ints[level + a.NUMBER])].level, self._width(level), self._modes(level)
+        loaded, n, r = arrays.loaded[int(arrays.ints[level + a.NUMBER])], self._width(level), self._modes(level)
+        own, ways = loaded.level, exits_of(loaded)
         squares = own.squares[:r]
         inverse = np.divide(1.0, squares, out=np.zeros(r), where=squares != 0)
         beside = np.diag((squares == 0).astype(float))
@@ -208,12 +215,11 @@ class HeldForces:
         places = np.concatenate([at for at, _ in parts])
         gains = np.zeros((len(places), r + len(own.indices)))
         gains[:, :r] = np.vstack([gain[: len(at)] for at, gain in parts])
-        elements = ints[exits + a.ELEMENT].tolist()
-        for k, contact in enumerate(own.indices):
-            carriers = [len(places) - len(exits) + e for e, element in enumerate(elements) if element == contact]
-            gains[carriers, r + k] = 1.0
+        for e, (element, exit_) in enumerate(ways):
+            if exit_.force:
+                gains[len(places) - len(ways) + e, r + own.indices.index(element)] = exit_.force
         return _Level(
-            closed=own.indices,
+            states=loaded.states,
             inverse=inverse,
             places=places,
             constants=numbers[places],
@@ -223,7 +229,7 @@ class HeldForces:
             linear=numbers[energy + 1 : energy + 1 + r].copy(),
             squares=numbers[energy + 1 + n :][:r].copy(),
             exits=exits.tolist(),
-            elements=elements,
+            elements=[element for element, _ in ways],
             ends=ints[ints[level + a.ENDS] :][: ints[level + a.END_COUNT]].copy(),
             mobility=mobility,
         )
@@ -243,7 +249,7 @@ class HeldForces:
         ints[level + a.MOBILITY], ends = -1, plain.ends
         if self._inertia is not None:
             ints[level + a.MOBILITY] = plain.mobility
-            root = self._inertia.mobility(plain.closed)
+            root = self._inertia.mobility(plain.states)
             self.arrays.numbers[plain.mobility : plain.mobility + r * r] = root.ravel()
             held = self._inertia.held
             ends = np.array([k for k in ends.tolist() if plain.elements[k] not in held], dtype=np.int64)
@@ -252,5 +258,5 @@ class HeldForces:
         ints[level + a.END_COUNT] = len(ends)
 
 
-def _nothing(closed: tuple[int, ...]) -> Acting:
+def _nothing(states: tuple[int, ...]) -> Acting:
     raise AssertionError("no force has been given yet")

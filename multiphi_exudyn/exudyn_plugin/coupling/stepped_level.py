@@ -53,7 +53,7 @@ class SteppedLevel:
     @classmethod
     def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
         """A level matched to ``step`` [s], or plain for None."""
-        level = loaded.level
+        level = loaded.modal
         squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
         damping[: level.modes, : level.modes] = level.damping
@@ -64,9 +64,14 @@ class SteppedLevel:
         return cls(loaded, step, mass, stepped, np.diag(squares), damping, drive, q, v, g)
 
     @property
-    def closed(self) -> tuple[int, ...]:
-        """Positions of the closed contacts."""
-        return self.loaded.level.indices
+    def states(self) -> tuple[int, ...]:
+        """The number of every element's state."""
+        return self.loaded.states
+
+    @property
+    def modes(self) -> int:
+        """Number r of the level's modes."""
+        return self.loaded.modal.modes
 
     @property
     def size(self) -> int:
@@ -87,19 +92,19 @@ class SteppedLevel:
         return self._velocity_inverse.dot(shown)
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
-        """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,)."""
-        q, v, acting = np.zeros(self.size), np.zeros(self.size), force + self.drive
-        q[: len(eta)], v[: len(eta)] = eta, eta_t
+        """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,); behind eta may stand what links hold."""
+        q, v, acting, r = np.zeros(self.size), np.zeros(self.size), force + self.drive, self.modes
+        q[:r], v[:r] = eta[:r], eta_t[:r]
         q_t = self.from_displacement.dot(q) + self.from_velocity.dot(v) + self.from_force.dot(acting)
         return q, q_t, self._mass_inverse.dot(acting - self.damping.dot(q_t) - self.stiffness.dot(q))
 
-    def states(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s)."""
+    def shown(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s); behind eta as in ``state``."""
         found = np.zeros((len(eta), 3 * self.size))
         s = self.size
         q, q_t, q_tt = found[:, :s], found[:, s : 2 * s], found[:, 2 * s :]
-        v, r = np.zeros_like(q), eta.shape[1]
-        q[:, :r], v[:, :r] = eta, eta_t
+        v, r = np.zeros_like(q), self.modes
+        q[:, :r], v[:, :r] = eta[:, :r], eta_t[:, :r]
         q_t[:] = q @ self.from_displacement.T + v @ self.from_velocity.T + (force + self.drive) @ self.from_force.T
         q_tt[:] = (force + self.drive - q_t @ self.damping.T - q @ self.stiffness.T) @ self._mass_inverse.T
         return found

@@ -1,0 +1,96 @@
+"""Steady states with friction: Den Hartog's amplitudes, an integrator's, and places that are kept for ever.
+
+J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931).
+"""
+
+import math
+
+import numpy as np
+import pytest
+from small_structures import chain
+
+import multiphi_exudyn as mp
+
+RATIOS = mp.ModalDamping([0.02, 0.02, 0.02])
+
+
+def block(*elements, stiffness=1.0):
+    structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
+    return mp.MultiPhiModel(structure, elements, modes="all")
+
+
+@pytest.mark.parametrize(("beta", "share", "expected"), [(0.7, 0.5, 1.744253936249), (1.5, 0.4, 0.653197264742)])
+def test_den_hartogs_amplitude_is_settled_to_from_rest(beta, share, expected):
+    load = mp.HarmonicLoad("m", 1.0, beta / (2 * math.pi))
+    state = mp.steady_state(block(mp.Friction("floor", "m", share)), load, tolerance=1e-9)
+    assert (state.status, state.order) == ("periodic", 1)
+    assert state.amplitude("m") == pytest.approx(expected, abs=2e-12)
+    assert 0.0 < state.multiplier < 1.0  # without damping: only friction makes it attract
+    ledger = state.trajectory.ledger
+    assert ledger.work_of_loads == pytest.approx(ledger.friction, rel=1e-9)
+    assert ledger.friction == pytest.approx(4 * share * expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [30.0, math.inf])
+def test_stick_and_slip_repeat_where_a_long_run_does(stiffness):
+    model = mp.MultiPhiModel(
+        chain(3, damping=RATIOS, stiffness=9.0), [mp.Friction("ring", "m1", 0.4, stiffness=stiffness)], modes="all"
+    )
+    load = mp.HarmonicLoad("m2", 1.3, 0.31)
+    state = mp.steady_state(model, load, tolerance=1e-10)
+    assert (state.status, state.order) == ("periodic", 1)
+    assert {"stick", "slip"} == {event.kind for event in state.trajectory.events}
+    period = 1 / load.frequency_hz
+    long = mp.simulate(model, 200 * period, loads=[load])
+    t = np.linspace(0, period, 101)
+    size = state.amplitude("m2")
+    assert np.max(np.abs(state.trajectory.at("m2", t) - long.at("m2", 199 * period + t))) < 1e-8 * size
+    force = state.trajectory.friction_force("ring", t)
+    assert np.max(np.abs(force - long.friction_force("ring", 199 * period + t))) < 1e-7
+
+
+class TestWhatNeverSlips:
+    """Every held place has a response of its own; which one, the start decides, and it is neutral to that place."""
+
+    def model(self, limit=5.0):
+        return mp.MultiPhiModel(chain(3, damping=RATIOS), [mp.Friction("ring", "m1", limit)], modes="all")
+
+    @pytest.mark.parametrize("place", [0.0, 0.1, -0.3])
+    def test_stays_where_the_path_has_left_it(self, place):
+        load = mp.HarmonicLoad("m2", 1.0, 0.2)
+        state = mp.steady_state(self.model(), load, displacement=[place] * 3, tolerance=1e-9)
+        assert state.status == "periodic"
+        assert not state.trajectory.events
+        assert state.trajectory.at("m1", 0.0) == pytest.approx(place, abs=1e-14)
+        stuck = self.model().level(("ring",))
+        motion = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.diag(stuck.squares), -stuck.damping]])
+        slowest = np.max(np.linalg.eigvals(motion).real)
+        assert state.multiplier == pytest.approx(math.exp(slowest / 0.2), rel=1e-7)
+
+    def test_is_handed_on_to_the_next_frequency(self):
+        """Pulled away first: from each frequency to the next the ring stays where it was dragged to."""
+        model = self.model(0.3)
+        dragged = mp.steady_state(model, mp.HarmonicLoad("m2", 1.0, 0.2), other_loads=[mp.ConstantLoad("m1", 2.0)])
+        weak = mp.HarmonicLoad("m2", 0.05, 0.2)
+        response = mp.frequency_response(model, weak, [0.3, 0.35], start=dragged.trajectory)
+        places = [float(np.mean(state.trajectory.at("m1", np.array([0.0, 1.0])))) for state in response.states]
+        assert [state.status for state in response.states] == ["periodic"] * 2
+        assert places[0] == pytest.approx(places[1], abs=1e-9)
+        assert abs(places[0]) > 0.03
+        alone = mp.steady_state(model, weak)
+        assert abs(alone.trajectory.at("m1", 0.0)) < 1e-12
+
+
+def test_a_belt_goes_on_for_ever():
+    """Time begins anew at every chunk: the belt's own place does not count."""
+    belt = mp.Friction("belt", "m", 2.0, static_limit=3.5, velocity=0.3)
+    load = mp.HarmonicLoad("m", 0.5, 0.745)
+    model = block(belt, stiffness=25.0)
+    state = mp.steady_state(model, load, tolerance=1e-10)
+    long = mp.simulate(model, 60 / load.frequency_hz, loads=[load])
+    t = np.linspace(0, 1 / load.frequency_hz, 51)
+    assert (state.status, state.order) == ("periodic", 1)
+    shown, expected = state.trajectory.at("m", t), long.at("m", 59 / load.frequency_hz + t)
+    assert np.max(np.abs(shown - expected)) < 1e-8 * np.max(np.abs(expected))
+    slipped = state.trajectory.slip("belt", state.trajectory.t_end)
+    assert slipped == pytest.approx(-0.3 / load.frequency_hz, rel=1e-7)
