@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -278,7 +279,9 @@ class Trajectory:
         i = self._contact("deepest_gap", contact)
         depth = 0.0
         for segment in self.segments:
-            if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
+            waits = zip(exits_of(segment.level), segment.phases, strict=True)
+            armed = all(phase is Phase.ARMED for (element, _), phase in waits if element == i)
+            if not armed and i not in segment.level.level.indices:
                 depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))
         return depth
 
