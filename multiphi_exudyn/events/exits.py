@@ -15,7 +15,7 @@ from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
-__all__ = ["after", "entered_row", "exits_of", "signal_row", "signal_rows", "state_of", "way_back"]
+__all__ = ["after", "entered_row", "exits_of", "force_shares", "signal_row", "signal_rows", "state_of", "way_back"]
 
 
 def state_of(level: LoadedLevel, element: int) -> ElementState:
@@ -41,11 +41,15 @@ def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
     own = level.level
     position, rate = exit_.gap * own.gap_rows[element], exit_.rate * own.gap_rows[element]
     constant = exit_.constant + exit_.gap * float(level.gap_constants[element])
-    if exit_.force:
-        k = own.indices.index(element)
-        position, rate = position + exit_.force * own.force_rows[k], rate + exit_.force * own.force_rate_rows[k]
-        constant += exit_.force * float(level.asymptotic.forces[k])
+    for k, force in force_shares(level, element, exit_):
+        position, rate = position + force * own.force_rows[k], rate + force * own.force_rate_rows[k]
+        constant += force * float(level.asymptotic.forces[k])
     return Row(position, rate, constant)
+
+
+def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:
+    """Of the forces of links that hold in a level, by their places among these, what counts in an exit's signal."""
+    return [(level.level.indices.index(element), exit_.force)] if exit_.force else []
 
 
 def signal_rows(level: LoadedLevel) -> list[Row]:

@@ -111,7 +111,10 @@ class LoadedLevels:
         return _Known(level.under(self.excitation) if under else level, links)
 
     def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
-        """The level under the static loads and what elements push, without any channel; kept for all excitations."""
+        """The level under the static loads and what elements push, without any channel; kept for all excitations.
+
+        What elements push is among its loads, and not among those of a level with channels.
+        """
         return self._pushed.get_or_build(states, lambda: self._made(states))
 
     def _made(self, states: tuple[int, ...]) -> LoadedLevel:
