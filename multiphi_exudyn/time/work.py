@@ -77,17 +77,17 @@ def integrate_works(
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
         place, sums = 0, 4 * n * p + 2 * q * p
+        exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
+        for part in range(3):
+            works[3 * i + part] = 0.0
+        add_friction(ints, numbers, waves, works, 3 * i + 2)
         list_terms(ints, numbers, waves, scratch)
         weigh_terms(ints, numbers, scratch)
-        exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
         raised = sums + 8 * p  # powers of t / T at the end
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
-        for part in range(3):
-            works[3 * i + part] = 0.0
         add_constants(ints, numbers, waves, scratch, works, 3 * i + 1)
-        add_friction(ints, numbers, waves, scratch, works, 3 * i + 2)
         while place < p:
             other, length = place, chain(ints, place)
             while other < p:
@@ -261,13 +261,15 @@ def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, wo
 
 
 @compiled
-def add_friction(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers, result: int) -> None:
-    """Adds the limits times the ways slipped: f times what xi has changed by."""
-    level, row = ints[AFTER + LEVEL], ints[ints[AFTER + LEVEL] + RUBBING]
-    n = ints[level + MODES] + ints[CHANNELS]
+def add_friction(ints: Ints, numbers: Numbers, waves: Waves, works: Numbers, result: int) -> None:
+    """Adds the limits times the ways slipped, f times what xi has changed by, of the flow and its exponentials."""
+    level, c, free = ints[AFTER + LEVEL], ints[FLOW_WAVES], ints[FLOW_FREE]
+    r, row, moving = ints[level + MODES], ints[level + RUBBING], ints[level + MODES] + ints[PRESCRIBED]
     for j in range(ints[FLOW_COUNT]):
-        pushed = 0j
-        for i in range(n):
-            pushed += numbers[row + i] * scratch[j * n + i]
+        shape, size, pushed = ints[ints[level + RESPONSE] + SHAPES] + j * r, r, 0j
+        if j >= free:
+            shape, size = ints[FLOW_FORCED] + (j - free) * moving, moving
+        for i in range(size):
+            pushed += numbers[row + i] * waves[shape + i]
         began = 1.0 if ints[ints[ints[FLOW_BASIS] + POWERS] + j] == 0 else 0.0
-        works[result] += (pushed * (waves[ints[WORK_WAVES] + j] - began)).real
+        works[result] += (pushed * waves[c + j] * (waves[ints[WORK_WAVES] + j] - began)).real
