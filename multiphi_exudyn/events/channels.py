@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.events.excitation import Excitation, columns
+from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
@@ -151,8 +151,10 @@ def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
 
 def _at_rest(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Configurations (m, q) and contact forces (k, q) under loads (m, q), the closed contacts with gaps (k, q)."""
-    found = [level.static_response(load, gap) for load, gap in zip(loads.T, gaps.T, strict=True)]
-    return columns([y for _, y in found], len(loads)), columns([forces for forces, _ in found], len(gaps))
+    configurations, forces = np.zeros_like(loads), np.zeros_like(gaps)
+    for k in np.flatnonzero(np.any(loads, axis=0) | np.any(gaps, axis=0)).tolist():
+        forces[:, k], configurations[:, k] = level.static_response(loads[:, k], gaps[:, k])
+    return configurations, forces
 
 
 def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
-__all__ = ["after", "entered_row", "exits_of", "signal_row", "signal_rows", "state_of", "way_back"]
+__all__ = ["after", "entered_row", "exits_of", "force_shares", "signal_row", "signal_rows", "state_of", "way_back"]
 
 
 def state_of(level: LoadedLevel, element: int) -> ElementState:
@@ -44,11 +44,16 @@ def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
         link = own.base.link_places[element][share.link]
         position, rate = position + share.gap * own.gap_rows[link], rate + share.rate * own.gap_rows[link]
         terms.append(share.gap * float(level.gap_constants[link]))
-        if share.force:
-            k = own.indices.index(link)
-            position, rate = position + share.force * own.force_rows[k], rate + share.force * own.force_rate_rows[k]
-            terms.append(share.force * float(level.asymptotic.forces[k]))
+    for k, force in force_shares(level, element, exit_):
+        position, rate = position + force * own.force_rows[k], rate + force * own.force_rate_rows[k]
+        terms.append(force * float(level.asymptotic.forces[k]))
     return Row(position, rate, float(drop_round_off(np.sum(terms), np.sum(np.abs(terms)))))
+
+
+def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:
+    """Of the forces of links that hold in a level, by their places among these, what counts in an exit's signal."""
+    links, places = level.level.base.link_places[element], level.level.indices
+    return [(places.index(links[share.link]), share.force) for share in exit_.shares if share.force]
 
 
 def signal_rows(level: LoadedLevel) -> list[Row]:

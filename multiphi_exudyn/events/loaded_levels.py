@@ -67,6 +67,7 @@ class LoadedLevels:
         self.starts = BoundedCache[float, Any](STARTS)
         self._all = tuple(range(len(model.contacts)))
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
+        self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "arrays": None, "held": None}
@@ -112,17 +113,27 @@ class LoadedLevels:
         """Let go of what is kept of the levels in which these links hold."""
         for states in [states for states, known in self._known.items() if known.links == links]:
             self._known.drop(states)
+        for states in [states for states, level in self._pushed.items() if level.level.indices == links]:
+            self._pushed.drop(states)
 
     def _of(self, states: tuple[int, ...]) -> _Known:
         return self._known.get_or_build(states, lambda: self._loaded(states))
 
     def _loaded(self, states: tuple[int, ...]) -> _Known:
-        if self.alone is not self:
-            return _Known(self.alone.level(states).alone.under(self.excitation), self.model.links_held(states))
-        links = self.model.links_held(states)
-        level = LoadedLevel.of(self.model.level_at(links), self.load + self.model.push(states))
-        level = replace(level, own_states=states)
-        return _Known(level.under(self.excitation) if self.model.general else level, links)
+        level, links = self.alone.pushed(states), self.model.links_held(states)
+        under = self.alone is not self or self.model.general
+        return _Known(level.under(self.excitation) if under else level, links)
+
+    def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
+        """The level under the static loads and what elements push, without any channel; kept for all excitations.
+
+        What elements push is among its loads, and not among those of a level with channels.
+        """
+        return self._pushed.get_or_build(states, lambda: self._made(states))
+
+    def _made(self, states: tuple[int, ...]) -> LoadedLevel:
+        level = self.model.level_at(self.model.links_held(states))
+        return replace(LoadedLevel.of(level, self.load + self.model.push(states)), own_states=states)
 
     def with_channels(self, state: State) -> State:
         """A state under the static loads alone as one of these levels, at the time at which they set out."""

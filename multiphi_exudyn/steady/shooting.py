@@ -141,9 +141,9 @@ class Shooting:
 
     def _free(self, trajectory: Trajectory) -> np.ndarray:
         """Which coordinates are unknowns: all but places that links have held all the time."""
-        levels = [level.states for level in listed(trajectory.segments).levels]
-        elements = self.map.model.contacts
-        kept = [all(elements[i].states[states[i]].holds for states in levels) for i in self.map.model.held]
+        model = self.map.model
+        holding = [model.links_held(level.states) for level in listed(trajectory.segments).levels]
+        kept = [all(i in held for held in holding) for i in model.held]
         return np.flatnonzero(np.append(np.ones(len(self._scales) - len(kept), bool), ~np.array(kept, bool)))
 
     def _jacobian(self, place: np.ndarray, reached: np.ndarray, free: np.ndarray) -> np.ndarray | None:

@@ -33,6 +33,8 @@ CASES = {
         -1.0,
         "m1",
     ),
+    "friction": (STRUCTURE, [mp.Friction("ring", "m2", 0.3, stiffness=40.0)], -1.0, "m1"),
+    "friction, where it rubs": (STRUCTURE, [mp.Friction("ring", "m2", 0.3, static_limit=0.4)], -1.0, "m2"),
     "without a support": (LOOSE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0)], -0.2, "m1"),
 }
 

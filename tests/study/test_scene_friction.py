@@ -9,6 +9,7 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.cli.main import main
+from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.comparison.compare import compare, histories, summary
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -111,3 +112,21 @@ def test_errors_name_file_and_field(tmp_path, path, value, said):
         mechanics_of(load_scene(write(tmp_path / "scene.toml", changed(path, value, SCENE))))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_the_limit_of_a_friction_is_an_axis_of_a_study(tmp_path):
+    scene = write(
+        tmp_path / "ring.toml", SCENE | {"models": [MODELS[0], MODELS[1]], "comparison": {"reference": "all"}}
+    )
+    study = {
+        "title": "how many modes does friction take?",
+        "scene": scene,
+        "axes": {"friction.ring.limit": [0.5, 0.8]},
+        "methods": [{"name": "r", "model": {"kind": "reduced"}, "axes": {"modes": [2, 6]}}],
+    }
+    found = load_study(write(tmp_path / "study.toml", study))
+    limits = [found.scene_for(found.reference(at)).file.friction[0].limit for at in found.points]
+    assert sorted(limits) == [0.5, 0.8]
+    for path, said in (("friction.belt.limit", "friction, which is no table"), ("friction.ring", "a whole table")):
+        with pytest.raises(mp.MultiPhiValueError, match=said):
+            load_study(write(tmp_path / "study.toml", study | {"axes": {path: [0.5]}}))

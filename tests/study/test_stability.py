@@ -16,6 +16,7 @@ from multiphi_exudyn.study.stability import catalogue_run, native_run
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.catalogue_run import QUICK, chosen_cases, run_case
+from multiphi_exudyn.study.stability.exudyn_runs import run_user_object
 from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.native_run import run_native
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
@@ -108,6 +109,47 @@ class TestTheJudgeSees:
         assert complaints(problem, trajectory) == ""
         pulled = [dataclasses.replace(s, level=_with_forces(s.level, -1.0)) for s in trajectory.segments]
         assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=tuple(pulled)))
+
+
+class TestTheJudgeKnowsFriction:
+    """Each case is right, and wrong as soon as the problem's friction is another than the trajectory's."""
+
+    @staticmethod
+    def run(name):
+        problem = BY_NAME[name].build(True)
+        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
+        assert complaints(problem, trajectory) == ""
+        assert len(trajectory.events) > 2
+        return problem, trajectory
+
+    @pytest.mark.parametrize(
+        ("name", "changed", "said"),
+        [
+            ("friction-decays", {"limit": 100.0 * (1 + 1e-6)}, "friction off its law"),
+            ("friction-lets-go", {"static_limit": 99.9}, "friction off its law"),
+            ("friction-lets-go", {"stiffness": 1.001e5}, "m beyond the contact law"),
+            ("friction-belt", {"velocity": 0.1001}, "m beyond the contact law"),
+        ],
+    )
+    def test_that_is_another(self, name, changed, said):
+        problem, trajectory = self.run(name)
+        other = dataclasses.replace(problem.contacts[0], **changed)
+        assert said in complaints(dataclasses.replace(problem, contacts=[other]), trajectory)
+
+    def test_whose_events_are_not_told(self):
+        problem, trajectory = self.run("friction-lets-go")
+        for lost in range(2, 6):
+            others = tuple(event for k, event in enumerate(trajectory.events) if k != lost)
+            found = judge(problem, dataclasses.replace(trajectory, events=others), BUDGET)
+            assert found.missed == 1
+
+    @pytest.mark.parametrize("name", ["friction-decays", "friction-lets-go-rigid", "friction-belt"])
+    def test_in_exudyn_too(self, name):
+        problem, trajectory = self.run(name)
+        outcome = run_user_object(problem, trajectory, 8000, 20.0)
+        assert outcome.status == "ok", outcome.message
+        assert outcome.difference < 1e-3
+        assert outcome.events == len(trajectory.events)
 
 
 class TestTheJudgeKnowsLaws:

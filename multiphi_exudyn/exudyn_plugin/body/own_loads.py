@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.exits import exits_of, signal_rows
+from multiphi_exudyn.events.exits import exits_of, force_shares, signal_rows
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import (
@@ -99,10 +99,10 @@ class OwnLoads:
         rows = [row for *_, row in ways]
         if self.varies:
             return driven_conditions(stepped, level, rows, step)
-        carried, links = np.zeros((len(rows), direct.shape[1])), level.level.indices
+        carried = np.zeros((len(rows), direct.shape[1]))
         for k, (element, exit_, _) in enumerate(ways):
-            if exit_.force:
-                carried[k] = exit_.force * direct[links.index(element)]
+            for place, force in force_shares(level, element, exit_):
+                carried[k] += force * direct[place]
         return plain_conditions(stepped, rows, step, carried)
 
     def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:

@@ -54,7 +54,7 @@ class RunAhead:
         self._regular = True
         self._steps = BoundedCache[tuple[int, ...], UndisturbedSteps](body.model.most_levels)
         self._state = np.array(here.views)
-        self._least = UNSEEN * _way(here.stepped)
+        self._way = _way(here.stepped)
         self._past, self._truncated = list[Sequence[Event]](), 0.0
         self._stretch = self._motion.advance(self._until(time))
         self._place = self._done = 0
@@ -139,7 +139,10 @@ class RunAhead:
 
     def _check(self, q: np.ndarray, expected: np.ndarray, largest: float, t: float) -> None:
         """Raises if somebody has changed the coordinates since the last stop."""
-        apart, limit = q - expected, CHANGED * max(largest, self._least)
+        here, way = self._body.coordinates, self._way
+        if here.slips:  # what stays where it is held moves its modes by nothing
+            way += float(np.linalg.norm(here.stepped.loaded.channels.shapes @ here.held))
+        apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
         if not apart.dot(apart) <= limit * limit:
             raise MultiPhiValueError(
                 f"coordinates of {self._body.name!r}: got others at t = {t:.9g} s than its motion has led to, need a "

@@ -163,7 +163,7 @@ def rebuilt(
 
 def _holds(body: MultiPhiBody, element: int, data: np.ndarray) -> np.ndarray:
     """When (k,) the link of an element holds."""
-    holds = np.array([state.holds for state in body.model.contacts[element].states])
+    holds = np.array([bool(state.holds) for state in body.model.contacts[element].states])
     return np.asarray(holds[body.coordinates.layout.states(data)[:, element]])
 
 

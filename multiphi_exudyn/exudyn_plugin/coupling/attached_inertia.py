@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.exits import state_of
 from multiphi_exudyn.events.impact import IMMOVABLE
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
@@ -123,8 +122,7 @@ class Reactions:
 
     def _push(self, level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
         """What elements push (b,), and the forces (m,) that follow."""
-        pushes = [state_of(level, i).push for i in range(len(level.states))]
-        push = self._base.directions @ np.array(pushes)
+        push = level.alone.excitation.static - level.excitation.static
         return push, self._attached.reactions(self._rows, push)
 
 

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.exits import after, exits_of, way_back
+from multiphi_exudyn.events.exits import after, exits_of, force_shares, way_back
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
@@ -172,10 +172,9 @@ class HeldForces:
         back = way_back(loaded, element, taken)
         plain = self._entered.setdefault(exit_, float(numbers[row + 2 * n]))
         numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
-        if back.force:
-            entered = after(loaded, element, taken)
-            links = self.arrays.levels.level(entered).level.indices
-            numbers[row + 2 * n] += back.force * self._acting(entered).reactions[links.index(element)]
+        entered = self.arrays.levels.level(after(loaded, element, taken))
+        for k, share in force_shares(entered, element, back):
+            numbers[row + 2 * n] += share * self._acting(entered.states).reactions[k]
 
     # ------------------------------------------------------------------ levels
 
@@ -216,8 +215,8 @@ class HeldForces:
         gains = np.zeros((len(places), r + len(own.indices)))
         gains[:, :r] = np.vstack([gain[: len(at)] for at, gain in parts])
         for e, (element, exit_) in enumerate(ways):
-            if exit_.force:
-                gains[len(places) - len(ways) + e, r + own.indices.index(element)] = exit_.force
+            for k, share in force_shares(loaded, element, exit_):
+                gains[len(places) - len(ways) + e, r + k] = share
         return _Level(
             states=loaded.states,
             inverse=inverse,

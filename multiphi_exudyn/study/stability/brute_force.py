@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.mechanics.loads import BaseMotion, Load, StopMotion
@@ -33,6 +34,7 @@ __all__ = [
     "sample_contact",
     "sampling",
     "truncated",
+    "untold_switches",
 ]
 
 SAMPLES_PER_PERIOD = 10_000
@@ -68,7 +70,7 @@ class SegmentTable:
         for row, segment in enumerate(segments):
             closed[row, list(segment.level.level.indices)] = True
             until = segment.start + segment.armed_at if segment.armed_at > 0 else segment.end
-            for i, phase in enumerate(segment.phases):
+            for (i, _), phase in zip(exits_of(segment.level), segment.phases, strict=True):
                 if phase is not Phase.ARMED:
                     excused[row, i] = until
         return cls(np.array([s.start for s in segments]), np.array([s.end for s in segments]), closed, excused)
@@ -172,14 +174,22 @@ def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable,
     Samples of a below -tolerance in an open contact that its phase does not excuse (a run of them counts once);
     changes of the sign of a; changes of the level between segments.
     """
-    own = np.array([event.time for event in trajectory.events if event.contact == name])
-    slack = TIME_ROUND_OFF * trajectory.t_end
+    own, slack = _times(trajectory, name), TIME_ROUND_OFF * trajectory.t_end
     entered = (samples.apart < -tolerance) & ~samples.closed & ~samples.excused
     inside = int(entered[0]) + int(np.sum(entered[1:] & ~entered[:-1]))
-    i = trajectory.model.index(name)
+    return max(inside, _untold_signs(samples, own, slack, tolerance), untold_switches(trajectory, table, name))
+
+
+def untold_switches(trajectory: Trajectory, table: SegmentTable, name: str) -> int:
+    """How often the link of an element begins or ceases to hold between segments without an event."""
+    i, slack = trajectory.model.index(name), TIME_ROUND_OFF * trajectory.t_end
     switched = table.start[1:][table.closed[1:, i] != table.closed[:-1, i]]
-    switches = int(np.sum(_events_in(own, switched - slack, switched + slack) == 0))
-    return max(inside, _untold_signs(samples, own, slack, tolerance), switches)
+    return int(np.sum(_events_in(_times(trajectory, name), switched - slack, switched + slack) == 0))
+
+
+def _times(trajectory: Trajectory, name: str) -> np.ndarray:
+    """When (k,) [s] an element changes."""
+    return np.array([event.time for event in trajectory.events if event.contact == name])
 
 
 def _untold_signs(samples: ContactSamples, own: np.ndarray, slack: float, tolerance: float) -> int:

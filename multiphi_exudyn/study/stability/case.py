@@ -11,6 +11,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, expanded
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -39,7 +40,7 @@ class Pull:
 class Problem:
     """What a run is given.
 
-    structure, contacts (force laws among them), modes: of the model.
+    structure, contacts (force laws and friction among them), modes: of the model.
     displacement, velocity: x, x' (n,) at the start, None for zero.
     loads: of loads.py. t_end: end of the run in the case's unit of time.
     pull: the same problem for the full nonlinear beam; without one the full model has the structure's matrices.
@@ -48,7 +49,7 @@ class Problem:
     """
 
     structure: LinearStructure
-    contacts: Sequence[UnilateralContact | ForceLaw]
+    contacts: Sequence[UnilateralContact | ForceLaw | Friction]
     t_end: float
     modes: int | str = "all"
     displacement: np.ndarray | None = None
@@ -64,8 +65,13 @@ class Problem:
 
     @property
     def parts(self) -> tuple[Contact, ...]:
-        """The contacts, every law by its chain of springs."""
-        return expanded(self.contacts)
+        """The contacts, every law by its chain of springs, without friction."""
+        return expanded([contact for contact in self.contacts if not isinstance(contact, Friction)])
+
+    @property
+    def frictions(self) -> list[Friction]:
+        """The friction among the contacts."""
+        return [contact for contact in self.contacts if isinstance(contact, Friction)]
 
     @property
     def laws(self) -> list[ForceLaw]:
@@ -80,7 +86,7 @@ class Problem:
     @property
     def conservative(self) -> bool:
         """Whether nothing but impacts may change the energy."""
-        return not self.damped and not self.loads
+        return not (self.damped or self.loads or self.frictions)
 
     @property
     def driven(self) -> bool:

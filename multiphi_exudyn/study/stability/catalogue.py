@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from multiphi_exudyn.study.stability import beams, driven, laws, starts, systems
+from multiphi_exudyn.study.stability import beams, driven, friction, laws, starts, systems
 
 __all__ = ["CATALOGUE"]
 
-CATALOGUE = (*starts.CASES, *beams.CASES, *systems.CASES, *laws.CASES, *driven.CASES)
+CATALOGUE = (*starts.CASES, *beams.CASES, *systems.CASES, *laws.CASES, *driven.CASES, *friction.CASES)

@@ -58,7 +58,7 @@ def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit
         remark = "" if matched else f"{steps} steps allowed, {wanted} needed to match its modes: plain trapezoidal rule"
         outcome = Outcome(USER_OBJECT, message=remark, events=len(found.events), steps=steps, time_s=time_s)
         told = replace(outcome, warnings=found.warnings)
-        return _compared(told, problem, native, found.time, found.gaps)
+        return _compared(told, problem, native, found.time, found.gaps, found.slip)
 
     return _guarded(USER_OBJECT, solve)
 
@@ -69,6 +69,8 @@ def run_full_model(problem: Problem, native: Trajectory, values: int, limit_s: f
     values: coordinates that a run may store, all steps together.
     """
     contacts = problem.penalty_contacts
+    if problem.frictions:
+        return Outcome(FULL_MODEL, NOT_RUN, "friction: compared by scenes with a full beam")
     if contacts is None:
         return Outcome(FULL_MODEL, NOT_RUN, "Exudyn's contact elements have no rigid law without rebound")
     pull = problem.pull
@@ -161,13 +163,19 @@ def _drift(energy: np.ndarray, work: np.ndarray, kinetic: np.ndarray, conservati
 
 
 def _compared(
-    outcome: Outcome, problem: Problem, native: Trajectory, time: np.ndarray, gaps: Mapping[str, np.ndarray]
+    outcome: Outcome,
+    problem: Problem,
+    native: Trajectory,
+    time: np.ndarray,
+    gaps: Mapping[str, np.ndarray],
+    slips: Mapping[str, np.ndarray] | None = None,
 ) -> Outcome:
-    """The outcome with difference and agreement of the contacts' travel h.x, unless there is no motion."""
+    """The outcome with difference and agreement of the contacts' travel h.x, and of slips, unless nothing moves."""
     inside = time <= native.t_end
     pairs = [
         (gaps[c.name][inside] - c.gap, np.asarray(native.gap(c.name, time[inside])) - c.gap) for c in problem.parts
     ]
+    pairs += [(slip[inside], np.asarray(native.slip(name, time[inside]))) for name, slip in (slips or {}).items()]
     pairs = [(values, ref) for values, ref in pairs if np.any(ref)]
     if not pairs:
         return outcome

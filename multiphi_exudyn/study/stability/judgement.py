@@ -6,6 +6,7 @@
                 open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
                 with a as in brute_force.py; a force law: |sum of its springs' forces + F(q_m) - F(q)| / max |F'|
     pulling     most negative reaction of a rigid or viscous contact over the largest one
+    friction    see friction_judgement.py: its ways are among ``beyond``
 
 A truncated model may leave negative gaps; its event rule says where, in the phases, and ``Trajectory.deepest_gap``
 how deep. There only what no phase excuses is wrong, and a depth that the trajectory does not report.
@@ -28,12 +29,14 @@ from multiphi_exudyn.study.stability.brute_force import (
     truncated,
 )
 from multiphi_exudyn.study.stability.case import Problem
+from multiphi_exudyn.study.stability.friction_judgement import judge_friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["BEYOND", "RESIDUAL", "Judgement", "judge"]
 
 RESIDUAL = 1e-9  # of the largest energy: what a ledger may leave over
 BEYOND = 1e-9  # m beyond the contact law
+FRICTION = 1e-9  # of its limit: what a friction force may be off
 PULLING = 1e-9  # of the largest reaction: round-off of a release
 REPORTED = 0.5  # of a depth that sampling finds: less must not be reported; both are sampled, on different grids
 LOOKS = 1000  # segments at whose ends the energy is looked at
@@ -56,6 +59,7 @@ class Judgement:
     unexcused: float
     open_depth: float
     pulling: float
+    friction: float
     truncated: bool
     reported: float
     samples: int
@@ -69,6 +73,7 @@ class Judgement:
             (not self.energy <= RESIDUAL, f"energy off by {self.energy:.1e}"),
             (not law <= BEYOND * metre, f"{law / metre:.1e} m beyond the contact law"),
             (not self.pulling <= PULLING, f"a contact pulls with {self.pulling:.1e} of its largest reaction"),
+            (not self.friction <= FRICTION, f"friction off its law by {self.friction:.1e} of its limit"),
             (self.missed > 0, f"{self.missed} closings or openings without an event"),
             (self._hidden(metre), f"open {self.open_depth / metre:.1e} m deep, {self.reported / metre:.1e} m reported"),
         ]
@@ -85,14 +90,16 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     parts = problem.parts
     seen = [sample_contact(trajectory, contact, table, look.times, problem.loads) for contact in parts]
     beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
-    laws = [_beyond_law(law, trajectory, look.times) for law in problem.laws]
+    rubbed = [judge_friction(trajectory, friction, table, look.times) for friction in problem.frictions]
+    laws = [*(found.way for found in rubbed)] + [_beyond_law(law, trajectory, look.times) for law in problem.laws]
     largest, drift = _energies(trajectory, table)
     residual = _share(trajectory.ledger.residual, largest)
     return Judgement(
         energy=drift if problem.conservative else residual,
         residual=residual,
         events=len(trajectory.events),
-        missed=sum(
+        missed=sum(found.missed for found in rubbed)
+        + sum(
             missed(trajectory, found, table, contact.name, tolerance)
             for contact, found in zip(parts, seen, strict=True)
         ),
@@ -100,6 +107,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         unexcused=_largest([*(np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, seen, strict=True)), *laws]),
         open_depth=_largest([-np.min(s.apart[~s.closed], initial=0.0) for s in seen]),
         pulling=_pulling(parts, seen),
+        friction=_largest([found.force for found in rubbed]),
         truncated=truncated(trajectory),
         reported=_largest([-trajectory.deepest_gap(contact.name) for contact in parts]),
         samples=len(look.times),
