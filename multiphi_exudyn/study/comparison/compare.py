@@ -1,6 +1,7 @@
 """Comparison: every model of a scene run once, and measured against the reference.
 
-``summary`` and ``histories`` are what is written to disk.
+Rigid levels are measured against a stiff stop too (measures/stiff_stop.py). ``summary`` and ``histories`` are what is
+written to disk.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.measures.stiff_stop import StiffStop, rigid_models, stiff_stop
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
@@ -23,11 +25,15 @@ __all__ = ["Comparison", "compare", "histories", "summary"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs of one scene, in the scene's order; environment: where they ran."""
+    """Runs of one scene, in the scene's order; environment: where they ran.
+
+    stiff: what rigid levels are measured against beside the reference; None where there are none.
+    """
 
     bench: Workbench
     runs: Mapping[str, ModelRun]
     environment: Mapping[str, Any]
+    stiff: StiffStop | None = None
 
     @property
     def reference(self) -> ModelRun:
@@ -51,6 +57,13 @@ class Comparison:
         if not self.reference.ok:
             return {}
         return {name: run for name, run in self.runs.items() if run.ok and run is not self.reference}
+
+    @property
+    def rigid(self) -> dict[str, ModelRun]:
+        """Runs with rigid levels that can be measured against a stiff stop."""
+        if self.stiff is None or not self.stiff.ok:
+            return {}
+        return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
 
     @property
     def warnings(self) -> dict[str, list[str]]:
@@ -140,7 +153,7 @@ def compare(
     for name in bench.scene.models:
         started(name)
         runs[name] = run_model(bench, name, progress, retry=True, horizon=True)
-    return Comparison(bench, runs, environment)
+    return Comparison(bench, runs, environment, stiff_stop(bench))
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
@@ -165,6 +178,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
             for name, run in comparison.runs.items()
         },
         "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
+        "stiff_stop": comparison.stiff.values(comparison.bench, comparison.rigid) if comparison.stiff else {},
     }
     return _without_nan(content)
 

@@ -23,7 +23,17 @@ from reference_models.rig import rig
 __all__ = ["render"]
 
 TEMPLATE = "report.html.j2"
-ON_THE_PAGE = ("nrmse", "horizon", "horizon_s", "first_contact", "inner_losses", "closed_time", "impulse", "ledger")
+ON_THE_PAGE = (
+    "nrmse",
+    "stiff_nrmse",
+    "horizon",
+    "horizon_s",
+    "first_contact",
+    "inner_losses",
+    "closed_time",
+    "impulse",
+    "ledger",
+)
 HISTORY = (
     "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."

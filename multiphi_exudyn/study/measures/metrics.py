@@ -48,6 +48,13 @@ METRICS = {
         "||y - ref|| / ||ref|| over the samples from 0 to the window's end, y and ref being one point's "
         "displacements; 0.01 is 1 %. Not divided by a range or a standard deviation.",
     ),
+    "stiff_nrmse": Metric(
+        "difference to a stiff stop (NRMSE)",
+        "1",
+        "the same, of models with rigid levels, to the linear structure with all modes and stops so stiff that more "
+        "stiffness changes little: the decade above the scene's own stops and above what the structure's finest motion "
+        "opposes to a push, times 100. Its own uncertainty is its largest difference to stops 10 and 100 times softer.",
+    ),
     "max_difference": Metric(
         "largest difference",
         "m",

@@ -1,0 +1,53 @@
+"""Rigid levels beside two stops, in words: the scene's own, and a stiff one, whose limit they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.wording import engineering, listed, percent
+
+__all__ = ["from_a_stiff_stop", "rigid_limit"]
+
+
+def from_a_stiff_stop(comparison: Comparison, name: str) -> str:
+    """How far a model with rigid levels is from a stiff stop: "1.48 %"; "" of other models."""
+    if comparison.stiff is None or name not in comparison.rigid:
+        return ""
+    points, until = comparison.bench.judged_points, comparison.headline_window
+    return percent(comparison.stiff.error(comparison.rigid[name], points, until))
+
+
+def rigid_limit(comparison: Comparison) -> Iterable[str]:
+    """What rigid levels are the limit of, and how far they are from it and from the reference."""
+    stiff = comparison.stiff
+    if stiff is None:
+        return
+    told = "Rigid levels are the limit of stiff stops"
+    if not stiff.ok:
+        yield f"{told}, but nothing with stiff stops ran: {stiff.message}."
+        return
+    if not comparison.rigid:
+        return
+    until, stiffest = comparison.headline_window, f"{engineering(stiff.stiffness[-1])}N/m"
+    own = percent(stiff.uncertainty(comparison.bench.time, comparison.bench.judged_points, until))
+    errors = [
+        f"{name} {from_a_stiff_stop(comparison, name)}{_from_reference(comparison, name)}" for name in comparison.rigid
+    ]
+    yield (
+        f"{told}, so they are measured against one too: to {until:g} s {listed(errors)} from all linear modes on a "
+        f"stop of {stiffest}, which itself differs by {own} from softer stops down to "
+        f"{engineering(stiff.stiffness[0])}N/m."
+    )
+    if not all(contact.rigid for contact in comparison.bench.mechanics.contacts):
+        yield (
+            "What rigid levels differ from the reference beyond that is the softness of its stop: more modes do not "
+            "remove it, levels of the stop's own stiffness do not have it."
+        )
+
+
+def _from_reference(comparison: Comparison, name: str) -> str:
+    if name not in comparison.measured:
+        return ""
+    error = percent(comparison.worst_error(comparison.runs[name], comparison.headline_window))
+    return f" (from the reference {error})"
