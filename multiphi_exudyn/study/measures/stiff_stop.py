@@ -61,9 +61,13 @@ class StiffStop:
     def values(self, bench: Workbench, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
         """What JSON holds of it: by window and point its uncertainty, and the errors of ``runs`` by name."""
 
-        def by_window(measure: Any) -> dict[str, dict[str, float]]:
+        def number(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        def by_window(measure: Any) -> dict[str, dict[str, float | None]]:
             return {
-                f"{until:g}": {point: measure((point,), until) for point in bench.points} for until in bench.windows
+                f"{until:g}": {point: number(measure((point,), until)) for point in bench.points}
+                for until in bench.windows
             }
 
         known = {name: run for name, run in runs.items() if self.ok and run.ok}
