@@ -19,11 +19,13 @@ from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.assembly import Assembly, assemble
 from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import (
     BaseMotion,
     ConstantLoad,
@@ -50,9 +52,11 @@ __all__ = [
     "Beam",
     "Clamp",
     "ConstantLoad",
+    "Equilibrium",
     "Event",
     "ForceLaw",
     "FrequencyResponse",
+    "Friction",
     "FunctionLoad",
     "Gravity",
     "Harmonic",

@@ -226,9 +226,8 @@ class LevelArrays:
         take("numbers", a.RUN_NUMBERS)
         base, c = model.base, len(model.contacts)
         viscous = base.dampings > 0
-        striking = np.isinf(base.stiffnesses)
-        striking[list(model.held)] = False
-        kinds = np.where(striking, a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))
+        kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))
+        kinds[list(model.held)] = a.SLIDING
         chains = np.full(c, -1)
         for number, chain in enumerate(model.chains):
             chains[list(chain)] = number
@@ -242,6 +241,7 @@ class LevelArrays:
             a.CHAINS: put("ints", chains),
             a.CHAIN_COUNT: len(model.chains),
             a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
+            a.STRETCHES: put("numbers", [max(state.stretch for state in c.states) for c in model.contacts]),
             a.DIRECTIONS: put("numbers", units.T),
         }
         for slot, value in given.items():
@@ -395,11 +395,12 @@ class LevelArrays:
         self._enter_level(record)
 
     def add_powers(self, level: int) -> None:
-        """Pack the power of damping and of what varies in a level that stands in the ints."""
+        """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
-            damping, varying = powers(self.loaded[int(self.ints[level + a.NUMBER])])
+            damping, varying, rubbing = powers(self.loaded[int(self.ints[level + a.NUMBER])])
             self.ints[level + a.DISSIPATION] = self.buffers.put("numbers", (damping + damping.T) / 2)
             self.ints[level + a.POWER] = self.buffers.put("numbers", varying)
+            self.ints[level + a.RUBBING] = self.buffers.put("numbers", rubbing)
 
     @property
     def most(self) -> tuple[int, int]:

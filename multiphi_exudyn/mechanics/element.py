@@ -2,10 +2,12 @@
 
 It has one link, which in some of its states holds:
 
-    q = h.x + gap - w,     force on the structure along +h:   lambda = -k q - c q',   rigid: q = 0, lambda its reaction
+    q = h.x + gap - v t - w
+    lambda = -k q - c q', force on the structure along +h;   rigid: q = 0, lambda its reaction
 
-w is zero, or *held*: a place that nothing but a change of state moves. Where the link begins to hold, w becomes what
-gives it the stretch q that the state before says. In every state a constant force, the push, may act along +h as well.
+v is the speed of the surface at its other side. w is zero, or *held*: a place that nothing but a change of state moves.
+Where the link begins to hold, w becomes what gives it the stretch q that the state before says. In every state a
+constant force, the push, may act along +h as well.
 
 A state lasts as long as for each of its exits
 
@@ -17,11 +19,12 @@ have changed (or a change in truncated modes), the exit says by its firmness wha
     MAY_RECOVER      while it rises the state stays, and the exit waits until it has risen to zero
     NEVER_RECOVERS   it does not wait for that
     ALWAYS_TAKEN     nor for whether the state it leads to admits it: it changes at once
+    TAKEN_ONCE       it waits while it rises; else it changes at once, but stays where it has just come from there
 
     contact          open: q;  closed: -q where compliant, lambda where rigid (always taken) or viscous (never recovers)
     friction |T| <= F, T = -lambda, rigid or by a spring in series
                      stick (the link holds, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
-                     exit s q', back into stick; all of them always taken
+                     exit s q', back into stick, taken once; those of stick always taken
 """
 
 from __future__ import annotations
@@ -31,9 +34,18 @@ from typing import Protocol, runtime_checkable
 
 from multiphi_exudyn.mechanics.structure import At
 
-__all__ = ["ALWAYS_TAKEN", "MAY_RECOVER", "NEVER_RECOVERS", "Element", "ElementState", "Exit", "contact_states"]
+__all__ = [
+    "ALWAYS_TAKEN",
+    "MAY_RECOVER",
+    "NEVER_RECOVERS",
+    "TAKEN_ONCE",
+    "Element",
+    "ElementState",
+    "Exit",
+    "contact_states",
+]
 
-MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN = 0, 1, 2
+MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -68,7 +80,8 @@ class ElementState:
 class Element(Protocol):
     """An element by its link and its states; contacts and the springs of force laws are elements.
 
-    direction, gap, stiffness, damping, rigid: of the link, as of a UnilateralContact. held: whether w is.
+    direction, gap, stiffness, damping, rigid: of the link, as of a UnilateralContact. velocity: v [m/s]. held: whether
+    w is.
     """
 
     @property
@@ -83,6 +96,8 @@ class Element(Protocol):
     def damping(self) -> float: ...
     @property
     def rigid(self) -> bool: ...
+    @property
+    def velocity(self) -> float: ...
     @property
     def held(self) -> bool: ...
     @property

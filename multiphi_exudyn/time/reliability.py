@@ -120,7 +120,8 @@ def _lost_energy(trajectory: Trajectory, history: DefectHistory) -> Iterator[str
     start, base = trajectory.start, trajectory.model.base
     at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
     lost = abs(at_start) + float(np.sum(np.abs(history.table[:, 3])))
-    given = 0.5 * float(start.velocity @ start.velocity) + base.strain(start.displacement, start.penetrating)
+    given = 0.5 * float(start.velocity @ start.velocity)
+    given += base.strain(start.displacement, start.penetrating, start.gaps)
     if lost <= ENERGY_SHARE * abs(given):
         return
     yield from _energy_warning(lost, max(history.largest_energy, abs(given)))
