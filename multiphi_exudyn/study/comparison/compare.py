@@ -93,6 +93,11 @@ class Comparison:
         """Largest NRMSE of the judged points."""
         return max(self.error(run, point, until) for point in self.bench.judged_points)
 
+    def stiff_error(self, run: ModelRun, until: float) -> float:
+        """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stop."""
+        assert self.stiff is not None, "there are no rigid runs without one"
+        return self.stiff.error(run, self.bench.judged_points, until)
+
     def horizon(self, run: ModelRun, tolerance: float) -> float:
         """Agreement horizon [s] of the judged points."""
         pairs = [(run.points[p], self.reference.points[p]) for p in self.bench.judged_points]

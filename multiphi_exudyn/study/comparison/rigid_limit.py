@@ -12,10 +12,8 @@ __all__ = ["from_a_stiff_stop", "rigid_limit"]
 
 def from_a_stiff_stop(comparison: Comparison, name: str) -> str:
     """How far a model with rigid levels is from a stiff stop: "1.48 %"; "" of other models."""
-    if comparison.stiff is None or name not in comparison.rigid:
-        return ""
-    points, until = comparison.bench.judged_points, comparison.headline_window
-    return percent(comparison.stiff.error(comparison.rigid[name], points, until))
+    run = comparison.rigid.get(name)
+    return "" if run is None else percent(comparison.stiff_error(run, comparison.headline_window))
 
 
 def rigid_limit(comparison: Comparison) -> Iterable[str]:
