@@ -232,13 +232,13 @@ class TestRunning:
         rigid = {"name": "rigid", "model": {"kind": "reduced", "contact": "rigid"}, "axes": {"modes": [4, 8]}}
         study = load_study(study_file(STUDY | {"methods": [STUDY["methods"][0], rigid], "axes": {}, "timing": False}))
         result = run_study(study, store, progress=False)
-        found = {row.parameters["method"]: row.values.get("stiff_stop") for row in result.rows}
+        found = {row.parameters["method"]: row.values.get("stiff_stops") for row in result.rows}
         assert found["reference"] is found["coarser"] is found["levels"] is None
         assert [each.setting.setting["modes"] for each in stiff_errors(result, {})] == [4, 8]
         assert all(
             each.uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"] for each in stiff_errors(result, {})
         )
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stop", lambda bench: pytest.fail("run again"))
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: pytest.fail("run again"))
         assert run_study(study, store, progress=False).rows == result.rows
 
     def test_histories_are_kept_on_request(self, study_file, store):

@@ -1,4 +1,4 @@
-"""Rigid levels against a stiff stop, from a study's rows: what they are the limit of, beside the study's reference."""
+"""Rigid levels against stiff stops, from a study's rows: what they are the limit of, beside the study's reference."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["StiffError", "stiff_errors", "stiff_words"]
 
 @dataclass(frozen=True)
 class StiffError:
-    """A setting's largest NRMSE of the judged points against a stop of ``stiffness`` [N/m], and that one's own."""
+    """A setting's largest NRMSE of the judged points against stops from ``stiffness`` [N/m] up, and their own."""
 
     setting: Setting
     error: float
@@ -23,10 +23,10 @@ class StiffError:
 
 
 def stiff_errors(result: StudyResult, at: Mapping[str, Any]) -> list[StiffError]:
-    """Of the settings with rigid levels at one point of the scene's axes that ran, as did the stiff stop."""
-    found = [(setting, setting.values.get("stiff_stop", {})) for setting in settings_at(result, at)]
+    """Of the settings with rigid levels at one point of the scene's axes that ran, as did the stiff stops."""
+    found = [(setting, setting.values.get("stiff_stops", {})) for setting in settings_at(result, at)]
     return [
-        StiffError(setting, error, uncertainty, kept["stiffness"][-1])
+        StiffError(setting, error, uncertainty, kept["stiffness"][0])
         for setting, kept in found
         if (error := _worst(result, kept.get("errors", {}))) is not None
         and (uncertainty := _worst(result, kept.get("uncertainty", {}))) is not None
@@ -38,9 +38,10 @@ def stiff_words(result: StudyResult, at: Mapping[str, Any]) -> Iterable[str]:
     best = min(stiff_errors(result, at), key=lambda each: each.error, default=None)
     if best is not None:
         yield (
-            "Rigid levels are the limit of stiff stops, and are measured against one too: "
-            f"{named(best.setting)} is {percent(best.error)} from a stop of {engineering(best.stiffness)}N/m, which "
-            f"itself is uncertain by {percent(best.uncertainty)}, and {percent(best.setting.error)} from the reference."
+            "Rigid levels are the limit of stiff stops, and are measured against some too: "
+            f"{named(best.setting)} is {percent(best.error)} from stops of {engineering(best.stiffness)}N/m and more, "
+            f"which themselves differ by up to {percent(best.uncertainty)}, and {percent(best.setting.error)} from the "
+            "reference."
         )
 
 

@@ -2,7 +2,7 @@
 
 The error pass runs wherever the executor has workers. At the first point of the scene's axes every setting itself, not
 its nearby ones, is run once more, nudged, for its sensitivity horizon: one number per model is enough, and the other
-points cost what they did. Warnings are kept with every run. Rigid levels are measured against a stiff stop as well. The
+points cost what they did. Warnings are kept with every run. Rigid levels are measured against stiff stops as well. The
 timing pass is another one: each setting again, one at a time, in this process, with nothing else of the study running,
 a first run and its repeats. Every run is kept in the store as it ends, so a study that was stopped goes on where it
 was; maps are made anew with every report.
@@ -25,7 +25,7 @@ from multiphi_exudyn.study.measures.apparent_frequencies import apparent_frequen
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.response_frequencies import level_name
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
-from multiphi_exudyn.study.measures.stiff_stop import StiffStop, rigid_models, stiff_stop
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
@@ -50,7 +50,7 @@ class MeasuredRun:
 
     study: Study
     reference: ModelRun | None
-    stiff: StiffStop | None = None
+    stiff: StiffStops | None = None
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """The run's measures, and the run itself as arrays."""
@@ -66,7 +66,7 @@ class MeasuredRun:
         if self.stiff is None or run.name not in rigid_models(bench):
             return {}
         found = self.stiff.values(bench, {run.name: run})
-        return {"stiff_stop": found | {"errors": found["errors"].get(run.name, {})}}
+        return {"stiff_stops": found | {"errors": found["errors"].get(run.name, {})}}
 
     def _shown(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
         """The frequencies that the run shows by window, and its levels' own, where the study asks for them."""
@@ -140,10 +140,10 @@ def _stored(store: Store, case: Parameters) -> ModelRun | None:
     return from_arrays(arrays) if row is not None and row.status == "ok" and arrays is not None else None
 
 
-def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStop | None:
+def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStops | None:
     """What rigid levels at one point of the axes are measured against too; None where no case with any is left."""
     pending = {case["method"]: case for case in cases if store.find(ERRORS, case) is None}
-    found = (stiff_stop(_bench(study, case)) for case in pending.values())
+    found = (stiff_stops(_bench(study, case)) for case in pending.values())
     return next((stiff for stiff in found if stiff is not None), None)
 
 

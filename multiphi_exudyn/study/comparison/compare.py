@@ -1,6 +1,6 @@
 """Comparison: every model of a scene run once, and measured against the reference.
 
-Rigid levels are measured against a stiff stop too (measures/stiff_stop.py). ``summary`` and ``histories`` are what is
+Rigid levels are measured against stiff stops too (measures/stiff_stops.py). ``summary`` and ``histories`` are what is
 written to disk.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
-from multiphi_exudyn.study.measures.stiff_stop import StiffStop, rigid_models, stiff_stop
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
@@ -33,7 +33,7 @@ class Comparison:
     bench: Workbench
     runs: Mapping[str, ModelRun]
     environment: Mapping[str, Any]
-    stiff: StiffStop | None = None
+    stiff: StiffStops | None = None
 
     @property
     def reference(self) -> ModelRun:
@@ -60,7 +60,7 @@ class Comparison:
 
     @property
     def rigid(self) -> dict[str, ModelRun]:
-        """Runs with rigid levels that can be measured against a stiff stop."""
+        """Runs with rigid levels that can be measured against stiff stops."""
         if self.stiff is None or not self.stiff.ok:
             return {}
         return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
@@ -94,7 +94,7 @@ class Comparison:
         return max(self.error(run, point, until) for point in self.bench.judged_points)
 
     def stiff_error(self, run: ModelRun, until: float) -> float:
-        """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stop."""
+        """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stops."""
         assert self.stiff is not None, "there are no rigid runs without one"
         return self.stiff.error(run, self.bench.judged_points, until)
 
@@ -158,7 +158,7 @@ def compare(
     for name in bench.scene.models:
         started(name)
         runs[name] = run_model(bench, name, progress, retry=True, horizon=True)
-    return Comparison(bench, runs, environment, stiff_stop(bench))
+    return Comparison(bench, runs, environment, stiff_stops(bench))
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
             for name, run in comparison.runs.items()
         },
         "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
-        "stiff_stop": comparison.stiff.values(comparison.bench, comparison.rigid) if comparison.stiff else {},
+        "stiff_stops": comparison.stiff.values(comparison.bench, comparison.rigid) if comparison.stiff else {},
     }
     return _without_nan(content)
 

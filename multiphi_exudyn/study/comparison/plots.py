@@ -99,7 +99,7 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
 def error_time_figure(comparison: Comparison) -> Figure:
     """Worst NRMSE of the judged points against online time, with the reference's own uncertainty.
 
-    Hollow: rigid levels against a stiff stop.
+    Hollow: rigid levels against stiff stops.
     """
     figure, (axes,) = panels(4.6, 1)
     until = comparison.headline_window

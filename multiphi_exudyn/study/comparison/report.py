@@ -91,7 +91,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
             "cost",
             plots.error_time_figure(comparison),
             "Lower left is better. In the grey band a model is as good as the reference can tell. "
-            f"{'Hollow: rigid levels against a stiff stop. ' if comparison.rigid else ''}"
+            f"{'Hollow: rigid levels against stiff stops. ' if comparison.rigid else ''}"
             "Colours are the same in all pictures.",
         )
         yield from _contact_pictures(comparison)

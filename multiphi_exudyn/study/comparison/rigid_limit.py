@@ -1,4 +1,4 @@
-"""Rigid levels beside two stops, in words: the scene's own, and a stiff one, whose limit they are."""
+"""Rigid levels beside the scene's own stop and beside stiff ones, whose limit they are, in words."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent
 
-__all__ = ["from_a_stiff_stop", "rigid_limit"]
+__all__ = ["from_stiff_stops", "rigid_limit"]
 
 
-def from_a_stiff_stop(comparison: Comparison, name: str) -> str:
-    """How far a model with rigid levels is from a stiff stop: "1.48 %"; "" of other models."""
+def from_stiff_stops(comparison: Comparison, name: str) -> str:
+    """How far a model with rigid levels is from stiff stops: "1.48 %"; "" of other models."""
     run = comparison.rigid.get(name)
     return "" if run is None else percent(comparison.stiff_error(run, comparison.headline_window))
 
@@ -27,15 +27,14 @@ def rigid_limit(comparison: Comparison) -> Iterable[str]:
         return
     if not comparison.rigid:
         return
-    until, stiffest = comparison.headline_window, f"{engineering(stiff.stiffness[-1])}N/m"
+    until = comparison.headline_window
     own = percent(stiff.uncertainty(comparison.bench.time, comparison.bench.judged_points, until))
     errors = [
-        f"{name} {from_a_stiff_stop(comparison, name)}{_from_reference(comparison, name)}" for name in comparison.rigid
+        f"{name} {from_stiff_stops(comparison, name)}{_from_reference(comparison, name)}" for name in comparison.rigid
     ]
     yield (
-        f"{told}, so they are measured against one too: to {until:g} s {listed(errors)} from all linear modes on a "
-        f"stop of {stiffest}, which itself differs by {own} from softer stops down to "
-        f"{engineering(stiff.stiffness[0])}N/m."
+        f"{told}, so they are measured against some too: to {until:g} s {listed(errors)} from all linear modes on "
+        f"stops of {engineering(stiff.stiffness[0])}N/m and more, which themselves differ by up to {own}."
     )
     if not all(contact.rigid for contact in comparison.bench.mechanics.contacts):
         yield (

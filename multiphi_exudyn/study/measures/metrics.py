@@ -49,11 +49,12 @@ METRICS = {
         "displacements; 0.01 is 1 %. Not divided by a range or a standard deviation.",
     ),
     "stiff_nrmse": Metric(
-        "difference to a stiff stop (NRMSE)",
+        "difference to stiff stops (NRMSE)",
         "1",
-        "the same, of models with rigid levels, to the linear structure with all modes and stops so stiff that more "
-        "stiffness changes little: the decade above the scene's own stops and above what the structure's finest motion "
-        "opposes to a push, times 100. Its own uncertainty is its largest difference to stops 10 and 100 times softer.",
+        "the same, of models with rigid levels, to the linear structure with all modes on stops so stiff that more "
+        "stiffness changes little: the decade above the scene's own stops and above 1e5 times the structure's static "
+        "stiffness at a contact, and 10 and 100 times as much. The largest of the three counts. Their own uncertainty "
+        "is the largest difference between two of them.",
     ),
     "max_difference": Metric(
         "largest difference",

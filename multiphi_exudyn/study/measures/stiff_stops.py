@@ -1,4 +1,4 @@
-"""The stiff stop: what rigid levels are measured against beside the scene's own stop.
+"""Stiff stops: what rigid levels are measured against beside the scene's own stop.
 
 With the stiffness k of a stop answers converge, about as k^-1/2, and to those of rigid levels. From a soft stop rigid
 levels differ by its softness, which no number of modes removes; what is their own error shows against a stiff one. That
@@ -7,13 +7,15 @@ scene's own stops and above STIFF times the structure's static stiffness at any 
 
     1 / sum (a / omega)^2,  a = Phi^T h, over the elastic modes of the open level.                              [N/m]
 
-The stiffest is the reference. Its uncertainty is its largest difference to the other two: what stiffness still changes,
-and what an answer with many contacts is sensitive to anyway. Large displacements are not in it.
+Of the differences to the three the largest counts: with so many contacts a single one can be lucky. Their own
+uncertainty is the largest difference between two of them: what stiffness still changes, and what the answer is
+sensitive to anyway. Large displacements are not in it.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +31,7 @@ from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warning_groups import kept_back
 
-__all__ = ["StiffStop", "rigid_models", "stiff_stop"]
+__all__ = ["StiffStops", "rigid_models", "stiff_stops"]
 
 STIFF = 1e5  # static stiffnesses: from there on more changes the rig's answers by no more than a nudged start
 FACTORS = (1.0, 10.0, 100.0)  # of the softest of the stiff stops
@@ -38,7 +40,7 @@ Histories = Mapping[str, np.ndarray]  # point -> displacements (k,) [m] on the c
 
 
 @dataclass(frozen=True)
-class StiffStop:
+class StiffStops:
     """stiffness: of the stops [N/m], ascending. histories: the answer with each; none if one failed: ``message``."""
 
     stiffness: tuple[float, ...]
@@ -51,12 +53,13 @@ class StiffStop:
         return not self.message
 
     def error(self, run: ModelRun, points: Sequence[str], until: float) -> float:
-        """Largest NRMSE of the points from 0 to ``until`` [s], against the stiffest stop."""
-        return self._apart(run.points, points, run.time, until)
+        """Largest NRMSE of the points from 0 to ``until`` [s], against any of the stops."""
+        return max(_apart(run.points, stiff, points, run.time, until) for stiff in self.histories)
 
     def uncertainty(self, time: np.ndarray, points: Sequence[str], until: float) -> float:
-        """The same of the softer stops, the largest of them."""
-        return max(self._apart(softer, points, time, until) for softer in self.histories[:-1])
+        """The same of every stop against the stiffer ones."""
+        pairs = itertools.combinations(self.histories, 2)
+        return max(_apart(softer, stiffer, points, time, until) for softer, stiffer in pairs)
 
     def values(self, bench: Workbench, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
         """What JSON holds of it: by window and point its uncertainty, and the errors of ``runs`` by name."""
@@ -78,10 +81,6 @@ class StiffStop:
             "errors": {name: by_window(functools.partial(self.error, run)) for name, run in known.items()},
         }
 
-    def _apart(self, histories: Histories, points: Sequence[str], time: np.ndarray, until: float) -> float:
-        stiffest = self.histories[-1]
-        return max(metrics.nrmse(histories[point], stiffest[point], time, until) for point in points)
-
 
 def rigid_models(bench: Workbench) -> tuple[str, ...]:
     """Names of the scene's models that take every contact as rigid; none where printed frequencies are a level's."""
@@ -92,20 +91,24 @@ def rigid_models(bench: Workbench) -> tuple[str, ...]:
     return tuple(name for name in models if given or getattr(models[name], "contact", "") == "rigid")
 
 
-def stiff_stop(bench: Workbench) -> StiffStop | None:
+def stiff_stops(bench: Workbench) -> StiffStops | None:
     """Run the linear structure against stiff stops; None where no model of the scene has rigid levels."""
     if not rigid_models(bench):
         return None
     softest = 10.0 ** math.ceil(math.log10(_softest(bench)))
     stiffness = tuple(factor * softest for factor in FACTORS)
     try:
-        return StiffStop(stiffness, tuple(_histories(bench, each) for each in stiffness))
+        return StiffStops(stiffness, tuple(_histories(bench, each) for each in stiffness))
     except MultiPhiError as error:
-        return StiffStop(stiffness, (), str(error))
+        return StiffStops(stiffness, (), str(error))
+
+
+def _apart(values: Histories, reference: Histories, points: Sequence[str], time: np.ndarray, until: float) -> float:
+    return max(metrics.nrmse(values[point], reference[point], time, until) for point in points)
 
 
 def _softest(bench: Workbench) -> float:
-    """What the softest of the stiff stops has at least [N/m]; a structure without any stiffness gives no scale."""
+    """What the softest of the stops has at least [N/m]; a structure without any stiffness gives no scale."""
     level = MultiPhiModel(bench.structure, bench.contacts(rigid=True), modes="all").level(())
     elastic = level.squares > 0
     flexibilities = level.gap_rows[:, elastic] ** 2 @ (1 / level.squares[elastic])
