@@ -11,7 +11,7 @@ import numpy as np
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.exact import BouncingBar
 
-__all__ = ["clamped_bar", "free_bar", "nodes"]
+__all__ = ["clamped_bar", "elastic_bar", "free_bar", "nodes"]
 
 
 def nodes(elements: int, length: float) -> np.ndarray:
@@ -29,14 +29,19 @@ def clamped_bar(elements: int) -> LinearStructure:
 
 
 def free_bar(elements: int) -> LinearStructure:
-    """The bar of ``exact.BouncingBar``, free at both ends.
+    """The bar of ``exact.BouncingBar``, free at both ends; see ``elastic_bar``."""
+    bar = BouncingBar()
+    return elastic_bar(elements, bar.length, stiffness=bar.modulus, density=bar.density)
+
+
+def elastic_bar(elements: int, length: float, *, stiffness: float, density: float) -> LinearStructure:
+    """A bar free at both ends: EA [N], rho A [kg/m].
 
     Points ``bottom``, ``top`` and ``centre``, the centre of mass: the force -rho A L g there is the weight.
     """
-    bar = BouncingBar()
-    mass, stiffness = _matrices(elements, bar.length / elements, stiffness=bar.modulus, density=bar.density)
+    mass, stiffnesses = _matrices(elements, length / elements, stiffness=stiffness, density=density)
     centre = mass.sum(axis=0) / mass.sum()
-    return LinearStructure(mass, stiffness, points={"bottom": 0, "top": elements, "centre": centre})
+    return LinearStructure(mass, stiffnesses, points={"bottom": 0, "top": elements, "centre": centre})
 
 
 def _matrices(elements: int, size: float, *, stiffness: float, density: float) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -48,7 +49,10 @@ def comparison(bench):
     shares = dict(zip(bench.scene.models, (0.02, 0.2, 0.03, 0.0, 0.01, 0.04), strict=True))
     times_s = dict(zip(bench.scene.models, (0.01, 0.01, 0.1, 10.0, 5.0, 1.0), strict=True))
     runs = {name: drawn(bench, name, share, times_s[name]) for name, share in shares.items()}
-    return Comparison(bench, runs, ENVIRONMENT)
+    stiff = [
+        {name: factor * values for name, values in runs["rigid-r6"].points.items()} for factor in (1.03, 1.02, 1.01)
+    ]
+    return Comparison(bench, runs, ENVIRONMENT, StiffStops((1e8, 1e9, 1e10), tuple(stiff)))
 
 
 def drawn(bench, name, share, online_s):
@@ -91,7 +95,9 @@ def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
     assert "takes 10 ms instead of 10 s: 1000 times faster" in found.outcome
     doubts = " ".join(found.distrust)
     assert "coarser copy of itself by 1.00 % to 0.1 s" in doubts
-    assert "another contact law" in doubts
+    assert "rigid-r6 2.91 % (from the reference 20.0 %) from all linear modes on stops of 100 MN/m and more" in doubts
+    assert "which themselves differ by up to 1.98 %" in doubts
+    assert "more modes do not remove it" in doubts
 
 
 def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):
@@ -124,8 +130,10 @@ def test_the_summary_is_json_with_the_agreed_keys(comparison):
     content = json.loads(json.dumps(summary(comparison), allow_nan=False))
     assert set(content) == {
         "scene", "environment", "reference", "models", "reference_uncertainty", "errors",
-        "agreement_horizon_s", "contact_intervals", "ledger",
+        "agreement_horizon_s", "contact_intervals", "ledger", "stiff_stops",
     }  # fmt: skip
+    assert content["stiff_stops"]["errors"]["rigid-r6"]["0.1"]["tip"] == pytest.approx(0.03 / 1.03)
+    assert content["stiff_stops"]["uncertainty"]["0.1"]["tip"] == pytest.approx(0.02 / 1.01)
     assert content["reference"] == "full"
     model = content["models"]["compliant-r6"]
     wanted = {"kind": "reduced", "dofs": 6, "status": "ok", "message": "", "steps": 100, "online_s": 0.01}
@@ -141,6 +149,20 @@ def test_the_histories_are_arrays_on_one_grid(comparison):
     arrays = histories(comparison)
     assert arrays["rigid-r6/point/tip"].shape == arrays["time"].shape
     assert {"full/gap/stop", "full/force/stop", "full/energy", "full/energy_time"} <= set(arrays)
+
+
+def test_without_rigid_levels_no_stiff_stop_is_told_of(comparison):
+    plain = replace(comparison, stiff=None)
+    assert "stiff" not in " ".join(findings(plain).distrust)
+    assert "Rigid levels" not in text_of(render(plain, (), ()))
+    assert summary(plain)["stiff_stops"] == {}
+
+
+def test_a_stiff_stop_that_failed_is_told_with_its_cause(comparison):
+    spoiled = replace(comparison, stiff=StiffStops((1e8, 1e9, 1e10), (), "chatter at 0.1 s"))
+    assert "nothing with stiff stops ran: chatter at 0.1 s" in " ".join(findings(spoiled).distrust)
+    assert summary(spoiled)["stiff_stops"]["errors"] == {}
+    assert "Rigid levels against stiff stops" not in text_of(render(spoiled, (), ()))
 
 
 def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(comparison):

@@ -9,6 +9,7 @@ from small_scene import BEAM, changed, write
 from multiphi_exudyn import MultiPhiValueError
 from multiphi_exudyn.study.accuracy.analysis import points, settings, uncertainty
 from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studies
+from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
 from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
@@ -224,6 +225,21 @@ class TestRunning:
         failed = [s for s in settings(result) if s.method == "stepwise"]
         assert all(s.error is None and s.message.startswith("failed: ") for s in failed)
         assert all(s.error is not None for s in settings(result) if s.method == "levels")
+
+    def test_rigid_levels_are_measured_against_a_stiff_stop_too_and_nothing_else_is(
+        self, study_file, store, monkeypatch
+    ):
+        rigid = {"name": "rigid", "model": {"kind": "reduced", "contact": "rigid"}, "axes": {"modes": [4, 8]}}
+        study = load_study(study_file(STUDY | {"methods": [STUDY["methods"][0], rigid], "axes": {}, "timing": False}))
+        result = run_study(study, store, progress=False)
+        found = {row.parameters["method"]: row.values.get("stiff_stops") for row in result.rows}
+        assert found["reference"] is found["coarser"] is found["levels"] is None
+        assert [each.setting.setting["modes"] for each in stiff_errors(result, {})] == [4, 8]
+        assert all(
+            each.uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"] for each in stiff_errors(result, {})
+        )
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: pytest.fail("run again"))
+        assert run_study(study, store, progress=False).rows == result.rows
 
     def test_histories_are_kept_on_request(self, study_file, store):
         for keep in (False, True):

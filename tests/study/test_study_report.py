@@ -148,6 +148,18 @@ def test_every_section_with_data_appears_in_its_place(page):
     ]
 
 
+def test_rigid_levels_stand_beside_a_stiff_stop():
+    stiff = {"stiffness": [1e8, 1e9, 1e10], "errors": {"0.3": {"node2": 0.005, "node3": 0.011}}}
+    stiff["uncertainty"] = {"0.3": {"node2": 0.009, "node3": 0.01}}
+    rows = [row("reference"), coarser({}), row("Multi-Phi, rigid", 0.12, setting={"modes": 6}, stiff_stops=stiff)]
+    result = result_of([*rows, row("Multi-Phi", 0.01, setting={"modes": 6})])
+    told = " ".join(findings(result).distrust)
+    assert (
+        "rigid (r = 6) is 1.10 % from stops of 100 MN/m and more, which themselves differ by up to 1.00 %, and" in told
+    )
+    assert "Multi-Phi, rigid r = 6 12.0 % 1.10 % own uncertainty 0.10 % 1.00 %" in text_of(render_study(result))
+
+
 def test_sections_without_data_do_not_appear():
     bare = render_study(result_of([row("reference"), row("a", 0.1)], assumptions=()))
     assert headings(bare) == ["How it was measured", "How the numbers are defined"]

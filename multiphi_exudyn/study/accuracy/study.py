@@ -2,9 +2,10 @@
 
 The error pass runs wherever the executor has workers. At the first point of the scene's axes every setting itself, not
 its nearby ones, is run once more, nudged, for its sensitivity horizon: one number per model is enough, and the other
-points cost what they did. Warnings are kept with every run. The timing pass is another one: each setting again, one at
-a time, in this process, with nothing else of the study running, a first run and its repeats. Every run is kept in the
-store as it ends, so a study that was stopped goes on where it was; maps are made anew with every report.
+points cost what they did. Warnings are kept with every run. Rigid levels are measured against stiff stops as well. The
+timing pass is another one: each setting again, one at a time, in this process, with nothing else of the study running,
+a first run and its repeats. Every run is kept in the store as it ends, so a study that was stopped goes on where it
+was; maps are made anew with every report.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from multiphi_exudyn.study.measures.apparent_frequencies import apparent_frequen
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.response_frequencies import level_name
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
@@ -41,10 +43,14 @@ KEPT = 4  # natural frequencies of a level that a row keeps: the tables of the p
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """A case of the error pass: one run, measured against the reference at its point of the axes."""
+    """A case of the error pass: one run, measured against the reference at its point of the axes.
+
+    stiff: what rigid levels are measured against too.
+    """
 
     study: Study
     reference: ModelRun | None
+    stiff: StiffStops | None = None
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """The run's measures, and the run itself as arrays."""
@@ -53,7 +59,14 @@ class MeasuredRun:
         run = run_model(bench, self.study.model_name(parameters), progress=False, horizon=nudged)
         indicator = run.indicators.get(f"{_window(self.study, bench):g}")
         values = measures(bench, run, self.reference) | {"indicator": indicator}
-        return Outcome(values | self._shown(bench, run), to_arrays(run), run.status, run.message)
+        values |= self._against_stiff(bench, run) | self._shown(bench, run)
+        return Outcome(values, to_arrays(run), run.status, run.message)
+
+    def _against_stiff(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
+        if self.stiff is None or run.name not in rigid_models(bench):
+            return {}
+        found = self.stiff.values(bench, {run.name: run})
+        return {"stiff_stops": found | {"errors": found["errors"].get(run.name, {})}}
 
     def _shown(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
         """The frequencies that the run shows by window, and its levels' own, where the study asks for them."""
@@ -113,8 +126,9 @@ def run_study(study: Study, store: Store, executor: Executor | None = None, prog
     for case in references:
         reference = _stored(store, case)
         if reference is not None:  # without one nothing can be measured there
-            measured, kept = MeasuredRun(study, reference), study.file.histories
-            rows += passed(measured, study.runs(case["at"]), ERRORS, executor=executor, keep_histories=kept)
+            cases, kept = study.runs(case["at"]), study.file.histories
+            measured = MeasuredRun(study, reference, _stiff(study, cases, store))
+            rows += passed(measured, cases, ERRORS, executor=executor, keep_histories=kept)
     budgets = passed(BudgetRun(study), study.budgets(), BUDGETS, executor=executor)
     timings = passed(TimedRun(study), _timed(study, rows), TIMING) if study.file.timing else ()
     return _result(study, tuple(rows), timings, budgets, store)
@@ -124,6 +138,13 @@ def _stored(store: Store, case: Parameters) -> ModelRun | None:
     """A run that is ok, from its arrays."""
     row, arrays = store.find(ERRORS, case), store.histories(ERRORS, case)
     return from_arrays(arrays) if row is not None and row.status == "ok" and arrays is not None else None
+
+
+def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStops | None:
+    """What rigid levels at one point of the axes are measured against too; None where no case with any is left."""
+    pending = {case["method"]: case for case in cases if store.find(ERRORS, case) is None}
+    found = (stiff_stops(_bench(study, case)) for case in pending.values())
+    return next((stiff for stiff in found if stiff is not None), None)
 
 
 def _bench(study: Study, parameters: Mapping[str, Any]) -> Workbench:

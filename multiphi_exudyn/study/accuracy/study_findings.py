@@ -27,6 +27,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
 )
 from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
 from multiphi_exudyn.study.accuracy.frequency_findings import frequency_asked, frequency_outcome
+from multiphi_exudyn.study.accuracy.stiff_errors import stiff_words
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence, times
 
@@ -189,6 +190,7 @@ def _distrust(result: StudyResult) -> Iterable[str]:
     yield from map(sentence, warned(result))
     for at in shown_points(result):
         yield _own_uncertainty(result, at)
+        yield from stiff_words(result, at)
     yield from _failures(result)
     yield from _times(result)
     if result.timings:

@@ -31,6 +31,7 @@ from multiphi_exudyn.study.accuracy.frequency_figure import frequency_figure
 from multiphi_exudyn.study.accuracy.frequency_findings import signed, value_words
 from multiphi_exudyn.study.accuracy.indicator import Correlation, indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
+from multiphi_exudyn.study.accuracy.stiff_errors import StiffError, stiff_errors
 from multiphi_exudyn.study.accuracy.study_findings import (
     choices,
     error_words,
@@ -67,6 +68,7 @@ class Point:
     pareto: Picture | None
     convergence: Picture | None
     lines: tuple[Series, ...]
+    stiff: tuple[StiffError, ...]
     contact: tuple[Setting, ...]
 
 
@@ -130,6 +132,7 @@ def _point(result: StudyResult, at: Mapping[str, Any]) -> Point:
         _pareto(result, at, drawn),
         _convergence(result, at),
         tuple(line for line in lines if line is not None),
+        tuple(stiff_errors(result, at)),
         tuple(s for s in (*_references(result, at), *most_accurate(result, at)) if s.values.get("first_contact")),
     )
 

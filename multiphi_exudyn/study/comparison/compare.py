@@ -1,6 +1,7 @@
 """Comparison: every model of a scene run once, and measured against the reference.
 
-``summary`` and ``histories`` are what is written to disk.
+Rigid levels are measured against stiff stops too (measures/stiff_stops.py). ``summary`` and ``histories`` are what is
+written to disk.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
@@ -23,11 +25,15 @@ __all__ = ["Comparison", "compare", "histories", "summary"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs of one scene, in the scene's order; environment: where they ran."""
+    """Runs of one scene, in the scene's order; environment: where they ran.
+
+    stiff: what rigid levels are measured against beside the reference; None where there are none.
+    """
 
     bench: Workbench
     runs: Mapping[str, ModelRun]
     environment: Mapping[str, Any]
+    stiff: StiffStops | None = None
 
     @property
     def reference(self) -> ModelRun:
@@ -51,6 +57,13 @@ class Comparison:
         if not self.reference.ok:
             return {}
         return {name: run for name, run in self.runs.items() if run.ok and run is not self.reference}
+
+    @property
+    def rigid(self) -> dict[str, ModelRun]:
+        """Runs with rigid levels that can be measured against stiff stops."""
+        if self.stiff is None or not self.stiff.ok:
+            return {}
+        return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
 
     @property
     def warnings(self) -> dict[str, list[str]]:
@@ -79,6 +92,11 @@ class Comparison:
     def worst_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points."""
         return max(self.error(run, point, until) for point in self.bench.judged_points)
+
+    def stiff_error(self, run: ModelRun, until: float) -> float:
+        """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stops."""
+        assert self.stiff is not None, "there are no rigid runs without one"
+        return self.stiff.error(run, self.bench.judged_points, until)
 
     def horizon(self, run: ModelRun, tolerance: float) -> float:
         """Agreement horizon [s] of the judged points."""
@@ -140,7 +158,7 @@ def compare(
     for name in bench.scene.models:
         started(name)
         runs[name] = run_model(bench, name, progress, retry=True, horizon=True)
-    return Comparison(bench, runs, environment)
+    return Comparison(bench, runs, environment, stiff_stops(bench))
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
@@ -165,6 +183,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
             for name, run in comparison.runs.items()
         },
         "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
+        "stiff_stops": comparison.stiff.values(comparison.bench, comparison.rigid) if comparison.stiff else {},
     }
     if comparison.bench.mechanics.frictions:
         content["stick_intervals"] = {

@@ -13,6 +13,7 @@ from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting
+from multiphi_exudyn.study.comparison.rigid_limit import rigid_limit
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, times
 from multiphi_exudyn.study.measures import metrics
@@ -157,7 +158,7 @@ def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from map(sentence, warned(comparison))
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
-    yield from _contact_law(comparison)
+    yield from rigid_limit(comparison)
     yield from _force_laws(comparison)
     if comparison.bench.overrides:
         yield (
@@ -197,19 +198,6 @@ def _sensitivity(comparison: Comparison) -> Iterable[str]:
             f"Contact makes nearby runs separate. Curve by curve the comparison holds to 5 % until: {listed}; "
             "after that compare contact times and energies, not curves."
         )
-
-
-def _contact_law(comparison: Comparison) -> Iterable[str]:
-    rigid = [run for run in comparison.measured.values() if run.kind != "full" and "rigid levels" in run.label]
-    if not rigid or all(contact.rigid for contact in comparison.bench.mechanics.contacts):
-        return
-    until = comparison.headline_window
-    errors = ", ".join(f"{run.name} {percent(comparison.worst_error(run, until))}" for run in rigid)
-    yield (
-        f"Rigid levels (to {until:g} s: {errors}) obey another contact law than the reference: an impact without "
-        "rebound against a stop that gives way and pushes back. More modes do not remove that difference; "
-        "it is the law, not the truncation. Levels of the reference's own stiffness have no such difference."
-    )
 
 
 def _force_laws(comparison: Comparison) -> Iterable[str]:

@@ -99,7 +99,10 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
 
 
 def error_time_figure(comparison: Comparison) -> Figure:
-    """Worst NRMSE of the judged points against online time, with the reference's own uncertainty."""
+    """Worst NRMSE of the judged points against online time, with the reference's own uncertainty.
+
+    Hollow: rigid levels against stiff stops.
+    """
     figure, (axes,) = panels(4.6, 1)
     until = comparison.headline_window
     style = styles(comparison)
@@ -109,6 +112,9 @@ def error_time_figure(comparison: Comparison) -> Figure:
         axes.loglog(run.online_s, error, drawn.marker, color=drawn.colour, markersize=9, mec="white")
         if run not in nearby:
             axes.annotate(name, (run.online_s, error), (8, 4), textcoords="offset points", fontsize=9)
+    for name, run in comparison.rigid.items():
+        error, drawn = 100 * comparison.stiff_error(run, until), style[name]
+        axes.loglog(run.online_s, error, drawn.marker, mfc="none", mec=drawn.colour, markersize=9)
     _error_time_frame(axes, comparison, until)
     return figure
 
@@ -265,6 +271,7 @@ def _error_time_frame(axes: Axes, comparison: Comparison, until: float) -> None:
         place = {"xycoords": ("data", "axes fraction"), "ha": "right", "va": "top", "rotation": 90}
         _note(axes, "online time of the reference", (reference.online_s, 0.98), **place)
     errors = [100 * comparison.worst_error(run, until) for run in comparison.measured.values()]
+    errors += [100 * comparison.stiff_error(run, until) for run in comparison.rigid.values()]
     errors = [error for error in errors if error > 0]
     if errors:
         axes.set_ylim(min(errors) / 4, max(errors) * 3)

@@ -23,7 +23,17 @@ from reference_models.rig import rig
 __all__ = ["render"]
 
 TEMPLATE = "report.html.j2"
-ON_THE_PAGE = ("nrmse", "horizon", "horizon_s", "first_contact", "inner_losses", "closed_time", "impulse", "ledger")
+ON_THE_PAGE = (
+    "nrmse",
+    "stiff_nrmse",
+    "horizon",
+    "horizon_s",
+    "first_contact",
+    "inner_losses",
+    "closed_time",
+    "impulse",
+    "ledger",
+)
 HISTORY = (
     "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
@@ -82,6 +92,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
             "cost",
             plots.error_time_figure(comparison),
             "Lower left is better. In the grey band a model is as good as the reference can tell. "
+            f"{'Hollow: rigid levels against stiff stops. ' if comparison.rigid else ''}"
             "Colours are the same in all pictures.",
         )
         yield from _contact_pictures(comparison)

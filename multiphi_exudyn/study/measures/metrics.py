@@ -48,6 +48,14 @@ METRICS = {
         "||y - ref|| / ||ref|| over the samples from 0 to the window's end, y and ref being one point's "
         "displacements; 0.01 is 1 %. Not divided by a range or a standard deviation.",
     ),
+    "stiff_nrmse": Metric(
+        "difference to stiff stops (NRMSE)",
+        "1",
+        "the same, of models with rigid levels, to the linear structure with all modes on stops so stiff that more "
+        "stiffness changes little: the decade above the scene's own stops and above 1e5 times the structure's static "
+        "stiffness at a contact, and 10 and 100 times as much. The largest of the three counts. Their own uncertainty "
+        "is the largest difference between two of them.",
+    ),
     "max_difference": Metric(
         "largest difference",
         "m",

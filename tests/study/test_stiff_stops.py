@@ -1,0 +1,83 @@
+"""Stiff stops: rigid levels are their limit, and they are run only where there are any."""
+
+import numpy as np
+import pytest
+from small_scene import BEAM, changed, write
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.study.measures import stiff_stops as module
+from multiphi_exudyn.study.measures.stiff_stops import rigid_models, stiff_stops
+from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
+
+RIGID = {"kind": "reduced", "name": "rigid", "contact": "rigid", "modes": "all"}
+
+
+def bench_of(tmp_path, *models, data=BEAM):
+    data = data | {"models": [*BEAM["models"], *models]}
+    scene = load_scene(write(tmp_path / "scene.toml", data))
+    return prepare(scene, mechanics_of(scene))
+
+
+def one_mass(tmp_path, stiffness, mass=2.0):
+    np.savez(tmp_path / "one.npz", mass=[[mass, 0.0], [0.0, 1.0]], stiffness=np.diag([300.0, 1.0]))
+    data = BEAM | {
+        "structure": {"matrices": "one.npz", "points": {"middle": 0, "tip": 1}},
+        "damping": {"modal_ratios": []},
+    }
+    data |= {
+        "start": {"load_at": "tip", "force": 1.0},
+        "models": [RIGID | {"modes": 1}],
+        "comparison": {"reference": "rigid"},
+    }
+    data["contacts"] = [BEAM["contacts"][0] | {"stiffness": stiffness}]
+    scene = load_scene(write(tmp_path / "one.toml", data))
+    return prepare(scene, mechanics_of(scene))
+
+
+@pytest.mark.parametrize(("own", "softest"), [("rigid", 1e8), (1e2, 1e8), (2e9, 1e10), (1e9, 1e9)])
+def test_the_softest_is_the_decade_above_the_structure_and_the_scenes_own_stop(tmp_path, own, softest):
+    """Of a mass on a spring of 300 N/m: 3e7."""
+    assert stiff_stops(one_mass(tmp_path, own)).stiffness == pytest.approx([softest, 10 * softest, 100 * softest])
+
+
+def test_rigid_levels_are_near_stiff_stops_and_far_from_the_scenes_soft_one(tmp_path):
+    bench = bench_of(tmp_path, RIGID, data=changed(["contacts", 0, "stiffness"], 1e4))
+    stiff, rigid, soft = stiff_stops(bench), run_model(bench, "rigid"), run_model(bench, "all")
+    from_stiff = stiff.error(rigid, ("tip",), 0.1)
+    assert max(from_stiff, stiff.uncertainty(bench.time, ("tip",), 0.1)) < 0.03
+    assert stiff.error(soft, ("tip",), 0.1) > 0.1
+    values = stiff.values(bench, {"rigid": rigid})
+    assert values["errors"]["rigid"]["0.1"]["tip"] == from_stiff
+
+
+def test_loads_that_need_the_scenes_own_mesh_act_on_it(tmp_path):
+    full = {"kind": "full", "name": "full", "elements": 3, "step": 1e-3}
+    data = BEAM | {"loads": [{"kind": "gravity", "acceleration": 9.81}]}
+    assert stiff_stops(bench_of(tmp_path, RIGID, full, data=data)).ok
+
+
+def test_without_rigid_levels_nothing_is_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "simulate", None)
+    assert stiff_stops(bench_of(tmp_path)) is None
+    free = BEAM | {"contacts": []}
+    assert stiff_stops(bench_of(tmp_path, RIGID, data=free)) is None
+
+
+def test_levels_with_printed_frequencies_have_no_stiff_stop():
+    scene = load_scene("paper-rig-as-published", t_end=0.01)
+    assert rigid_models(prepare(scene, mechanics_of(scene))) == ()
+
+
+def test_a_failure_is_told_and_measures_nothing(tmp_path, monkeypatch):
+    def failing(*_):
+        raise NumericalFailure("no way")
+
+    monkeypatch.setattr(module, "_histories", failing)
+    bench = bench_of(tmp_path, RIGID)
+    stiff = stiff_stops(bench)
+    assert not stiff.ok
+    values = stiff.values(bench, {"rigid": run_model(bench, "rigid")})
+    assert (values["message"], values["errors"], values["uncertainty"]) == ("no way", {}, {})
