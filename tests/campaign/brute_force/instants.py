@@ -107,7 +107,7 @@ class Instants:
         return values[0] > DEPENDENT * values[-1]
 
     def _struck(self, y, w, touching, answer):
-        """Moreau's impact: impulses p >= 0, speeds u >= 0, p u = 0, by trying every set; u of after it + e of before."""
+        """Moreau's impact: impulses p >= 0, speeds u >= 0 (and e times those before), p u = 0, by trying every set."""
         u = np.array([self._rate(i, y, w) for i in touching])
         if not len(u) or np.min(u) >= -ZERO * self.speed:
             return y
