@@ -8,6 +8,11 @@ Case by case, each from its kind and number alone: no exception but a named one,
 Prescott,Haswell`` the same cases run under each of these kernels of the linear algebra library, each in its own
 process, and their statuses, numbers of events and answers are compared.
 
+Kinds with dry friction: a slider alone, blocks, springs in series ("jenkins"), of all laws under several loads, beside
+contacts that give way, beside rigid ones ("friction impacts"), on bodies that nothing else holds, at rest exactly at
+their limits, in other units, and contacts that rub in proportion to their forces ("contact friction"). The energy that
+friction takes is compared too.
+
 Finished chunks stand in a file, so that a campaign that was stopped goes on where it was; the summary names every
 failing case with its cause. A case alone: ``--kinds viscous --first 17 --count 1``.
 """

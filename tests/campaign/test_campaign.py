@@ -118,6 +118,25 @@ class TestBruteForce:
         assert answer.impulse[0] == pytest.approx(math.cos(math.pi / 6), abs=1e-13)
         assert answer.impact == pytest.approx(0.375, abs=1e-13)
 
+    def test_bounces_until_it_rests(self):
+        """A ball from 1 m, e .5: it rests after sqrt(2 h / g) (1 + e) / (1 - e)."""
+        floor = bf.Stop(np.ones(1), 0.0, restitution=0.5)
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), [floor], constant=np.array([-9.81]))
+        answer = bf.solved(system, np.ones(1), np.zeros(1), np.array([1.0, 1.354570922957, 2.0]))
+        first = math.sqrt(2 / 9.81)
+        second = 1.0 - 2 * first
+        height = 0.25 * 9.81 * first * second - 9.81 * second**2 / 2
+        assert answer.displacement[0] == pytest.approx([height, 0.0, 0.0], abs=1e-10)
+        assert answer.impact == pytest.approx(9.81, rel=1e-10)
+
+    def test_three_balls_that_touch_share_an_impact(self):
+        """e 1, v- = (1, 0, 0): v+ = (-1, 2, 2) / 3."""
+        stops = [bf.Stop(np.array(row), 0.0, restitution=1.0) for row in ([-1.0, 1.0, 0.0], [0.0, -1.0, 1.0])]
+        system = bf.System(np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)), stops)
+        answer = bf.solved(system, np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.5]))
+        assert answer.velocity[:, 0] == pytest.approx([-1 / 3, 2 / 3, 2 / 3], abs=1e-13)
+        assert answer.impact == pytest.approx(0.0, abs=1e-13)
+
     def test_swings_on_a_compliant_stop(self):
         """Mass 1 without a spring against 4 N/m: half a period of 2 rad/s, and back."""
         system = bf.System(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), [bf.Stop(np.ones(1), 0.0, 4.0)])

@@ -2,7 +2,7 @@
 
     M x'' + C x' + K x = sum_j p_j u_j(t) - M e z_b''(t) + sum_i h_i lambda_i,   g_i = h_i.x + gap_i - z_i(t)
 
-    rigid      0 <= lambda, g >= 0, lambda g = 0, plastic impacts (Moreau)
+    rigid      0 <= lambda, g >= 0, lambda g = 0, impacts by Moreau's law, plastic or with e
     compliant  lambda = k max(0, -g)
     viscous    lambda = max(0, -k g - c g') where g < 0
     law        -F(q) along p, F straight between knots and beyond them

@@ -107,12 +107,13 @@ class Instants:
         return values[0] > DEPENDENT * values[-1]
 
     def _struck(self, y, w, touching, answer):
-        """Moreau's impact: impulses p >= 0, speeds u >= 0, p u = 0, by trying every set."""
+        """Moreau's impact: impulses p >= 0, speeds u >= 0 (and e times those before), p u = 0, by trying every set."""
         u = np.array([self._rate(i, y, w) for i in touching])
         if not len(u) or np.min(u) >= -ZERO * self.speed:
             return y
-        rows = self.rows[touching]
+        rows, stops = self.rows[touching], self.levels.system.stops
         flexibility, best = rows @ self.inverse @ rows.T, (np.inf, None)
+        before, u = u, u * np.array([1 + stops[i].restitution for i in touching])
         for count in range(1, len(touching) + 1):
             for chosen in itertools.combinations(range(len(touching)), count):
                 pushed = list(chosen)
@@ -127,7 +128,7 @@ class Instants:
         if best[0] > 1e-8:
             raise NoAnswer("no admissible impact")
         y = y.copy()
-        answer.impact += float(-best[1] @ u - 0.5 * best[1] @ flexibility @ best[1])
+        answer.impact += float(-best[1] @ before - 0.5 * best[1] @ flexibility @ best[1])
         y[self.n : 2 * self.n] += self.inverse @ rows.T @ best[1]
         y[2 * self.n :][touching] += best[1]
         return y

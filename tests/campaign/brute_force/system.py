@@ -24,13 +24,17 @@ class Course:
 
 @dataclass(frozen=True)
 class Stop:
-    """A contact: row h, gap [m], stiffness k and damping c; course of its stop."""
+    """A contact: row h, gap [m], stiffness k and damping c; course of its stop.
+
+    restitution: e of a rigid one, the same of all that are struck together.
+    """
 
     row: np.ndarray
     gap: float
     stiffness: float = np.inf
     damping: float = 0.0
     course: Course | None = None
+    restitution: float = 0.0
 
 
 @dataclass(frozen=True)

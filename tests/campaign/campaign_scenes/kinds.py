@@ -1,7 +1,7 @@
 """Kinds of scenes, each a function of a random generator; DRAWN has them by name."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import brute_force as bf
 import numpy as np
@@ -320,6 +320,18 @@ def _units(random):
     return replace(scene, units=powers)
 
 
+def _restitution(random):
+    """Rigid contacts that throw back, all with the same coefficient."""
+    parts = random_parts(random)
+    add_contacts(parts, "rigid")
+    e = float(random.choice([1.0, random.uniform(0.1, 0.9)]))
+    parts.contacts = [replace(contact, restitution=e) for contact in parts.contacts]
+    parts.stops = [replace(stop, restitution=e) for stop in parts.stops]
+    if random.random() < 0.6:
+        random.choice([add_harmonic_load, add_gravity, add_constant_load])(parts)
+    return parts.scene(velocity=random_velocity(parts))
+
+
 def _restarts(random):
     parts = random_parts(random)
     add_contacts(parts, str(random.choice(["rigid", "compliant", "viscous", "mixed"])))
@@ -351,3 +363,5 @@ DRAWN = {
     "units": _units,
     "restarts": _restarts,
 }
+if "restitution" in {f.name for f in fields(mp.UnilateralContact)}:
+    DRAWN["restitution"] = _restitution
