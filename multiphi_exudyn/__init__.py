@@ -24,6 +24,7 @@ from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import (
     BaseMotion,
     ConstantLoad,
@@ -53,6 +54,7 @@ __all__ = [
     "Event",
     "ForceLaw",
     "FrequencyResponse",
+    "Friction",
     "FunctionLoad",
     "Gravity",
     "Harmonic",

@@ -101,6 +101,7 @@ class Excitation:
         for number, load in enumerate(loads):
             channels.called = _called(number, load)
             channels.add(load)
+        channels.add_surfaces()
         channels.add_static(static_load(model, loads))
         patterns = columns(channels.patterns, base.modes.count)
         stops = columns(channels.stops, len(model.contacts))
@@ -203,7 +204,8 @@ class _Channels:
             self._check_stop(load.contact)
             stop = self._no_stop()
             stop[self._model.index(load.contact)] = 1.0
-            self._move(stop, load.course)
+            self._check_smooth(stop, load.course)
+            self._move(stop, self._history(load.course))
         elif isinstance(load, BaseMotion):
             self._shake(load)
         elif not isinstance(load, (ConstantLoad, Gravity)):
@@ -211,6 +213,12 @@ class _Channels:
                 f"loads: got {type(load).__name__}, need ConstantLoad, Gravity, HarmonicLoad, SampledLoad, "
                 "FunctionLoad, SweepLoad, StopMotion or BaseMotion"
             )
+
+    def add_surfaces(self) -> None:
+        """Counter-surfaces that move, each with its constant speed, are one channel: the time."""
+        speeds = np.array([contact.velocity for contact in self._model.contacts])
+        if np.any(speeds):
+            self._move(speeds, PiecewiseExponential.line(1.0))
 
     def add_static(self, load: np.ndarray) -> None:
         """Constant loads (m,); those that pull at damped rigid-body motion are a channel too.
@@ -237,23 +245,28 @@ class _Channels:
             i = self._model.index(name)
             fixed[i] = -float(structure.row(self._model.contacts[i].direction) @ moved)
         if np.any(fixed):
-            self._move(fixed, load.course)
+            self._check_smooth(fixed, load.course)
+            self._move(fixed, self._history(load.course))
 
     def _check_stop(self, name: str) -> None:
         contact = self._model.contacts[self._model.index(name)]
         if isinstance(contact, LawSpring):
             raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
 
-    def _move(self, stop: np.ndarray, course: TimeFunction) -> None:
-        """Stops that move by their entries of (c,) times the course."""
-        history, nothing = self._history(course), np.zeros(self._model.base.modes.count)
-        self._append(nothing, stop, history)
-        moving = [contact for contact, moves in zip(self._model.contacts, stop, strict=True) if moves]
-        rigid = [contact.name for contact in moving if contact.rigid]
+    def _check_smooth(self, stop: np.ndarray, course: TimeFunction) -> None:
+        """Refuse samples where they move a rigid contact's stop."""
+        rigid = [c.name for c, moves in zip(self._model.contacts, stop, strict=True) if moves and c.rigid]
         if rigid and isinstance(course, Sampled):
             raise MultiPhiTypeError(
                 f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
             )
+
+    def _move(self, stop: np.ndarray, history: PiecewiseExponential) -> None:
+        """Stops that move by their entries of (c,) times a history."""
+        nothing = np.zeros(self._model.base.modes.count)
+        self._append(nothing, stop, history)
+        moving = [contact for contact, moves in zip(self._model.contacts, stop, strict=True) if moves]
+        rigid = [contact.name for contact in moving if contact.rigid]
         viscous = [contact.name for contact in moving if contact.damping]
         if rigid or viscous:
             self._check_continuous(history, f"of the stop of {(rigid + viscous)[0]!r}", speed=bool(rigid))

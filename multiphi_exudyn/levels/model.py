@@ -33,9 +33,9 @@ LOADS = 8  # static loads for which a model keeps what simulations have made of 
 class MultiPhiModel:
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
-    structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws; kept with every law by its
-    chain of springs. With c contacts there are 2^c levels, and for every law as many times that as it has segments, of
-    which only those asked for are built.
+    structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws, kept with every law by its
+    chain of springs; and friction. With c contacts there are 2^c levels, for every law as many times that as it has
+    segments, for every friction three times that, of which only those asked for are built.
     modes: r of every level, all that it has where they are fewer, or "all"; or ``UpTo`` a frequency; None: chosen from
     static responses, without a run (mode_choice.py); or a ``Tolerance``: the first run under ``simulate`` decides, once
     for this model, and every later one has the modes of ``decided``. ``most_modes`` tells the number. Levels are
@@ -359,7 +359,7 @@ class MultiPhiModel:
 
 def _contacts(given: Any) -> tuple[Contact, ...]:
     """Contacts, every law by its chain of springs."""
-    needed = "UnilateralContact or ForceLaw"
+    needed = "UnilateralContact, Friction or ForceLaw"
     if not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
     items = tuple(given)

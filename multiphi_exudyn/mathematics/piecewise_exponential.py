@@ -54,6 +54,11 @@ class PiecewiseExponential:
         return cls(np.array([0.0, math.inf]), np.zeros(1, complex), np.full((1, 1), value, complex))
 
     @classmethod
+    def line(cls, slope: float) -> PiecewiseExponential:
+        """u = slope t for ever."""
+        return cls(np.array([0.0, math.inf]), np.zeros(1, complex), np.array([[0.0, slope]], complex))
+
+    @classmethod
     def harmonic(cls, amplitude: float, omega: float, phase: float) -> PiecewiseExponential:
         """u = amplitude cos(omega t + phase), omega [rad/s]."""
         rate = np.array([1j * omega])

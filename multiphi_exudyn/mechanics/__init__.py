@@ -1,8 +1,8 @@
-"""Mechanics: what a user describes: a structure, its contacts and force laws, and the loads on it.
+"""Mechanics: what a user describes: a structure, its contacts, friction and force laws, and the loads on it.
 
 A structure is M, C, K and named points, given as matrices, read from files, built as a beam, or assembled from others.
 Nothing is reduced or solved here.
 
 Order: arguments, damping, structure, assembly, matrix_files, section, beam, element, contact,
-force_law, time_functions, loads.
+friction, force_law, time_functions, loads.
 """

@@ -18,7 +18,8 @@ h = -e_c; two bodies facing each other have one coefficient each.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
@@ -46,7 +47,8 @@ class UnilateralContact:
     gap: float
     stiffness: float = math.inf
     damping: float = 0.0
-    held: bool = field(default=False, init=False, repr=False)
+    velocity: ClassVar[float] = 0.0
+    held: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:

@@ -2,10 +2,12 @@
 
 It has one link, which in some of its states holds:
 
-    q = h.x + gap - w,     force on the structure along +h:   lambda = -k q - c q',   rigid: q = 0, lambda its reaction
+    q = h.x + gap - v t - w
+    lambda = -k q - c q', force on the structure along +h;   rigid: q = 0, lambda its reaction
 
-w is zero, or *held*: a place that nothing but a change of state moves. Where the link begins to hold, w becomes what
-gives it the stretch q that the state before says. In every state a constant force, the push, may act along +h as well.
+v is the speed of the surface at its other side. w is zero, or *held*: a place that nothing but a change of state moves.
+Where the link begins to hold, w becomes what gives it the stretch q that the state before says. In every state a
+constant force, the push, may act along +h as well.
 
 A state lasts as long as for each of its exits
 
@@ -68,7 +70,8 @@ class ElementState:
 class Element(Protocol):
     """An element by its link and its states; contacts and the springs of force laws are elements.
 
-    direction, gap, stiffness, damping, rigid: of the link, as of a UnilateralContact. held: whether w is.
+    direction, gap, stiffness, damping, rigid: of the link, as of a UnilateralContact. velocity: v [m/s]. held: whether
+    w is.
     """
 
     @property
@@ -83,6 +86,8 @@ class Element(Protocol):
     def damping(self) -> float: ...
     @property
     def rigid(self) -> bool: ...
+    @property
+    def velocity(self) -> float: ...
     @property
     def held(self) -> bool: ...
     @property

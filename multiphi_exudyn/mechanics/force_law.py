@@ -20,7 +20,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -233,9 +233,10 @@ class LawSpring:
     stiffness: float
     law: ForceLaw
     side: int
-    rigid: bool = field(default=False, init=False)
-    damping: float = field(default=0.0, init=False)
-    held: bool = field(default=False, init=False, repr=False)
+    rigid: ClassVar[bool] = False
+    damping: ClassVar[float] = 0.0
+    velocity: ClassVar[float] = 0.0
+    held: ClassVar[bool] = False
 
     @property
     def states(self) -> tuple[ElementState, ...]:

@@ -280,31 +280,31 @@ def test_an_address_nobody_answers_at_is_named(refused, monkeypatch):
 @pytest.fixture
 def cluster(tmp_path):
     """Address of a Dask scheduler with two workers, in processes of their own."""
-    file, programs = tmp_path / "scheduler.json", []
+    file = tmp_path / "scheduler.json"
+    environment = ENVIRONMENT | {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
 
-    def start(program, *options):
-        command = [
-            sys.executable,
-            "-m",
-            f"distributed.cli.{program}",
-            "--no-dashboard",
-            "--host",
-            "127.0.0.1",
-            *options,
-        ]
-        environment = ENVIRONMENT | {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
-        programs.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment, cwd=tmp_path))
+    with contextlib.ExitStack() as programs:
 
-    start("dask_scheduler", "--port", "0", "--scheduler-file", str(file))
-    for _ in range(2):
-        start("dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny")
+        def start(program, *options):
+            command = [sys.executable, "-m", f"distributed.cli.{program}", "--no-dashboard", "--host", "127.0.0.1"]
+            opened = subprocess.Popen([*command, *options], stderr=subprocess.DEVNULL, env=environment, cwd=tmp_path)
+            programs.enter_context(opened)
+            programs.callback(opened.kill)
+
+        start("dask_scheduler", "--port", "0", "--scheduler-file", str(file))
+        for _ in range(2):
+            start("dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny")
+        yield address_in(file)
+
+
+def address_in(file):
+    """The address that a scheduler writes; its file is there before its text is."""
     until = time.perf_counter() + LONG
-    while not file.exists() and time.perf_counter() < until:
+    while time.perf_counter() < until:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return json.loads(file.read_text())["address"]
         time.sleep(0.01)
-    yield json.loads(file.read_text())["address"]
-    for program in programs:
-        program.kill()
-        program.wait()
+    raise TimeoutError(f"no scheduler within {LONG} s")
 
 
 def told(rows):

@@ -1,4 +1,4 @@
-"""Elements given by their states alone run in the loop: dry friction, of which the package knows nothing.
+"""Dry friction in the loop: an element given by its states alone.
 
 Exact answers: a block's free decay, the hysteresis loop of a Jenkins element, the period of a block on a belt, and the
 amplitude of J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931).
@@ -11,12 +11,11 @@ import warnings
 import numpy as np
 import pytest
 import scipy.integrate
-from friction_elements import Slider
 from numpy.testing import assert_allclose
 from small_structures import chain, random_structure, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth
+from multiphi_exudyn.mechanics.time_functions import Harmonic
 from reference_models.rig import rig_beam, rig_damping
 
 
@@ -42,7 +41,7 @@ class TestFreeDecay:
     """m 1, k 4, F .1 from x0 .33: 2 F/k are lost in each of 7 half cycles of pi/2, then it rests at .02."""
 
     def test_of_a_block_with_a_coulomb_limit_is_exact(self):
-        run = mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[0.33])
+        run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 20.0, displacement=[0.33])
         assert run.status == "ok"
         assert_allclose([e.time for e in run.events], math.pi / 2 * np.repeat(range(8), 2)[1:-1], rtol=0, atol=1e-13)
         assert kinds(run) == [*itertools.islice(itertools.cycle(["slip", "stick"]), 14)]
@@ -52,19 +51,19 @@ class TestFreeDecay:
         assert run.velocity(20.0) == 0.0
 
     def test_of_a_mirrored_block_is_mirrored(self):
-        runs = [mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[x]) for x in (0.33, -0.33)]
+        runs = [mp.simulate(block(mp.Friction("floor", "m", 0.1)), 20.0, displacement=[x]) for x in (0.33, -0.33)]
         assert [e.time for e in runs[0].events] == [e.time for e in runs[1].events]
         t = np.linspace(0, 20, 101)
         assert np.array_equal(runs[0].at("m", t), -runs[1].at("m", t))
 
     def test_loses_the_limit_times_the_way_slipped(self):
-        run = mp.simulate(block(Slider("floor", "m", 0.1)), 20.0, displacement=[0.33])
+        run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 20.0, displacement=[0.33])
         way = sum(2 * (0.33 - 0.05 * n) - 0.05 for n in range(7))
         assert run.ledger.initial - run.ledger.final == pytest.approx(0.1 * way, rel=1e-13)
 
 
 def test_below_its_limit_a_block_holds_for_ever():
-    run = mp.simulate(block(Slider("floor", "m", 0.1)), 1000.0, loads=[mp.HarmonicLoad("m", 0.0999, 1.0)])
+    run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 1000.0, loads=[mp.HarmonicLoad("m", 0.0999, 1.0)])
     assert not run.events
     assert np.all(run.at("m", np.linspace(0, 1000.0, 101)) == 0.0)
 
@@ -76,7 +75,7 @@ def test_den_hartogs_amplitude_is_reached(beta, share, expected):
     amplitude = math.sqrt(v**2 - (share * u) ** 2)
     assert amplitude == pytest.approx(expected, abs=1e-11)
     phase = math.acos(amplitude / v)
-    model = block(Slider("floor", "m", share), stiffness=1.0)
+    model = block(mp.Friction("floor", "m", share), stiffness=1.0)
     run = mp.simulate(
         model,
         4 * math.pi / beta,
@@ -93,7 +92,7 @@ class TestJenkinsElement:
     reach, limit, stiffness, hertz = 0.3, 2.0, 25.0, 0.7
 
     def run(self, periods):
-        element = Slider("ring", "m", self.limit, self.stiffness)
+        element = mp.Friction("ring", "m", self.limit, stiffness=self.stiffness)
         loads = [mp.ConstantLoad("m", -100.0), mp.StopMotion("shaker", Harmonic(self.reach, self.hertz))]
         model = block(stop("m", 0.0, name="shaker"), element)
         return mp.simulate(model, periods / self.hertz, displacement=[self.reach], loads=loads)
@@ -124,12 +123,8 @@ class TestJenkinsElement:
 
 def test_a_block_on_a_belt_has_its_period():
     """m 1, k 25, V .3, N 10, limits .2 and .35: stick-slip of 1.3424777960769378 s."""
-    floor = Slider("belt", "m", 2.0, static_limit=3.5)
-    run = mp.simulate(
-        block(floor, stiffness=25.0),
-        12.0,
-        loads=[mp.StopMotion("belt", Smooth(lambda t: 0.3 * t))],
-    )
+    floor = mp.Friction("belt", "m", 2.0, static_limit=3.5, velocity=0.3)
+    run = mp.simulate(block(floor, stiffness=25.0), 12.0)
     slips = [e.time for e in run.events if e.kind == "slip"]
     assert len(slips) == 9
     assert_allclose(np.diff(slips), 1.3424777960769378, rtol=1e-11)
@@ -138,7 +133,10 @@ def test_a_block_on_a_belt_has_its_period():
 class TestChain:
     """Five masses, two Jenkins elements, a harmonic load: against an integrator that knows the law only."""
 
-    sliders = (Slider("left", "m1", 0.4, 30.0), Slider("right", {"m3": 1.0, "m2": -1.0}, 0.25, 12.0))
+    sliders = (
+        mp.Friction("left", "m1", 0.4, stiffness=30.0),
+        mp.Friction("right", {"m3": 1.0, "m2": -1.0}, 0.25, stiffness=12.0),
+    )
 
     def model(self, modes="all"):
         return mp.MultiPhiModel(chain(5, stiffness=9.0), self.sliders, modes=modes)
@@ -161,8 +159,8 @@ class TestStiffSprings:
         structure = mp.LinearStructure(mass, springs, points={f"m{i}": i for i in range(n)})
         places = random.permutation(n)
         sliders = [
-            Slider("one", {f"m{places[0]}": 1.0}, 0.3, stiffness),
-            Slider("two", {f"m{places[1]}": 1.0, f"m{places[2]}": -1.0}, 0.1, stiffness),
+            mp.Friction("one", {f"m{places[0]}": 1.0}, 0.3, stiffness=stiffness),
+            mp.Friction("two", {f"m{places[1]}": 1.0, f"m{places[2]}": -1.0}, 0.1, stiffness=stiffness),
         ]
         load = mp.HarmonicLoad(f"m{n - 1}", 2.0, 0.3)
         return mp.simulate(mp.MultiPhiModel(structure, sliders, modes="all"), t_end, loads=[load])
@@ -187,7 +185,7 @@ class TestTruncatedBeam:
         beam = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
         t, found = np.linspace(0, 0.3, 601), []
         for modes in ("all", 6, 8, 12):
-            model = mp.MultiPhiModel(beam, [Slider("ring", "node2", 0.6, stiffness)], modes=modes)
+            model = mp.MultiPhiModel(beam, [mp.Friction("ring", "node2", 0.6, stiffness=stiffness)], modes=modes)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 run = mp.simulate(model, 0.3, loads=[mp.HarmonicLoad("node3", 0.5, 10.0)])
@@ -199,7 +197,7 @@ class TestTruncatedBeam:
 
 class TestModel:
     def model(self):
-        return mp.MultiPhiModel(chain(3), [Slider("ring", "m1", 0.3), stop("m2")], modes="all")
+        return mp.MultiPhiModel(chain(3), [mp.Friction("ring", "m1", 0.3), stop("m2")], modes="all")
 
     def test_levels_are_named_by_states(self):
         model = self.model()

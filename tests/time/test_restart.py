@@ -5,7 +5,6 @@ import warnings
 
 import numpy as np
 import pytest
-from friction_elements import Slider
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -14,6 +13,7 @@ from strategies import cases
 
 from multiphi_exudyn import (
     ConstantLoad,
+    Friction,
     HarmonicLoad,
     LinearStructure,
     MultiPhiModel,
@@ -88,7 +88,8 @@ class TestFromATrajectory:
         assert len(phases) > 1
 
     def test_what_links_hold_goes_on(self):
-        model = MultiPhiModel(chain(4), [Slider("ring", "m1", 0.3, 20.0), Slider("floor", "m3", 0.2)], modes="all")
+        elements = Friction("ring", "m1", 0.3, stiffness=20.0), Friction("floor", "m3", 0.2)
+        model = MultiPhiModel(chain(4), elements, modes="all")
         load = [HarmonicLoad("m3", 1.0, 0.1)]
         whole, first = (simulate(model, t, loads=load) for t in (40.0, 23.0))
         rest = simulate(model, 40.0, loads=load, start=first)

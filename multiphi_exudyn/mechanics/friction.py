@@ -1,0 +1,97 @@
+"""Dry friction with a constant limit: a block on a counter-surface, or a Jenkins element, a spring in series with it.
+
+    T = k (h.x - w - v t)   while it sticks, |T| <= static limit; without a spring h.x - w - v t = 0, T its reaction
+    T = +-limit             while it slips, against the slip of the patch: s = sign of h.x' - v = sign of T
+
+The force on the structure is -h T. w is the place of the contact patch on the counter-surface, which itself moves with
+the speed v along +h. Stick ends where |T| reaches the static limit; slip ends where its speed falls to zero.
+
+Source: W. D. Iwan, A distributed-element model for hysteresis and its steady-state dynamic response, Trans. ASME
+J. Appl. Mech. 33 (1966).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit
+from multiphi_exudyn.mechanics.structure import At
+
+__all__ = ["Friction"]
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """One dry friction with a constant limit; see the module's docstring for its law.
+
+    name: how levels, events and results refer to it.
+    direction: h as a point name, {point: coefficient} or an (n,) row.
+    limit: |T| [N] while it slips. static_limit: |T| [N] at which it begins to, >= limit; None: the same.
+    stiffness: k [N/m] of the spring in series, infinite for none.
+    velocity: v [m/s] of the counter-surface along +h.
+
+    Two of them are equal only if they are the same object.
+    """
+
+    name: str
+    direction: At
+    limit: float
+    static_limit: float | None = None
+    stiffness: float = math.inf
+    velocity: float = 0.0
+    gap: ClassVar[float] = 0.0
+    damping: ClassVar[float] = 0.0
+    held: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise MultiPhiTypeError(f"friction name: got {self.name!r}, need a non-empty string")
+        for name in ("limit", "static_limit", "stiffness", "velocity"):
+            value = getattr(self, name)
+            if value is None and name == "static_limit":
+                continue
+            if not is_real(value):
+                raise MultiPhiTypeError(f"friction {self.name!r} {name}: got {value!r}, need a number")
+            object.__setattr__(self, name, float(value))
+        if not (math.isfinite(self.limit) and self.limit > 0):
+            raise MultiPhiValueError(f"friction {self.name!r} limit: got {self.limit!r}, need a finite force > 0")
+        if not (math.isfinite(self.most) and self.most >= self.limit):
+            received = f"friction {self.name!r} static_limit: got {self.static_limit!r}"
+            raise MultiPhiValueError(f"{received}, need a finite force >= the limit {self.limit!r}")
+        if not self.stiffness > 0:
+            received = f"friction {self.name!r} stiffness: got {self.stiffness!r}"
+            raise MultiPhiValueError(f"{received}, need a value > 0 (or inf, without a spring)")
+        if not math.isfinite(self.velocity):
+            raise MultiPhiValueError(f"friction {self.name!r} velocity: got {self.velocity!r}, need a finite speed")
+
+    @property
+    def most(self) -> float:
+        """|T| [N] at which it begins to slip."""
+        return self.limit if self.static_limit is None else self.static_limit
+
+    @property
+    def rigid(self) -> bool:
+        """True without a spring in series."""
+        return math.isinf(self.stiffness)
+
+    @property
+    def states(self) -> tuple[ElementState, ...]:
+        """Stick, slip+ and slip- (element.py)."""
+        exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")
+        return ElementState("stick", "stick", exits, holds=True), self._slip("+"), self._slip("-")
+
+    def _slip(self, sign: str) -> ElementState:
+        s = float(f"{sign}1")
+        back = Exit("stick", rate=s, firmness=ALWAYS_TAKEN)
+        stretch = 0.0 if self.rigid else s * self.limit / self.stiffness
+        return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
+
+    def first_state(self, q: float, rate: float) -> str:
+        """Stick, with a spring or at rest on its counter-surface; else slip, in the direction of its speed [m/s]."""
+        if not self.rigid or rate == 0:
+            return "stick"
+        return "slip+" if rate > 0 else "slip-"
