@@ -21,5 +21,5 @@ The sentences themselves stand in decision, where an instant is decided: decide,
 
 Order: excitation, pieces, channels, loaded_level, transition, state, exits, loaded_levels, arrays, state_arrays,
 signals, maps, energies, drive, flow, impact, phases, independence, changes, resting, striking, switching, decision,
-waiting, start, channel_arrays, level_parts, level_arrays.
+waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays.
 """

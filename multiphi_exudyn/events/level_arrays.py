@@ -10,30 +10,21 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.channel_arrays import ChannelArrays
-from multiphi_exudyn.events.decision import ROUNDS
-from multiphi_exudyn.events.exits import after, entered_row, exits_of, signal_row
-from multiphi_exudyn.events.level_parts import base_parts, from_base, level_parts, powers
+from multiphi_exudyn.events.element_arrays import describe_elements
+from multiphi_exudyn.events.exits import after, entered_row, exits_of
+from multiphi_exudyn.events.level_parts import from_base
+from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal
+from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.maps import level_hash, map_hash
-from multiphi_exudyn.events.state import Row
+from multiphi_exudyn.events.scratch_arrays import ScratchArrays
 from multiphi_exudyn.events.state_arrays import measure
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.mathematics import basis_arrays, response_arrays, zero_crossing
-from multiphi_exudyn.mathematics.exponentials import Exponentials
-from multiphi_exudyn.mathematics.free_response import ModalResponse
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.least_distance_arrays import least_distance_ints, least_distance_numbers
-from multiphi_exudyn.mechanics.element import Exit
 
 __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under one load: half of what a model may keep (model.py)
 FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
 ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
-POWERS = 96  # of a response to one term: where a carrier meets a pole it takes some 40
-SLOTS = 64  # of a table at first: twice as many as it holds, or more
-STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
 
 Measure = Callable[[np.ndarray, np.ndarray, int], None]
 
@@ -91,15 +82,13 @@ class LevelArrays:
         self._offsets: dict[int, int] = {}  # of levels in the ints, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by key
         self._maps: dict[tuple[int, int], int] = {}  # records by their levels
-        self._shown: set[int] = set()  # levels and maps that the loop finds, and does not ask for
-        self._most = 0, 0, 0  # coordinates, exponentials and exits for which there is scratch memory
         self._ring: int | None = None
         self._recorded = 0, 0  # coordinates and exits for which the record has room
         self._base = 0  # where the base stands among the levels, in the ints
-        self._powers = POWERS  # of a response to one term, for which there is room
-        self._describe_elements()
+        describe_elements(self.buffers, self.levels.model)
+        self._tables = LevelTables(self.buffers)  # what the loop finds, and does not ask for
         self.channels.describe(self.buffers)
-        self.ints[a.FORCED_ROOM] = self._powers
+        self.scratch = ScratchArrays(self.buffers, self.channels.terms)
 
     @property
     def ints(self) -> np.ndarray:
@@ -150,13 +139,12 @@ class LevelArrays:
     @property
     def outgrown(self) -> bool:
         """Whether a level has come that is larger than the record has room for."""
-        n, _, exits = self._most
-        return self._recorded[0] < n or self._recorded[1] < exits
+        return self._recorded[0] < self.scratch.coordinates or self._recorded[1] < self.scratch.exits
 
     def begin_record(self) -> None:
         """An empty record to write to."""
-        n, _, exits = self._most
-        room, events = self.room, max(self.room, self._changes)
+        n, exits = self.scratch.coordinates, self.scratch.exits
+        room, events = self.room, max(self.room, self.scratch.changes)
         if self.outgrown:
             wanted = {
                 a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * room),
@@ -173,27 +161,21 @@ class LevelArrays:
         for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
             self.ints[slot] = 0
 
-    @property
-    def _changes(self) -> int:
-        """Changes at one instant for which there is room: more are an endless exchange."""
-        return ROUNDS * (3 * len(self.levels.model.contacts) + 1)
-
     def level(self, states: Sequence[int]) -> int:
         """Where the level of elements in these states stands in the ints, packed if it was not."""
         key = tuple(states)
         if key not in self._levels:
             self._add(self.levels.pushed(key) if self.levels.model.general else self.levels.level(np.flatnonzero(key)))
         record = self._offsets[self._levels[key]]
-        if record not in self._shown:
-            self._show_level(record)
+        if record not in self._tables.levels:
+            if self.held is not None:
+                self.held.change_level(record)
+            self._tables.add_level(record)
         return record
 
     def hide(self) -> None:
         """Let the loop ask once more for every level and map, which are changed before they are used again."""
-        self._shown.clear()
-        for table, slots, width in ((a.LEVELS, a.LEVEL_SLOTS, 1), (a.MAPS, a.MAP_SLOTS, a.MAP_ENTRY)):
-            start = self.ints[table]
-            self.ints[start : start + width * self.ints[slots]] = 0
+        self._tables.clear()
 
     def supply(self) -> None:
         """Pack what the loop needs."""
@@ -212,241 +194,27 @@ class LevelArrays:
 
     def _supply_room(self) -> None:
         """Room for the powers that a response to a term has taken."""
-        self._powers = self.ints[a.FORCED_ROOM] = 2 * int(self.ints[a.FORCED_WANTED])
-        self.ints[a.FORCED_WANTED] = 0
-        n, _, exits = self._most
-        self._reserve(n, max(self._exponentials(level.modal.response) for level in self.loaded.values()), exits)
-
-    # ------------------------------------------------------------------ elements and scratch memory
-
-    def _describe_elements(self) -> None:
-        """The run record, and what is known of the elements."""
-        model, put, take = self.levels.model, self.buffers.put, self.buffers.take
-        take("ints", a.RUN_INTS)
-        take("numbers", a.RUN_NUMBERS)
-        base, c = model.base, len(model.contacts)
-        viscous = base.dampings > 0
-        striking = np.isinf(base.stiffnesses)
-        striking[list(model.held)] = False
-        kinds = np.where(striking, a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))
-        chains = np.full(c, -1)
-        for number, chain in enumerate(model.chains):
-            chains[list(chain)] = number
-        lengths = np.linalg.norm(base.directions, axis=0)
-        units = base.directions / np.where(lengths > 0, lengths, 1.0)
-        given = {
-            a.ELEMENTS: c,
-            a.COORDINATES: base.modes.count,
-            a.WHOLE: int(model.whole),
-            a.KINDS: put("ints", kinds),
-            a.CHAINS: put("ints", chains),
-            a.CHAIN_COUNT: len(model.chains),
-            a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
-            a.DIRECTIONS: put("numbers", units.T),
-        }
-        for slot, value in given.items():
-            self.ints[slot] = value
-        self.numbers[a.INDEPENDENCE] = INDEPENDENT
-        self._rehash(SLOTS, SLOTS)
-        self._reserve_sets(c, int(np.sum(kinds == a.RIGID)))
-
-    def _reserve_sets(self, c: int, rigid: int) -> None:
-        """Scratch memory that depends on the number of elements alone."""
-        take, m = self.buffers.take, int(self.ints[a.COORDINATES])
-        struck, changes = max(2 * rigid, 1), self._changes
-        sizes = {
-            "ints": dict.fromkeys((*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY), 2 * c + 1)
-            | {a.CHAIN_MARKS: len(self.levels.model.chains), a.LEAST_INTS: least_distance_ints(struck)}
-            | {a.CHANGES: a.CHANGE_WIDTH * changes},
-            "numbers": dict.fromkeys((a.IMPULSES, a.FURTHER, a.LEAST, a.LEAST_SIZES, a.RESTING_SIZES), struck)
-            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(rigid, m)), a.CHANGE_IMPULSES: changes}
-            | {a.FOUND: zero_crossing.RESULT},
-        }
-        for name, slots in sizes.items():
-            for slot, count in slots.items():
-                self.ints[slot] = take(name, count)
-        self.ints[a.CHANGE_ROOM] = changes
-
-    def _reserve(self, n: int, p: int, exits: int) -> None:
-        """Scratch memory for levels of n coordinates, p exponentials and so many exits."""
-        n, p, exits = map(max, (n, p, exits), self._most)
-        if (n, p, exits) == self._most:
-            return
-        self._most = n, p, exits
-        for name, slots in self._scratch(n, p, max(2 * exits, 1)).items():
-            for slot, count in slots.items():
-                self.ints[slot] = self.buffers.take(name, count)
-        self._reserve_flow(p)
-        for state in STATES_OF_A_RUN:
-            old = self.ints[state : state + a.STATE_INTS].copy()
-            for part in range(a.PLACE, a.SWING + 1):
-                self.ints[state + part] = self.buffers.take("numbers", n)
-            self.ints[state + a.PHASES] = self.buffers.take("ints", exits)
-            if old[a.LEVEL]:
-                self._carry_over(state, old)
-
-    def _reserve_flow(self, p: int) -> None:
-        """A record for the basis of a motion with channels, of p exponentials."""
-        take, record = self.buffers.take, self.buffers.take("ints", basis_arrays.BASIS)
-        given = {basis_arrays.POWERS: take("ints", p), basis_arrays.RATES: take("waves", p)}
-        given[basis_arrays.SCALES] = take("numbers", 3)
-        for slot, value in given.items():
-            self.ints[record + slot] = value
-        self.ints[a.FLOW_RECORD] = record
-
-    def _scratch(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
-        """How much of each buffer every part of the scratch memory takes, that depends on the levels.
-
-        Impacts happen in all modes too, at the start.
-        """
-        kinds = self.ints[self.ints[a.KINDS] :][: self.ints[a.ELEMENTS]]
-        rigid, wide = int(np.sum(kinds == a.RIGID)), int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
-        struck, wide = max(2 * rigid, 1), max(wide, n) if rigid else n
-        q, terms = int(self.ints[a.PRESCRIBED]), self.channels.terms
-        room = max(self._powers, terms) if self.ints[a.CHANNELS] else 0
-        return {
-            "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
-            | {a.ROWS: struck * wide, a.LEAST_NUMBERS: least_distance_numbers(struck, wide), a.CHANGE: wide}
-            | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
-            | {a.CONSTANTS: signals, a.NOISES: signals}
-            | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},
-            "ints": {a.WAITING: 2 * signals, a.FALLEN: signals},
-            "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 2 * p}
-            | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)}
-            | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n},
-        }
-
-    def _carry_over(self, state: int, old: np.ndarray) -> None:
-        """A state from the scratch memory that was too small."""
-        level = int(old[a.LEVEL])
-        n = int(self.ints[level + a.MODES] + self.ints[a.CHANNELS])
-        for part in range(a.PLACE, a.SWING + 1):
-            start, end = int(old[part]), int(self.ints[state + part])
-            self.numbers[end : end + n] = self.numbers[start : start + n]
-        start, end, exits = int(old[a.PHASES]), int(self.ints[state + a.PHASES]), self.ints[level + a.EXIT_COUNT]
-        self.ints[end : end + exits] = self.ints[start : start + exits]
-
-    # ------------------------------------------------------------------ levels
+        self.scratch.reserve_powers(max(len(level.modal.response.basis.rates) for level in self.loaded.values()))
 
     def _add_base(self) -> int:
-        """The base as a level in which all contacts are open, where runs start, and memory for what happens there."""
-        base, put, take = self.levels.model.base, self.buffers.put, self.buffers.take
-        omega, parts = base.modes.omega, base_parts(base, self.levels.excitation)
-        m, record = len(omega), self.buffers.take("ints", a.LEVEL_INTS)
-        periods = np.divide(1.0, omega, out=np.zeros(m), where=omega > 0)
-        given = {
-            a.MODES: m,
-            a.STATES: take("ints", int(self.ints[a.ELEMENTS])),
-            a.FREQUENCIES: put("numbers", omega),
-            a.PERIODS: put("numbers", periods),
-            a.CARRIED: -1,
-            a.MOBILITY: -1,
-            **{slot: put("numbers", values) for slot, values in parts.items()},
-        }
-        given[a.SPEEDS] = given[a.GAPS]
-        for slot, value in given.items():
-            self.ints[record + slot] = value
+        """The base as a level, and memory for what happens there."""
+        base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
         for state in (a.GIVEN, a.SLOWED):
-            for part in range(a.PLACE, a.SWING + 1):
-                self.ints[state + part] = take("numbers", m + int(self.ints[a.CHANNELS]))
-            self.ints[state + a.PHASES] = take("ints", int(self.ints[a.ELEMENTS]))
-        return record
+            self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
+        return put_base(self.buffers, base, self.levels.excitation)
 
     def _add(self, level: LoadedLevel) -> None:
-        own, put, q = level.level, self.buffers.put, int(self.ints[a.CHANNELS])
-        modal, exits = level.modal, exits_of(level)
-        parts, r = level_parts(level), modal.modes
-        self._reserve(r + q, self._exponentials(modal.response), len(exits))
-        record = self.buffers.take("ints", a.LEVEL_INTS)
-        firsts = np.searchsorted([i for i, _ in exits], range(len(level.states) + 1))
-        ends = [k for i in self.levels.ends(own.indices) for k in range(firsts[i], firsts[i + 1])]
-        omega = modal.omega
-        periods = np.divide(1.0, omega, out=np.zeros(r), where=omega > 0)
-        given = {
-            a.NUMBER: self._count,
-            a.MODES: r,
-            a.STATES: put("ints", level.states),
-            a.RESPONSE: self._response(modal),
-            a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
-            a.EXITS: self._exits(level, exits),
-            a.EXIT_COUNT: len(exits),
-            a.FIRST_EXITS: put("ints", firsts),
-            a.ENDS: put("ints", ends),
-            a.END_COUNT: len(ends),
-            a.FREQUENCIES: put("numbers", omega),
-            a.PERIODS: put("numbers", periods),
-            a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
-            a.CARRIED: -1,
-            a.MOBILITY: -1,
-            **{slot: put("numbers", values) for slot, values in parts.items()},
-        }
-        given.setdefault(a.SPEEDS, given[a.GAPS])
-        for slot, value in given.items():
-            self.ints[record + slot] = value
-        self._levels[level.states] = self._count
-        self._offsets[self._count] = record
-        self.loaded[self._count] = level
+        modal, number = level.modal, self._count
+        n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
+        self.scratch.reserve(n, free, len(exits_of(level)))
+        record = put_level(self.buffers, level, number, self.levels.ends(level.level.indices))
+        self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
-
-    def _show_level(self, record: int) -> None:
-        if self.held is not None:
-            self.held.change_level(record)
-        self._shown.add(record)
-        self._enter_level(record)
 
     def add_powers(self, level: int) -> None:
         """Pack the power of damping and of what varies in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
-            damping, varying = powers(self.loaded[int(self.ints[level + a.NUMBER])])
-            self.ints[level + a.DISSIPATION] = self.buffers.put("numbers", (damping + damping.T) / 2)
-            self.ints[level + a.POWER] = self.buffers.put("numbers", varying)
-
-    @property
-    def most(self) -> tuple[int, int]:
-        """The largest numbers of coordinates and of exponentials of the levels packed."""
-        return self._most[:2]
-
-    def _exponentials(self, response: ModalResponse) -> int:
-        """The largest number of exponentials of a motion in a level."""
-        return len(response.basis.rates) + int(self.ints[a.PRESCRIBED]) * self._powers
-
-    def _response(self, level: Level) -> int:
-        """The record of a level's response (response_arrays.py)."""
-        response, put = level.response, self.buffers.put
-        maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-        alone = (level.squares == 0) & ~np.any(level.damping, axis=1) | response.diagonal
-        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
-        basis, reached = self._basis(response.basis), self.buffers.take("ints", 2 * len(poles))
-        places = [put("waves", values) for values in maps]
-        places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
-        places += [put("ints", alone), put("ints", poles)]
-        record = put("ints", [level.modes, basis, reached, *places])
-        response_arrays.reached_modes(self.ints, self.buffers.waves, record)
-        return record
-
-    def _basis(self, basis: Exponentials) -> int:
-        """The record of a basis (basis_arrays.py)."""
-        put = self.buffers.put
-        powers, rates, scales = put("ints", basis.powers), put("waves", basis.rates), put("numbers", [basis.unit, 0, 0])
-        record = put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
-        basis_arrays.describe_basis(*self.buffers.all, record)
-        return record
-
-    def _exits(self, level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> int:
-        """Records of the exits of a level."""
-        records = self.buffers.take("ints", a.EXIT_INTS * len(exits))
-        for k, (i, exit_) in enumerate(exits):
-            asked = after(level, i, exit_)[i]
-            values = [i, asked, exit_.firmness, *self._signal(level, signal_row(level, i, exit_)), -1]
-            self.ints[records + a.EXIT_INTS * k : records + a.EXIT_INTS * (k + 1)] = values
-        return records
-
-    def _signal(self, level: LoadedLevel, row: Row) -> list[int]:
-        """A signal's record."""
-        r, shapes = level.modal.modes, level.modal.response.shapes
-        at = self.buffers.put("numbers", np.concatenate([row.position, row.rate, [row.constant]]))
-        waves = self.buffers.put("waves", np.concatenate([row.position[:r] @ shapes, row.rate[:r] @ shapes]))
-        return [at, waves, int(np.any(row.rate))]
+            put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """The signal that an exit's element would have in the level entered alone."""
@@ -454,13 +222,11 @@ class LevelArrays:
         element, exit_ = exits_of(level)[exit_number]
         target = self.loaded[int(self.ints[self.level(after(level, element, exit_)) + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
-        entered = self.buffers.put("ints", self._signal(level, row))
+        entered = self.buffers.put("ints", put_signal(self.buffers, level, row))
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
         self.ints[record + a.ENTERED] = entered
         if self.held is not None:
             self.held.change_entered(source, record)
-
-    # ------------------------------------------------------------------ maps and tables
 
     def _add_map(self, source: int, target: int) -> None:
         if (source, target) not in self._maps:
@@ -468,11 +234,7 @@ class LevelArrays:
         record = self._maps[source, target]
         if self.held is not None:
             self.held.change_map(source, target, record)
-        self._shown.add(record)
-        if 2 * len(self._maps) > self.ints[a.MAP_SLOTS]:
-            self._rehash(int(self.ints[a.LEVEL_SLOTS]), 2 * int(self.ints[a.MAP_SLOTS]))
-        else:
-            self._enter_map(source, target, record)
+        self._tables.add_map(source, target, record)
 
     def _map(self, source: int, target: int) -> int:
         """The record of the map between two levels."""
@@ -487,32 +249,3 @@ class LevelArrays:
         rates = at if np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
         known = -1 if terms is None else put("numbers", terms)
         return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known])
-
-    def _enter_level(self, record: int) -> None:
-        if 2 * len(self.loaded) > self.ints[a.LEVEL_SLOTS]:
-            self._rehash(2 * int(self.ints[a.LEVEL_SLOTS]), int(self.ints[a.MAP_SLOTS]))
-            return
-        slots = int(self.ints[a.LEVEL_SLOTS])
-        slot = level_hash(self.ints, int(self.ints[record + a.STATES])) % slots
-        while self.ints[self.ints[a.LEVELS] + slot]:
-            slot = (slot + 1) % slots
-        self.ints[self.ints[a.LEVELS] + slot] = record
-
-    def _enter_map(self, source: int, target: int, record: int) -> None:
-        slots = int(self.ints[a.MAP_SLOTS])
-        slot = map_hash(source, target) % slots
-        while self.ints[self.ints[a.MAPS] + a.MAP_ENTRY * slot]:
-            slot = (slot + 1) % slots
-        at = int(self.ints[a.MAPS]) + a.MAP_ENTRY * slot
-        self.ints[at : at + a.MAP_ENTRY] = source, target, record
-
-    def _rehash(self, levels: int, maps: int) -> None:
-        """Tables of so many slots."""
-        self.ints[a.LEVELS] = self.buffers.take("ints", levels)
-        self.ints[a.MAPS] = self.buffers.take("ints", a.MAP_ENTRY * maps)
-        self.ints[a.LEVEL_SLOTS], self.ints[a.MAP_SLOTS] = levels, maps
-        for record in self._shown.intersection(self._offsets.values()):
-            self._enter_level(record)
-        for (source, target), record in self._maps.items():
-            if record in self._shown:
-                self._enter_map(source, target, record)

@@ -250,7 +250,8 @@ class Record:
 
     def _scratch(self) -> np.ndarray:
         """Memory for the work of a segment."""
-        return np.empty(work_waves(*self.arrays.most, int(self.arrays.ints[a.CHANNELS])), complex)
+        room, q = self.arrays.scratch, int(self.arrays.ints[a.CHANNELS])
+        return np.empty(work_waves(room.coordinates, room.exponentials, q), complex)
 
     def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
         """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""

@@ -1,0 +1,120 @@
+"""Records of levels, their responses, exits and signals, and of the base, in buffers (arrays.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.exits import after, exits_of, signal_row
+from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.state import Row
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics import basis_arrays, response_arrays
+from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.mechanics.element import Exit
+
+__all__ = ["put_base", "put_level", "put_powers", "put_signal"]
+
+
+def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
+    """The record of the base as a level in which all contacts are open, where runs start."""
+    elements, parts = int(buffers.ints[a.ELEMENTS]), base_parts(base, excitation)
+    given = {
+        a.MODES: base.modes.count,
+        a.STATES: buffers.take("ints", elements),
+        **_frequencies(buffers, base.modes.omega),
+        **{slot: buffers.put("numbers", values) for slot, values in parts.items()},
+    }
+    return _record(buffers, given)
+
+
+def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequence[int]) -> int:
+    """The record of a level with a number; watched: elements that can ask first while all are armed."""
+    own, modal, put, parts, exits = level.level, level.modal, buffers.put, level_parts(level), exits_of(level)
+    firsts = np.searchsorted([i for i, _ in exits], range(len(level.states) + 1))
+    ends = [k for i in watched for k in range(firsts[i], firsts[i + 1])]
+    given = {
+        a.NUMBER: number,
+        a.MODES: modal.modes,
+        a.STATES: put("ints", level.states),
+        a.RESPONSE: _put_response(buffers, modal),
+        a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
+        a.EXITS: _put_exits(buffers, level, exits),
+        a.EXIT_COUNT: len(exits),
+        a.FIRST_EXITS: put("ints", firsts),
+        a.ENDS: put("ints", ends),
+        a.END_COUNT: len(ends),
+        **_frequencies(buffers, modal.omega),
+        a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
+        **{slot: put("numbers", values) for slot, values in parts.items()},
+    }
+    return _record(buffers, given)
+
+
+def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
+    """Give the record of a level the power of damping and of what varies."""
+    damping, varying = powers(level)
+    places = buffers.put("numbers", (damping + damping.T) / 2), buffers.put("numbers", varying)
+    buffers.ints[record + a.DISSIPATION], buffers.ints[record + a.POWER] = places
+
+
+def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
+    """The record of a signal."""
+    r, shapes = level.modal.modes, level.modal.response.shapes
+    at = buffers.put("numbers", np.concatenate([row.position, row.rate, [row.constant]]))
+    waves = buffers.put("waves", np.concatenate([row.position[:r] @ shapes, row.rate[:r] @ shapes]))
+    return [at, waves, int(np.any(row.rate))]
+
+
+def _record(buffers: Buffers, given: dict[int, int]) -> int:
+    """A level's record; where it says nothing else, speeds are those of gaps."""
+    record = buffers.take("ints", a.LEVEL_INTS)
+    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}.items():
+        buffers.ints[record + slot] = value
+    return record
+
+
+def _frequencies(buffers: Buffers, omega: np.ndarray) -> dict[int, int]:
+    """Where omega (r,) stands, and its inverses, zero where it is."""
+    periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
+    return {a.FREQUENCIES: buffers.put("numbers", omega), a.PERIODS: buffers.put("numbers", periods)}
+
+
+def _put_response(buffers: Buffers, level: Level) -> int:
+    """The record of a level's response (response_arrays.py)."""
+    response, put = level.response, buffers.put
+    maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
+    alone = (level.squares == 0) & ~np.any(level.damping, axis=1) | response.diagonal
+    poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
+    basis, reached = _put_basis(buffers, response.basis), buffers.take("ints", 2 * len(poles))
+    places = [put("waves", values) for values in maps]
+    places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
+    places += [put("ints", alone), put("ints", poles)]
+    record = put("ints", [level.modes, basis, reached, *places])
+    response_arrays.reached_modes(buffers.ints, buffers.waves, record)
+    return record
+
+
+def _put_basis(buffers: Buffers, basis: Exponentials) -> int:
+    """The record of a basis (basis_arrays.py)."""
+    put = buffers.put
+    powers, rates, scales = put("ints", basis.powers), put("waves", basis.rates), put("numbers", [basis.unit, 0, 0])
+    record = put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
+    basis_arrays.describe_basis(*buffers.all, record)
+    return record
+
+
+def _put_exits(buffers: Buffers, level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> int:
+    """Records of the exits of a level."""
+    records = buffers.take("ints", a.EXIT_INTS * len(exits))
+    for k, (i, exit_) in enumerate(exits):
+        asked = after(level, i, exit_)[i]
+        values = [i, asked, exit_.firmness, *put_signal(buffers, level, signal_row(level, i, exit_)), -1]
+        buffers.ints[records + a.EXIT_INTS * k : records + a.EXIT_INTS * (k + 1)] = values
+    return records

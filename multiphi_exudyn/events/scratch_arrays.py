@@ -1,0 +1,123 @@
+"""Scratch memory of the loop in buffers (arrays.py): sets of elements, states, and what a flow and a search take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.decision import ROUNDS
+from multiphi_exudyn.mathematics import basis_arrays, zero_crossing
+from multiphi_exudyn.mathematics.least_distance_arrays import least_distance_ints, least_distance_numbers
+
+__all__ = ["ScratchArrays"]
+
+POWERS = 96  # of a response to one term: where a carrier meets a pole it takes some 40
+STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
+
+
+class ScratchArrays:
+    """Scratch memory for the elements that ``buffers`` describe, and for the levels that come.
+
+    coordinates, exponentials, exits: the most of a level, for which there is memory. changes: at one instant for which
+    there is room, more are an endless exchange. powers: of a response to one term, for which there is room.
+    """
+
+    def __init__(self, buffers: Buffers, terms: int) -> None:
+        ints = buffers.ints
+        self._buffers, self._terms = buffers, terms
+        self._elements = int(ints[a.ELEMENTS])
+        self._rigid = int(np.sum(ints[ints[a.KINDS] :][: self._elements] == a.RIGID))
+        self._struck = max(2 * self._rigid, 1)
+        self.coordinates = self.exponentials = self.exits = 0
+        self.changes = ROUNDS * (3 * self._elements + 1)
+        self.powers = ints[a.FORCED_ROOM] = POWERS
+        self._take(self._sets())
+        buffers.ints[a.CHANGE_ROOM] = self.changes
+
+    def reserve(self, n: int, free: int, exits: int) -> None:
+        """Memory for levels of n coordinates, so many exponentials of the free response and so many exits."""
+        p = free + int(self._buffers.ints[a.PRESCRIBED]) * self.powers
+        known = self.coordinates, self.exponentials, self.exits
+        n, p, exits = map(max, (n, p, exits), known)
+        if (n, p, exits) == known:
+            return
+        self.coordinates, self.exponentials, self.exits = n, p, exits
+        self._take(self._of_levels(n, p, max(2 * exits, 1)))
+        self._reserve_flow(p)
+        for state in STATES_OF_A_RUN:
+            old = self._buffers.ints[state : state + a.STATE_INTS].copy()
+            self.reserve_state(state, n, exits)
+            if old[a.LEVEL]:
+                self._carry_over(state, old)
+
+    def reserve_state(self, state: int, n: int, exits: int) -> None:
+        """Memory for a state of n coordinates and so many exits."""
+        for part in range(a.PLACE, a.SWING + 1):
+            place = self._buffers.take("numbers", n)
+            self._buffers.ints[state + part] = place
+        place = self._buffers.take("ints", exits)
+        self._buffers.ints[state + a.PHASES] = place
+
+    def reserve_powers(self, free: int) -> None:
+        """Room for the powers that a response to a term has taken, where levels have ``free`` exponentials at most."""
+        wanted = 2 * int(self._buffers.ints[a.FORCED_WANTED])
+        self.powers = self._buffers.ints[a.FORCED_ROOM] = wanted
+        self._buffers.ints[a.FORCED_WANTED] = 0
+        self.reserve(self.coordinates, free, self.exits)
+
+    def _take(self, sizes: dict[str, dict[int, int]]) -> None:
+        """So much memory of each buffer for every slot."""
+        for name, slots in sizes.items():
+            for slot, count in slots.items():
+                place = self._buffers.take(name, count)
+                self._buffers.ints[slot] = place
+
+    def _sets(self) -> dict[str, dict[int, int]]:
+        """Memory that depends on the elements alone."""
+        ints, c, struck, changes = self._buffers.ints, self._elements, self._struck, self.changes
+        m, rigid = int(ints[a.COORDINATES]), self._rigid
+        return {
+            "ints": dict.fromkeys((*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY), 2 * c + 1)
+            | {a.CHAIN_MARKS: int(ints[a.CHAIN_COUNT]), a.LEAST_INTS: least_distance_ints(struck)}
+            | {a.CHANGES: a.CHANGE_WIDTH * changes},
+            "numbers": dict.fromkeys((a.IMPULSES, a.FURTHER, a.LEAST, a.LEAST_SIZES, a.RESTING_SIZES), struck)
+            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(rigid, m)), a.CHANGE_IMPULSES: changes}
+            | {a.FOUND: zero_crossing.RESULT},
+        }
+
+    def _of_levels(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
+        """Memory that depends on the levels. Impacts happen in all modes too, at the start."""
+        ints, struck, terms = self._buffers.ints, self._struck, self._terms
+        wide = max(int(ints[a.COORDINATES] + ints[a.CHANNELS]), n) if self._rigid else n
+        q, room = int(ints[a.PRESCRIBED]), max(self.powers, terms) if ints[a.CHANNELS] else 0
+        return {
+            "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
+            | {a.ROWS: struck * wide, a.LEAST_NUMBERS: least_distance_numbers(struck, wide), a.CHANGE: wide}
+            | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
+            | {a.CONSTANTS: signals, a.NOISES: signals}
+            | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},
+            "ints": {a.WAITING: 2 * signals, a.FALLEN: signals},
+            "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 2 * p}
+            | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)}
+            | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n},
+        }
+
+    def _reserve_flow(self, p: int) -> None:
+        """A record for the basis of a motion with channels, of p exponentials."""
+        take, record = self._buffers.take, self._buffers.take("ints", basis_arrays.BASIS)
+        given = {basis_arrays.POWERS: take("ints", p), basis_arrays.RATES: take("waves", p)}
+        given[basis_arrays.SCALES] = take("numbers", 3)
+        for slot, value in given.items():
+            self._buffers.ints[record + slot] = value
+        self._buffers.ints[a.FLOW_RECORD] = record
+
+    def _carry_over(self, state: int, old: np.ndarray) -> None:
+        """A state from the memory that was too small."""
+        ints, numbers, level = self._buffers.ints, self._buffers.numbers, int(old[a.LEVEL])
+        n, exits = int(ints[level + a.MODES] + ints[a.CHANNELS]), int(ints[level + a.EXIT_COUNT])
+        for part in range(a.PLACE, a.SWING + 1):
+            start, end = int(old[part]), int(ints[state + part])
+            numbers[end : end + n] = numbers[start : start + n]
+        start, end = int(old[a.PHASES]), int(ints[state + a.PHASES])
+        ints[end : end + exits] = ints[start : start + exits]
