@@ -16,10 +16,13 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     7       a viscous contact             switching.is_relaxing
     8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
+    10      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
+    10      the last bounce               rebounds.last_bounce, rebounds.keep_landing
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
 Order: excitation, pieces, channels, loaded_level, transition, state, exits, loaded_levels, arrays, state_arrays,
-signals, maps, energies, drive, flow, impact, phases, independence, changes, resting, striking, switching, decision,
-waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays.
+signals, maps, energies, drive, flow, impact, phases, independence, changes, rebounds, resting, striking, switching,
+decision, waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables,
+level_arrays.
 """

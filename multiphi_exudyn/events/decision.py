@@ -41,6 +41,11 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
 9. A sign is that of the first derivative that is not round-off.
    -> signals.row_sign, signals.rate_sign, phases.becomes
+10. A rigid contact with restitution e that strikes leaves its stop with -e times its speed, and so do all that touch
+   and are struck with it, in one impact (Moreau); those that are coupled have one e. Who is driven back to its stop is
+   struck again at once. A bounce too low to be seen is the last: it takes as long as all that would follow, and where
+   it lands e is zero.
+   -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
@@ -79,6 +84,7 @@ from multiphi_exudyn.events.arrays import (
     FREED,
     HEARD,
     KINDS,
+    LANDING,
     LEVEL,
     LOST,
     LOST_NOW,
@@ -100,6 +106,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held
 from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
+from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching, keep_landing
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
 from multiphi_exudyn.events.striking import close_without_impact, impact
@@ -124,6 +131,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     ints[CHANGE_COUNT] = first
     ints[TRANSITIONS_NOW] = 0
     copy_state(ints, numbers, REACHED, WORKED)
+    forget_bounces(ints)
     clear_turning_speeds(ints, numbers, WORKED)
     status = settle(ints, numbers, waves)
     if status < 0:
@@ -139,6 +147,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         hold_back(ints, WORKED)
         clear(numbers, LOST)
         ints[CHANGE_COUNT] = first
+    keep_landing(ints, numbers)
     return OK
 
 
@@ -151,7 +160,8 @@ def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         ints[ints[AGAIN] + i] = 0
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
         exit_ = exits + k * EXIT_INTS
-        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL) < 0:
+        waits = ints[ints[REACHED + PHASES] + k] in (ARMED, LANDING)
+        if waits and row_sign(ints, numbers, REACHED, exit_ + SIGNAL) < 0:
             ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
             asking = 1
     ints[CHANGE_COUNT] = 0
@@ -243,6 +253,7 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
     c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
     strikes, before = 0, ints[CHANGE_COUNT]
     clear(numbers, LOST_NOW)
+    hear_touching(ints, numbers, asking)
     for i in range(c):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[striking + i] = 1 if rigid and ints[ints[HEARD] + i] == 1 and ints[states + i] == OPEN else 0

@@ -35,6 +35,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
         a.DIRECTIONS: put("numbers", units.T),
+        a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
     }
     for slot, value in given.items():
         buffers.ints[slot] = value

@@ -17,7 +17,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.free_rows import norm
 
 __all__ = ["join"]
 

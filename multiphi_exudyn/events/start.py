@@ -49,6 +49,7 @@ from multiphi_exudyn.events.arrays import (
     STRIKING,
     TOUCHING,
     TRANSITIONS_NOW,
+    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, clear
@@ -56,11 +57,12 @@ from multiphi_exudyn.events.decision import decide
 from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.impact import collide
 from multiphi_exudyn.events.maps import find_level, find_map, move
+from multiphi_exudyn.events.rebounds import rebound
 from multiphi_exudyn.events.signals import gap
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.striking import impact, list_changes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.free_rows import norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["begin"]
@@ -120,7 +122,9 @@ def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -
         return status
     strikes = 1 if ints[CHANGE_COUNT] > 0 else 0
     ints[CHANGE_COUNT] = 0
-    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
+    if rebound(ints, numbers, GIVEN, count) < 0:
+        return FAILED
+    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, ints[WANTED], SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
         return FAILED
     list_changes(ints, numbers, count)
     return strikes

@@ -11,6 +11,7 @@ from multiphi_exudyn.events.arrays import (
     DENIED,
     ELEMENTS,
     ENTERED_STATE,
+    FAILED,
     FURTHER,
     HELD,
     IMPULSES,
@@ -33,6 +34,7 @@ from multiphi_exudyn.events.arrays import (
     STRIKING,
     STRUCK,
     TOUCHING,
+    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, clear, enter, is_held, note, transfer
@@ -41,6 +43,7 @@ from multiphi_exudyn.events.impact import collide
 from multiphi_exudyn.events.independence import join
 from multiphi_exudyn.events.maps import find_level
 from multiphi_exudyn.events.phases import update_phases
+from multiphi_exudyn.events.rebounds import bounce, last_bounce, rebound
 from multiphi_exudyn.events.resting import press, reaction_sign, same_speed, stay_closed
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -65,14 +68,24 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     if status < 0:
         return status
     clear(numbers, LOST_IN_IMPACT)
-    status = collide(ints, numbers, RELEASED, touching, count, 0, STRUCK, ints[IMPULSES], LOST_IN_IMPACT)
-    if status < 0:
-        return status
+    bouncing = rebound(ints, numbers, RELEASED, count)
+    wanted = ints[WANTED] if bouncing > 0 else -1
+    if bouncing < 0:
+        return FAILED
+    if collide(ints, numbers, RELEASED, touching, count, 0, wanted, STRUCK, ints[IMPULSES], LOST_IN_IMPACT) < 0:
+        return FAILED
+    if bouncing > 0 and bounce(ints, numbers, count) < 0:
+        return FAILED
     same = same_speed(ints, numbers, RELEASED, STRUCK)
     if same == 1:
         for k in range(count):
             numbers[ints[IMPULSES] + k] = 0.0  # round-off of them: nothing was struck
     closed = press(ints, numbers, waves, count)
+    last = last_bounce(ints, numbers, count) if bouncing > 0 and closed >= 0 else 0
+    if last < 0:
+        return FAILED
+    if last > 0:
+        closed = press(ints, numbers, waves, count)
     if closed < 0:
         return closed
     copy_state(ints, numbers, STRUCK, AFTER)

@@ -6,6 +6,6 @@ small complementarity problem of contact and friction; what round-off is; functi
 
 Order: round_off, bounded_cache, buffer_function, machine_code, compilation, compiled_cache, compiled, modes,
 exponentials, basis_arrays, free_response, forced_response, response_arrays, signal_bounds, suspect, block_search,
-zero_crossing, least_distance, least_distance_arrays, free_rows, row_sides, complementarity, corners, interpolation,
+zero_crossing, least_distance, free_rows, row_sides, complementarity, corners, interpolation,
 piecewise_exponential, piecewise_linear_fit.
 """

@@ -41,6 +41,7 @@ from multiphi_exudyn.mathematics.free_rows import (
     FREE,
     HIGHS,
     LACKING,
+    LEADERS,
     LEFT,
     LENGTHS,
     LOWS,
@@ -58,7 +59,9 @@ from multiphi_exudyn.mathematics.free_rows import (
     SIDES,
     SIZES,
     SLACKS,
+    STRIDE,
     TERMS,
+    TIES,
     UNITS,
     UNKNOWNS,
     VALUES,
@@ -83,7 +86,7 @@ from multiphi_exudyn.mathematics.least_distance import FOLLOWING, INDEPENDENT, S
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mathematics.row_sides import choose_sides, first_change, is_met, look, most_lacking, scale
 
-__all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "problem_ints", "problem_numbers", "solve"]
+__all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "pose", "problem_ints", "problem_numbers", "solve"]
 
 SOLVED, EXCLUDED, UNDECIDED = 0, 1, 2  # no z is complementary; round-off keeps the sides from settling
 PROVED = 1e-12  # of all pushes: what x may differ from their sum
@@ -95,12 +98,13 @@ def problem_numbers(count: int, unknowns: int) -> int:
 
 
 def problem_ints(count: int) -> int:
-    """Ints that it works in, beside its record."""
-    return 3 * count
+    """Ints that it takes, its record first."""
+    return PROBLEM + 3 * count
 
 
-def lay_out(ints: Ints, problem: int, count: int, unknowns: int, numbers_at: int, ints_at: int) -> None:
-    """Give a problem of at most so many rows and unknowns its memory."""
+def lay_out(ints: Ints, problem: int, count: int, unknowns: int, numbers_at: int) -> None:
+    """Give a problem of at most so many rows and unknowns its memory; that in the ints is behind its record."""
+    ints_at = problem + PROBLEM
     for part in (SIDES, FREE, EXCLUDED_ROWS):
         ints[problem + part] = ints_at
         ints_at += count
@@ -119,6 +123,40 @@ def lay_out(ints: Ints, problem: int, count: int, unknowns: int, numbers_at: int
     for part in (SHARES, MOVES, ALONG):
         ints[problem + part] = numbers_at
         numbers_at += count
+
+
+@compiled
+def pose(
+    ints: Ints,
+    problem: int,
+    count: int,
+    unknowns: int,
+    stride: int,
+    rows: int,
+    pushes: int,
+    values: int,
+    sizes: int,
+    lows: int,
+    highs: int,
+    leaders: int,
+    ties: int,
+    x: int,
+    z: int,
+) -> None:
+    """Where A, G (k, stride), b, the sizes of its terms, bounds, leaders (ints), mu (k,), x (r,) and z (k,) stand."""
+    ints[problem + COUNT] = count
+    ints[problem + UNKNOWNS] = unknowns
+    ints[problem + STRIDE] = stride
+    ints[problem + ROWS] = rows
+    ints[problem + PUSHES] = pushes
+    ints[problem + VALUES] = values
+    ints[problem + SIZES] = sizes
+    ints[problem + LOWS] = lows
+    ints[problem + HIGHS] = highs
+    ints[problem + LEADERS] = leaders
+    ints[problem + TIES] = ties
+    ints[problem + X] = x
+    ints[problem + Z] = z
 
 
 @compiled

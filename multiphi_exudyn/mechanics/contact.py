@@ -2,7 +2,7 @@
 
     g(x) = h.x + gap,   open where g > 0;   the contact force lambda >= 0 [N] acts along +h.
 
-    rigid      0 <= lambda, g >= 0, lambda g = 0
+    rigid      0 <= lambda, g >= 0, lambda g = 0, and where it strikes with g'- < 0: g'+ >= -e g'-  (Moreau)
     compliant  lambda = k max(0, -g)
     viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
 
@@ -38,6 +38,7 @@ class UnilateralContact:
     gap: distance [m] in the undeformed structure; negative is a preload.
     stiffness: k [N/m], infinite for a rigid contact.
     damping: c [N s/m] beside a finite stiffness.
+    restitution: e from 0 to 1 of a rigid contact. Those that are struck together, and are coupled, need one e.
 
     Two contacts are equal only if they are the same object.
     """
@@ -47,13 +48,14 @@ class UnilateralContact:
     gap: float
     stiffness: float = math.inf
     damping: float = 0.0
+    restitution: float = 0.0
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"contact name: got {self.name!r}, need a non-empty string")
-        for name in ("gap", "stiffness", "damping"):
+        for name in ("gap", "stiffness", "damping", "restitution"):
             value = getattr(self, name)
             if not is_real(value):
                 raise MultiPhiTypeError(f"contact {self.name!r} {name}: got {value!r}, need a number")
@@ -68,6 +70,13 @@ class UnilateralContact:
         if self.rigid and self.damping:
             received = f"contact {self.name!r} damping: got {self.damping!r} beside an infinite stiffness"
             raise MultiPhiValueError(f"{received}, need a finite stiffness")
+
+        if not 0 <= self.restitution <= 1:
+            received = f"contact {self.name!r} restitution: got {self.restitution!r}"
+            raise MultiPhiValueError(f"{received}, need a value from 0 to 1")
+        if self.restitution and not self.rigid:
+            received = f"contact {self.name!r} restitution: got {self.restitution!r} beside a finite stiffness"
+            raise MultiPhiValueError(f"{received}, need an infinite one: a spring loses nothing, its damper does")
 
     @property
     def rigid(self) -> bool:

@@ -155,9 +155,9 @@ def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=Non
     tied = buffers.put_numbers(np.zeros(k) if ties is None else ties)
     x, z = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))
     scratch = buffers.put_numbers(np.full(complementarity.problem_numbers(k, r), np.nan))
-    ints = buffers.put_ints(np.full(complementarity.problem_ints(k), -1))
-    problem = buffers.put_ints([k, r, r, *given, led, tied, x, z, *np.zeros(complementarity.PROBLEM - 13, int)])
-    complementarity.lay_out(buffers.ints, problem, k, r, scratch, ints)
+    problem = buffers.put_ints(np.full(complementarity.problem_ints(k), -1))
+    complementarity.lay_out(buffers.ints, problem, k, r, scratch)
+    complementarity.pose(buffers.ints, problem, k, r, r, *given, led, tied, x, z)
     answer = run(complementarity.solve)(*buffers.all[:2], problem)
     listed = buffers.ints[problem + free_rows.EXCLUDED_ROWS]
     excluded = buffers.ints[listed:][: buffers.ints[problem + free_rows.EXCLUDING]].tolist()
