@@ -18,11 +18,12 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
     10      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     10      the last bounce               rebounds.last_bounce, rebounds.keep_landing
+    11      friction at rest              sticking.stick_together, sticking.choose, independence.thin_out
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
 Order: excitation, pieces, channels, loaded_level, transition, state, exits, loaded_levels, arrays, state_arrays,
-signals, maps, energies, drive, flow, impact, phases, independence, changes, rebounds, resting, striking, switching,
-decision, waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables,
-level_arrays.
+signals, maps, energies, drive, flow, impact, phases, changes, independence, rebounds, resting, striking, switching,
+sticking, decision, waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts, level_records,
+level_tables, level_arrays.
 """

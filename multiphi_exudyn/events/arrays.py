@@ -85,7 +85,8 @@ JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
-RUN_INTS = 200
+LIMITS, STATIC_LIMITS, TOGETHER = 200, 201, 202  # of rigid friction, zero of others; whether it has been decided
+RUN_INTS = 203
 
 # ---------------------------------------------------------------------- run record, numbers
 

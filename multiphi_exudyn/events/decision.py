@@ -47,6 +47,12 @@ bases of two levels need not agree, so the law says what happens then; each sent
    it lands e is zero.
    -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
 
+11. Rigid friction elements that stick, turn or begin to slip at an instant are decided together: their forces within
+   their limits, static ones until they slip, are complementary to their accelerations. What that leaves to the next
+   derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others push with
+   their limit, as if they slipped, and take over when they are needed: the motion is the same.
+   -> sticking.stick_together, sticking.choose, independence.thin_out
+
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
 depends on sampling. Negative gaps that truncation leaves are reported; an endless exchange is a failure, with a cause.
@@ -101,6 +107,7 @@ from multiphi_exudyn.events.arrays import (
     SIGNAL,
     STATES,
     STRIKING,
+    TOGETHER,
     TRANSITIONS_NOW,
     WORKED,
 )
@@ -109,6 +116,7 @@ from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
 from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching, keep_landing
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
+from multiphi_exudyn.events.sticking import stick_together
 from multiphi_exudyn.events.striking import close_without_impact, impact
 from multiphi_exudyn.events.switching import switch
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -132,6 +140,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     ints[TRANSITIONS_NOW] = 0
     copy_state(ints, numbers, REACHED, WORKED)
     forget_bounces(ints)
+    ints[TOGETHER] = 0
     clear_turning_speeds(ints, numbers, WORKED)
     status = settle(ints, numbers, waves)
     if status < 0:
@@ -261,6 +270,12 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
         asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
     if strikes == 0:
+        status = stick_together(ints, numbers, waves, asking)
+        left = 0
+        for i in range(c):
+            left += 1 if ints[asking + i] != NOBODY else 0
+        if status < 0 or left == 0:
+            return status
         return switch(ints, numbers, waves, asking)
     status = impact(ints, numbers, waves)
     if status < 0:

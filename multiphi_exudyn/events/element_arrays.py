@@ -24,6 +24,10 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     chains = np.full(c, -1)
     for number, chain in enumerate(model.chains):
         chains[list(chain)] = number
+    limits = np.zeros((2, c))
+    for i in model.held:
+        if model.contacts[i].rigid:
+            limits[:, i] = model.contacts[i].limit, model.contacts[i].most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
     given = {
@@ -35,6 +39,8 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
         a.DIRECTIONS: put("numbers", units.T),
+        a.LIMITS: put("numbers", limits[0]),
+        a.STATIC_LIMITS: put("numbers", limits[1]),
         a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
     }
     for slot, value in given.items():

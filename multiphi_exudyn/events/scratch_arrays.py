@@ -30,7 +30,9 @@ class ScratchArrays:
         self._buffers, self._terms = buffers, terms
         self._elements = int(ints[a.ELEMENTS])
         self._rigid = int(np.sum(ints[ints[a.KINDS] :][: self._elements] == a.RIGID))
-        self._struck = max(2 * self._rigid, 1)
+        sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
+        self._struck = max(2 * self._rigid, int(sliding), 1)
+        self._together = self._rigid + int(sliding)  # that may be held at once
         self.coordinates = self.exponentials = self.exits = 0
         self.changes = ROUNDS * (3 * self._elements + 1)
         self.powers = ints[a.FORCED_ROOM] = POWERS
@@ -79,13 +81,13 @@ class ScratchArrays:
     def _sets(self) -> dict[str, dict[int, int]]:
         """Memory that depends on the elements alone."""
         ints, c, struck, changes = self._buffers.ints, self._elements, self._struck, self.changes
-        m, rigid = int(ints[a.COORDINATES]), self._rigid
+        m = int(ints[a.COORDINATES])
         return {
             "ints": dict.fromkeys(OF_ELEMENTS, 2 * c + 1)
             | {a.CHAIN_MARKS: int(ints[a.CHAIN_COUNT]), a.SMALL_PROBLEM: problem_ints(struck), a.LEADERS: struck}
             | {a.CHANGES: a.CHANGE_WIDTH * changes},
             "numbers": dict.fromkeys((*OF_A_PROBLEM, a.IMPULSES, a.FURTHER, a.RESTING_SIZES), struck)
-            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(rigid, m)), a.CHANGE_IMPULSES: changes}
+            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(self._together, m)), a.CHANGE_IMPULSES: changes}
             | {a.FOUND: zero_crossing.RESULT},
         }
 

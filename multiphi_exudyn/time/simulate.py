@@ -19,6 +19,7 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiled import available
+from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load
@@ -181,6 +182,23 @@ def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) ->
     for i in model.held:
         element, rate = model.contacts[i], drop_round_off(rates[[i]], sizes[[i]])[0]
         states[i] = [state.name for state in element.states].index(element.first_state(0.0, float(rate)))
+    return _independent(model, states)
+
+
+def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
+    """States of which, of rigid links that would stick, an independent set does; the others push till it is decided."""
+    found = np.zeros((0, len(model.base.directions)))
+    for i in model.held:
+        if model.contacts[i].rigid and model.contacts[i].states[states[i]].holds:
+            row = model.base.directions[:, i]
+            left = row / np.linalg.norm(row)
+            for _ in range(2):
+                left = left - (found @ left) @ found
+            size = float(np.linalg.norm(left))
+            if size > INDEPENDENT:
+                found = np.vstack([found, left / size])
+            else:
+                states[i] = next(k for k, state in enumerate(model.contacts[i].states) if not state.holds)
     return states
 
 
