@@ -19,6 +19,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     10      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     10      the last bounce               rebounds.last_bounce, rebounds.keep_landing
     11      friction at rest              sticking.stick_together, sticking.choose, independence.thin_out
+    11      its impacts                   striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 

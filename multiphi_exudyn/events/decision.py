@@ -50,8 +50,9 @@ bases of two levels need not agree, so the law says what happens then; each sent
 11. Rigid friction elements that stick, turn or begin to slip at an instant are decided together: their forces within
    their limits, static ones until they slip, are complementary to their accelerations. What that leaves to the next
    derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others push with
-   their limit, as if they slipped, and take over when they are needed: the motion is the same.
-   -> sticking.stick_together, sticking.choose, independence.thin_out
+   their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an impulse.
+   -> sticking.stick_together, sticking.choose, independence.thin_out,
+   striking.slide_on
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
@@ -92,6 +93,7 @@ from multiphi_exudyn.events.arrays import (
     KINDS,
     LANDING,
     LEVEL,
+    LIMITS,
     LOST,
     LOST_NOW,
     NOT_ADMISSIBLE,
@@ -269,6 +271,8 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
         strikes += 1 if ints[striking + i] == 1 and ints[asking + i] != NOBODY else 0
         asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
+        if numbers[ints[LIMITS] + i] > 0.0:  # which bears no impulse: in slip, one way or the other
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
     if strikes == 0:
         status = stick_together(ints, numbers, waves, asking)
         left = 0

@@ -30,6 +30,7 @@ from multiphi_exudyn.events.arrays import (
     IMPULSES,
     KINDS,
     LEVEL,
+    LIMITS,
     LOSSES,
     LOST,
     LOST_AT_START,
@@ -76,9 +77,14 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """
     states, count, strikes = ints[ints[GIVEN + LEVEL] + STATES], 0, 0
     measure(ints, numbers, GIVEN)
+    touching = 0
+    for i in range(ints[ELEMENTS]):
+        touching += ints[states + i] if ints[ints[KINDS] + i] == RIGID else 0
     for i in range(ints[ELEMENTS]):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
+        if numbers[ints[LIMITS] + i] > 0.0 and touching > 0:  # which bears no impulse (striking.py)
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
         ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
         ints[ints[FREED] + i] = 0
         ints[ints[ASKING] + i] = NOBODY

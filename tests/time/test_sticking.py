@@ -139,3 +139,18 @@ def test_mirrored_blocks_are_mirrored():
     runs = [mp.simulate(model, 20.0, displacement=sign * start) for sign in (1, -1)]
     assert [event.time for event in runs[0].events] == [event.time for event in runs[1].events]
     assert np.array_equal(runs[0].displacement(20.0), -runs[1].displacement(20.0))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+def test_what_sticks_bears_no_impulse(gap, e):
+    """A free block strikes one that friction holds: half of the speed, and rebound, then 2 F of both or F of one."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"a": 0, "b": 1})
+    contact = mp.UnilateralContact("ab", {"b": 1.0, "a": -1.0}, gap, restitution=e)
+    model = mp.MultiPhiModel(structure, [contact, mp.Friction("floor", "b", 0.1)], modes="all")
+    run = mp.simulate(model, gap + 1.0, velocity=[1.0, 0.0])
+    assert run.status == "ok"
+    after = np.array([1 - e, 1 + e]) / 2
+    lost = [0.05, 0.05] if e == 0 else [0.0, 0.1]
+    assert_allclose(run.velocity(gap + 1.0), after - lost, rtol=1e-12)
+    assert run.ledger.impact == pytest.approx(0.25 * (1 - e**2), rel=1e-12)
