@@ -219,12 +219,14 @@ def drive(ints: Ints, numbers: Numbers, problem: int, driven: int) -> int:
     ints[sides + driven] = WAITING
     for _ in range(SETS * (ints[problem + COUNT] + 1)):
         progress = way * move_free(ints, numbers, problem, driven, way)
-        if progress == 0.0 and is_met(ints, numbers, problem, driven) == 1:  # by others: its share goes back to them
-            way = -way
-            move_free(ints, numbers, problem, driven, way)
         numbers[ints[problem + MOVES] + driven] = way
         lacking = max(-way * numbers[results + driven], 0.0)
         step = first_change(ints, numbers, problem, driven, lacking / progress if progress > 0.0 else math.inf)
+        if progress == 0.0 and is_met(ints, numbers, problem, driven, step) == 1:  # by others: its share goes to them
+            way = -way
+            move_free(ints, numbers, problem, driven, way)
+            numbers[ints[problem + MOVES] + driven] = way
+            step = first_change(ints, numbers, problem, driven, math.inf)
         if not step < math.inf:
             list_excluded(ints, numbers, problem, driven)
             return EXCLUDED

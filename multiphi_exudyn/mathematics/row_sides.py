@@ -175,11 +175,18 @@ def is_wide(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
 
 
 @compiled
-def is_met(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
-    """1 where a row lacks no more beside those that it follows from than what is left of it beside them may make."""
-    x, slack = ints[problem + X], ints[problem + SLACKS] + row
+def is_met(ints: Ints, numbers: Numbers, problem: int, row: int, step: float) -> int:
+    """1 where a row lacks no more beside those that it follows from than what is left of it beside them may make.
+
+    Unless it can take over from one of them what they bear, in a step that is not far larger than that.
+    """
+    x, slack, borne = ints[problem + X], ints[problem + SLACKS] + row, 0.0
     terms = numbers[ints[problem + TERMS] + row] + norm(numbers, x, ints[problem + UNKNOWNS])
     if numbers[ints[problem + LACKING] + row] > FOLLOWING * terms:
+        return 0
+    for k in range(ints[problem + COUNT]):
+        borne += abs(numbers[ints[problem + SHARES] + k])
+    if numbers[ints[problem + LACKING] + row] > 0.0 and step <= 2.0 * borne:
         return 0
     numbers[slack] = FOLLOWING
     numbers[ints[problem + LACKING] + row] = 0.0
