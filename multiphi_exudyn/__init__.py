@@ -19,6 +19,7 @@ from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.assembly import Assembly, assemble
 from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -51,6 +52,7 @@ __all__ = [
     "Beam",
     "Clamp",
     "ConstantLoad",
+    "Equilibrium",
     "Event",
     "ForceLaw",
     "FrequencyResponse",

@@ -7,11 +7,13 @@ record    where                   what stands in it
 --------  ----------------------  -------------------------------------------------------------------------------------
 run       ints[0 ...]             sizes, where tables and scratch memory begin, states, counts, what is needed, causes
           numbers[0 ...]          times, energies lost, what a failure is told with
-element   ints[ints[KINDS] + i]   COMPLIANT, RIGID or VISCOUS; chain, stiffness, direction (m,) in tables of their own
+element   ints[ints[KINDS] + i]   COMPLIANT, RIGID, VISCOUS or SLIDING; chain, stiffness, direction (m,), and the
+                                  stretch that its link keeps where it does not hold, in tables of their own
 level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
-                                  the power of damping xi'.D xi', and of what varies (q, 4 n + 1), as in work.py;
+                                  the power of damping xi'.D xi', of what varies (q, 4 n + 1), and of friction
+                                  f.xi', as in work.py;
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it
@@ -23,7 +25,7 @@ piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
           SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
 event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event)
-          EVENT_NUMBERS           time, five losses, impulse
+          EVENT_NUMBERS           time, six losses, impulse
 
 A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
 an element is, and what friction will make of one (more states, more exits, channels that maps set), is data alone.
@@ -40,6 +42,7 @@ __all__ = ["Buffers"]
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 PRESCRIBED = 46  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
+STRETCHES = 113
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
 PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
     13,
@@ -76,8 +79,8 @@ SIGNALS, CONSTANTS, NOISES, WAITING, FALLEN, FOUND = 61, 62, 63, 64, 65, 66
 SEARCH_NUMBERS, SEARCH_WAVES, WORK_WAVES = 67, 68, 69
 ACCELERATION = 70
 ROWS, VALUES, VALUE_SIZES, IMPULSES, FURTHER, MOVED, SMALL_PROBLEM, CHANGE = 73, 74, 75, 76, 77, 78, 79, 80
-LOWEST, HIGHEST, LEADERS, RATIOS, WANTED = 113, 114, 115, 116, 117  # of a small problem: its bounds; speeds wanted
-RESTITUTIONS, LASTS, GROUPS = 118, 119, 71  # of elements; who begins its last bounce; who is struck with whom
+LOWEST, HIGHEST, LEADERS, RATIOS, WANTED = range(203, 208)  # of a small problem: its bounds; speeds wanted
+RESTITUTIONS, LASTS, GROUPS = range(208, 211)  # of elements; who begins its last bounce; who is struck with whom
 ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED = range(81, 91)  # sets
 HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
@@ -86,7 +89,7 @@ JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
 LIMITS, STATIC_LIMITS, TOGETHER = 200, 201, 202  # of rigid friction, zero of others; whether it has been decided
-RUN_INTS = 203
+RUN_INTS = 211
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -96,18 +99,19 @@ TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 RUN_NUMBERS = 42
-BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, LOSSES = 0, 1, 2, 3, 4, 5
+BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
 # ---------------------------------------------------------------------- other records, ints
 
-COMPLIANT, RIGID, VISCOUS = 0, 1, 2
+COMPLIANT, RIGID, VISCOUS, SLIDING = 0, 1, 2, 3
 FRESH, GOING_ON = 1, 2
 OPEN, CLOSE = 0, 1  # states of a contact
+STICK = 0  # of friction
 ARMED, RECOVERING, REFUSED, HELD_BACK, LANDING = 0, 1, 2, 3, 4
 
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
-DISSIPATION, POWER = 20, 21  # forms of the power of damping and of what varies, zero while nobody needed them
+DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
 LEVEL_INTS = 24
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
@@ -125,7 +129,7 @@ PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers;
 CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
 SHARED = -1
 SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
-EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 7
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 8
 
 # ---------------------------------------------------------------------- answers
 

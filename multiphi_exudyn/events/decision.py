@@ -19,7 +19,8 @@ bases of two levels need not agree, so the law says what happens then; each sent
    already stays open at its stop, without a force: of redundant contacts a set that is independent carries all.
    -> striking.impact, impact.collide, resting.list_resting, resting.press, resting.stay_closed, independence.join,
    striking.close_without_impact
-3. A rigid contact that asks to open always opens: it never pulls.
+3. A rigid contact that asks to open always opens: it never pulls. Friction that asks changes always, but stays in slip
+   where it has come from stick at the same instant and truncation has left it a speed against its slip.
    -> switching.is_firm, switching.open_and_enter
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
@@ -122,10 +123,11 @@ from multiphi_exudyn.events.sticking import stick_together
 from multiphi_exudyn.events.striking import close_without_impact, impact
 from multiphi_exudyn.events.switching import switch
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
+MOST_RETURNS = 3  # changes of an element at one instant, from which on it stays where truncated levels disagree
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
 
 
@@ -227,7 +229,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 def find_refused(ints: Ints) -> int:
     """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: some always taken, PULLING.
 
-    3: of others only. Who has changed has been heard.
+    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since.
     """
     level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
@@ -245,7 +247,8 @@ def find_refused(ints: Ints) -> int:
             if ints[heard + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
                 unheard = 1
-            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:
+            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element) == 0
+            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or once:
                 ints[pulling + element] = ints[exit_ + ASKED]
                 pulled = 1
     if refused == 0:
@@ -253,6 +256,16 @@ def find_refused(ints: Ints) -> int:
     if unheard == 1:
         return 1
     return 2 if pulled == 1 else 3
+
+
+@compiled
+def is_latest(ints: Ints, element: int) -> int:
+    """1 where an element was the last to change at this instant, or has changed again and again."""
+    last, count = NOBODY, 0
+    for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
+        last = ints[ints[CHANGES] + k * CHANGE_WIDTH]
+        count += 1 if last == element else 0
+    return 1 if last == element or count > MOST_RETURNS else 0
 
 
 @compiled

@@ -19,8 +19,8 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     buffers.take("numbers", a.RUN_NUMBERS)
     base, c = model.base, len(model.contacts)
     viscous = base.dampings > 0
-    striking = np.isinf(base.stiffnesses)
-    striking[list(model.held)] = False
+    kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))
+    kinds[list(model.held)] = a.SLIDING
     chains = np.full(c, -1)
     for number, chain in enumerate(model.chains):
         chains[list(chain)] = number
@@ -34,10 +34,11 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.ELEMENTS: c,
         a.COORDINATES: base.modes.count,
         a.WHOLE: int(model.whole),
-        a.KINDS: put("ints", np.where(striking, a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))),
+        a.KINDS: put("ints", kinds),
         a.CHAINS: put("ints", chains),
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
+        a.STRETCHES: put("numbers", [max(state.stretch for state in c.states) for c in model.contacts]),
         a.DIRECTIONS: put("numbers", units.T),
         a.LIMITS: put("numbers", limits[0]),
         a.STATIC_LIMITS: put("numbers", limits[1]),

@@ -7,6 +7,7 @@ from multiphi_exudyn.events.arrays import (
     CHANNELS,
     DAMPING,
     ELEMENTS,
+    FRICTION,
     KINDS,
     KINETIC,
     LEVEL,
@@ -14,10 +15,13 @@ from multiphi_exudyn.events.arrays import (
     PATTERNS,
     PLACE,
     POTENTIAL,
+    SLIDING,
     SPEED,
     STATES,
+    STICK,
     STIFFNESSES,
     STRAIN,
+    STRETCHES,
     VISCOUS,
 )
 from multiphi_exudyn.events.signals import gap
@@ -82,17 +86,22 @@ def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float, losses: int) -> None:
-    """Add what is lost between two states of one instant to losses (5,), less the energy ``collided`` in an impact.
+    """Add what is lost between two states of one instant to losses (6,), less the energy ``collided`` in an impact.
 
     Viscous contacts that open inside their stop lose what their springs hold, those that close there bring it back.
+    A spring that begins to slip loses what it held more than it keeps: the drop from its static limit.
     """
-    relaxed = 0.0
+    relaxed, dropped = 0.0, 0.0
     states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
         if ints[ints[KINDS] + i] == VISCOUS and ints[states + i] != ints[later + i]:
             depth = gap(ints, numbers, before, i)
             stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
             relaxed += stored if ints[states + i] > ints[later + i] else -stored
+        if ints[ints[KINDS] + i] == SLIDING and ints[states + i] == STICK and ints[later + i] != STICK:
+            stretch, kept = gap(ints, numbers, before, i), numbers[ints[STRETCHES] + i]
+            dropped += 0.5 * numbers[ints[STIFFNESSES] + i] * (stretch * stretch - kept * kept)
     numbers[losses + KINETIC] += kinetic(ints, numbers, before) - kinetic(ints, numbers, after) - collided
-    numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed
+    numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed - dropped
     numbers[losses + DAMPING] += relaxed
+    numbers[losses + FRICTION] += dropped

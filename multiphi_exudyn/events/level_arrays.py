@@ -212,7 +212,7 @@ class LevelArrays:
         self._count += 1
 
     def add_powers(self, level: int) -> None:
-        """Pack the power of damping and of what varies in a level that stands in the ints."""
+        """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 

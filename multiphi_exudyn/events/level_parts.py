@@ -56,19 +56,22 @@ def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, l
     return place, np.concatenate([-(vectors @ rest), np.zeros(q)]), speed, sizes
 
 
-def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
-    """The power of damping as a form in xi' (n, n), and of what varies (q, 4 n + 1), as in work.py."""
+def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py."""
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
     modal, patterns, static = level.modal, level.excitation.patterns, level.excitation.static + base.preload
     moved = np.hstack([modal.vectors, carried])
     springs = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
     held = springs * level.gap_constants[index]
-    worked = carried.T @ base.directions[:, index] - level.excitation.stops[index].T  # by their forces
+    given = carried.T @ base.directions - level.excitation.stops.T  # by the forces of elements
+    worked = given[:, index]
     placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
     placed[:, modal.modes :] -= carried.T @ patterns
     speed = worked @ drags + carried.T @ base.damping @ moved
     constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
+    constant -= given @ level.pushes
     damping = moved.T @ base.damping @ moved + own.speed_rows[index].T @ drags
     damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
-    return damping, np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
+    varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
+    return damping, varying, -(level.pushes @ own.gap_rows)

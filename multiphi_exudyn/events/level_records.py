@@ -58,10 +58,10 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequen
 
 
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
-    """Give the record of a level the power of damping and of what varies."""
-    damping, varying = powers(level)
-    places = buffers.put("numbers", (damping + damping.T) / 2), buffers.put("numbers", varying)
-    buffers.ints[record + a.DISSIPATION], buffers.ints[record + a.POWER] = places
+    """Give the record of a level the power of damping, of what varies and of friction."""
+    damping, varying, rubbing = powers(level)
+    places = [buffers.put("numbers", values) for values in ((damping + damping.T) / 2, varying, rubbing)]
+    buffers.ints[[record + slot for slot in (a.DISSIPATION, a.POWER, a.RUBBING)]] = places
 
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:

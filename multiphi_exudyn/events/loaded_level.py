@@ -131,6 +131,12 @@ class LoadedLevel:
         return tuple(int(i in closed) for i in range(len(self.gap_constants)))
 
     @functools.cached_property
+    def pushes(self) -> np.ndarray:
+        """Constant forces (c,) [N] of its elements along their directions."""
+        given = zip(self.level.base.contacts, self.states, strict=True)
+        return np.array([element.states[state].push for element, state in given])
+
+    @functools.cached_property
     def driven(self) -> bool:
         """Whether a static load drives zero-frequency modes."""
         return bool(np.any(self.asymptotic.drive))

@@ -51,7 +51,7 @@ from multiphi_exudyn.events.flow import expand, signal_sizes, signal_waves
 from multiphi_exudyn.events.signals import held_part, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.zero_crossing import first_sign
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
 
 __all__ = [
     "becomes",
@@ -79,7 +79,8 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
         rate = becomes(ints, numbers, waves, state, signal, 2)
     if value == 0 and rate >= 0:
         return ARMED
-    return RECOVERING if rate > 0 and ints[exit_ + FIRMNESS] == MAY_RECOVER else REFUSED
+    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] == TAKEN_ONCE
+    return RECOVERING if rate > 0 and recovers else REFUSED
 
 
 @compiled
@@ -178,7 +179,7 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
-        back = ints[exit_ + FIRMNESS] == ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
+        back = ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
         back = back and ints[phase] == REFUSED and ints[ints[KINDS] + element] != RIGID
         if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL) == 0:
             ints[phase] = ARMED

@@ -43,8 +43,10 @@ from multiphi_exudyn.events.arrays import (
     REACHED,
     RIGID,
     SETTLED,
+    SLIDING,
     SLOWED,
     STATES,
+    STICK,
     STIFFNESSES,
     STRAIN,
     STRIKING,
@@ -161,10 +163,10 @@ def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: i
 
 @compiled
 def springs(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level."""
+    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level, and of friction."""
     states, total = ints[ints[state + LEVEL] + STATES], 0.0
     for i in range(ints[ELEMENTS]):
-        if ints[states + i] == CLOSE:
+        if ints[states + i] == (STICK if ints[ints[KINDS] + i] == SLIDING else CLOSE):
             depth = gap(ints, numbers, state, i)
             total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
     return total

@@ -67,7 +67,8 @@ class Loss:
     """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
 
     stop_work: what moving stops, or what hangs on its points in Exudyn, put into it by impulses, no loss. damping: the
-    strain of viscous contacts that change inside their stop (contact.py).
+    strain of viscous contacts that change inside their stop (contact.py). friction: of springs that begin to slip, what
+    they held more than they keep (friction.py).
     """
 
     impact: float = 0.0
@@ -75,6 +76,7 @@ class Loss:
     truncation_strain: float = 0.0
     stop_work: float = 0.0
     damping: float = 0.0
+    friction: float = 0.0
 
     def __add__(self, other: Loss) -> Loss:
         return Loss(
@@ -83,21 +85,23 @@ class Loss:
             self.truncation_strain + other.truncation_strain,
             self.stop_work + other.stop_work,
             self.damping + other.damping,
+            self.friction + other.friction,
         )
 
     @property
     def total(self) -> float:
         """Sum of all that was lost [J]."""
-        return self.impact + self.truncation_kinetic + self.truncation_strain + self.damping
+        return self.impact + self.truncation_kinetic + self.truncation_strain + self.damping + self.friction
 
 
 @dataclass(frozen=True)
 class Event:
-    """A contact changed state.
+    """A contact or a friction changed state.
 
-    time [s]; contact: its name; kind: "close" | "open"; loss: the energy [J] of the whole instant, carried by its
-    first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an "open" of equal time.
-    shared: name and impulse of contacts that are closed and stay so in the impact, carried by its first event.
+    time [s]; contact: its name; kind: "close" | "open", of friction "stick" | "slip"; loss: the energy [J] of the whole
+    instant, carried by its first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an
+    "open" of equal time. shared: name and impulse of contacts that are closed and stay so in the impact, carried by its
+    first event.
     """
 
     time: float

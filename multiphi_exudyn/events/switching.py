@@ -108,7 +108,7 @@ def is_firm(ints: Ints, element: int, asked: int) -> int:
     first = ints[level + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
-        if ints[exit_ + ASKED] == asked and ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:
+        if ints[exit_ + ASKED] == asked and ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN:
             return 1
     return 0
 

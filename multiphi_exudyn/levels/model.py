@@ -15,7 +15,7 @@ from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base, direction_indices
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
-from multiphi_exudyn.levels.static_equilibrium import equilibrium, pressing
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import Element
@@ -301,25 +301,35 @@ class MultiPhiModel:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
 
         The configuration that the contacts admit nearest to the one without them, in the energy of structure and
-        contact springs: those that press make the level whose state of rest it is. With force laws it is the
-        equilibrium that is reached when the forces are applied slowly (static_equilibrium.py). Needs a structure
-        without rigid-body modes. Raises NumericalFailure where force laws let the structure snap through on the way.
+        contact springs: those that press make the level whose state of rest it is. With force laws or friction it is
+        the equilibrium that is reached when the forces are applied slowly (static_equilibrium.py); a run that starts
+        there with stretched springs of friction starts from ``equilibrium``. Needs a structure without rigid-body
+        modes. Raises NumericalFailure where the structure snaps through on the way, or friction lets go with a jump.
         """
-        self.need_contacts("static equilibrium")
+        return self.equilibrium(forces).displacement
+
+    def equilibrium(self, forces: Mapping[str, float]) -> Equilibrium:
+        """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``."""
+        y, stretches = self._at_rest(forces)
+        named = {c.name: float(stretch) for c, stretch in zip(self.contacts, stretches, strict=True) if c.held}
+        return Equilibrium(self.base.modes.shapes @ y, named)
+
+    def _at_rest(self, forces: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """y (m,) and stretches (c,) [m] at rest under forces [N] at points."""
         base = self.base
         if base.modes.rigid:
             raise MultiPhiValueError(
                 f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
             )
         load = self.base_load(forces)
-        if self.force_laws:
-            return base.modes.shapes @ equilibrium(base, load)
+        if self.force_laws or self.general:
+            return equilibrium(base, load)
         compliance = base.modes.omega**-2.0
         gaps = base.directions.T @ (compliance * load) + base.gaps
         bending = base.directions.T / base.modes.omega
         closed = pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
         level = build_level(base, tuple(int(i) for i in np.flatnonzero(closed)))
-        return base.modes.shapes @ level.asymptotic(load).configuration
+        return level.asymptotic(load).configuration, np.zeros(len(base.contacts))
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Forces [N] at points as a load (m,) in base coordinates."""

@@ -19,11 +19,12 @@ have changed (or a change in truncated modes), the exit says by its firmness wha
     MAY_RECOVER      while it rises the state stays, and the exit waits until it has risen to zero
     NEVER_RECOVERS   it does not wait for that
     ALWAYS_TAKEN     nor for whether the state it leads to admits it: it changes at once
+    TAKEN_ONCE       it waits while it rises; else it changes at once, but stays where it has just come from there
 
     contact          open: q;  closed: -q where compliant, lambda where rigid (always taken) or viscous (never recovers)
     friction |T| <= F, T = -lambda, rigid or by a spring in series
                      stick (the link holds, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
-                     exit s q', back into stick; all of them always taken
+                     exit s q', back into stick, taken once; those of stick always taken
 """
 
 from __future__ import annotations
@@ -33,9 +34,18 @@ from typing import Protocol, runtime_checkable
 
 from multiphi_exudyn.mechanics.structure import At
 
-__all__ = ["ALWAYS_TAKEN", "MAY_RECOVER", "NEVER_RECOVERS", "Element", "ElementState", "Exit", "contact_states"]
+__all__ = [
+    "ALWAYS_TAKEN",
+    "MAY_RECOVER",
+    "NEVER_RECOVERS",
+    "TAKEN_ONCE",
+    "Element",
+    "ElementState",
+    "Exit",
+    "contact_states",
+]
 
-MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN = 0, 1, 2
+MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, ElementState, Exit
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE, ElementState, Exit
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Friction"]
@@ -86,7 +86,7 @@ class Friction:
 
     def _slip(self, sign: str) -> ElementState:
         s = float(f"{sign}1")
-        back = Exit("stick", rate=s, firmness=ALWAYS_TAKEN)
+        back = Exit("stick", rate=s, firmness=TAKEN_ONCE)
         stretch = 0.0 if self.rigid else s * self.limit / self.stiffness
         return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
 

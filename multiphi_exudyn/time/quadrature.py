@@ -38,14 +38,15 @@ def panels(rates: np.ndarray, start: float, end: float) -> Iterator[tuple[np.nda
 
 def works(
     level: LoadedLevel, modal: Callable[[np.ndarray, int], np.ndarray], rates: np.ndarray, start: float, end: float
-) -> tuple[float, float]:
-    """Work [J] of damping and of what varies; modal: xi or a derivative (n, k) at times (k,)."""
-    damping = varying = 0.0
+) -> tuple[float, float, float]:
+    """Work [J] of damping, of what varies and of friction; modal: xi or a derivative (n, k) at times (k,)."""
+    damping = varying = friction = 0.0
     for times, weights in panels(rates, start, end):
         xi, xi_t, xi_tt = (modal(times, derivative) for derivative in range(3))
         damping += float(weights @ _dissipation(level, xi_t))
         varying += float(weights @ _power(level, xi, xi_t, xi_tt))
-    return damping, varying
+        friction -= float(weights @ (level.pushes @ level.level.gap_rows @ xi_t))
+    return damping, varying, friction
 
 
 def _dissipation(level: LoadedLevel, xi_t: np.ndarray) -> np.ndarray:
@@ -76,9 +77,10 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
     gaps = level.level.gap_rows[index] @ xi + level.gap_constants[index][:, None]
     springs = stiffness[:, None] * gaps + _dampers(level, xi_t)
     power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
+    power += level.pushes @ level.excitation.stops @ w_t
     if np.any(carried):
         y, moved, accelerated = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
-        load = (level.excitation.static + base.preload)[:, None] + varying
+        load = (level.excitation.static + base.preload + base.directions @ level.pushes)[:, None] + varying
         residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
         residual += base.directions[:, index] @ springs
         power += np.sum((carried @ w_t) * residual, axis=0)

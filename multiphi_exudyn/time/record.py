@@ -79,10 +79,10 @@ class Recorded(Made[Segment], Segments):
         return self._record.values(times, side, row)
 
     @functools.cached_property
-    def works(self) -> tuple[float, float]:
+    def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        damping, varying = self._record.works().tolist()
-        return damping, varying + float(np.sum(self._record.spans[:, 4]))
+        damping, varying, friction = self._record.works().tolist()
+        return damping, varying + float(np.sum(self._record.spans[:, 4])), friction
 
 
 class Events(Made[Event]):
@@ -95,14 +95,13 @@ class Events(Made[Event]):
     @property
     def loss(self) -> Loss:
         """The energies [J] that left at all of them."""
-        impact, kinetic, strain, stop_work, damping = np.sum(self._record.amounts[:, 1:6], axis=0).tolist()
-        return Loss(impact, kinetic, strain, stop_work, damping)
+        return Loss(*np.sum(self._record.amounts[:, 1:-1], axis=0).tolist())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
         places, amounts = self._record.places, self._record.amounts
         time, truncation = amounts[places, 0], amounts[places, 2] + amounts[places, 3]
-        return np.column_stack([time, self._record.kinds[places, 0], amounts[places, 6], truncation])
+        return np.column_stack([time, self._record.kinds[places, 0], amounts[places, -1], truncation])
 
 
 def _joined(name: str) -> property:
@@ -124,7 +123,7 @@ class Record:
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
     coordinates: xi, xi' of every start.
     phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
-    amounts (m, 7): time [s], five losses [J], impulse [N s]. arrays: those of the loop.
+    amounts (m, 8): time [s], six losses [J], impulse [N s]. arrays: those of the loop.
     """
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
@@ -238,8 +237,8 @@ class Record:
         return result
 
     def works(self) -> np.ndarray:
-        """Work [J] of damping and of what varies (2,) in all segments, without what jumps where they begin."""
-        works = np.zeros((len(self.rows), 2))
+        """Work [J] (3,) of damping, of what varies and of friction in all segments, less what jumps at their starts."""
+        works = np.zeros((len(self.rows), 3))
         for offsets in self._packed(list(range(len(self.levels)))):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_powers(level)
@@ -306,8 +305,6 @@ class Record:
         place = int(self.places[i])
         before = int(self.places[i - 1]) + 1 if i else 0
         time, *lost, impulse = self.amounts[place].tolist()
-        impact, kinetic, strain, stop_work, damping = lost
         contact, entered = self.kinds[place].tolist()
-        shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, 6])) for k in range(before, place))
-        loss = Loss(impact, kinetic, strain, stop_work, damping)
-        return Event(time, self._names[contact], self._events[contact][entered], loss, impulse, shared)
+        shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, -1])) for k in range(before, place))
+        return Event(time, self._names[contact], self._events[contact][entered], Loss(*lost), impulse, shared)

@@ -89,10 +89,10 @@ class Segment:
         return np.asarray(self.level.kinetic(self.modal(t, 1)) + self.level.strain(self.modal(t)))
 
     @functools.cached_property
-    def works(self) -> tuple[float, float]:
-        """Work [J] of damping, and of loads and stops that vary in time."""
-        damping, varying = works(self.level, self.modal, self.basis.rates, self.start, self.end)
-        return damping, self.entry_work + varying
+    def works(self) -> tuple[float, float, float]:
+        """Work [J] of damping, of loads and stops that vary in time, and of friction."""
+        damping, varying, friction = works(self.level, self.modal, self.basis.rates, self.start, self.end)
+        return damping, self.entry_work + varying, friction
 
     def unarmed_times(self, samples: int) -> np.ndarray:
         """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several.
@@ -132,8 +132,8 @@ class Segments(Sequence[Segment], ABC):
 
     @property
     @abstractmethod
-    def works(self) -> tuple[float, float]:
-        """Work [J] of damping, and of loads and stops that vary in time."""
+    def works(self) -> tuple[float, float, float]:
+        """Work [J] of damping, of loads and stops that vary in time, and of friction."""
 
     def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
         """Places (k,) of the segments that hold at times (k,) [s]."""
@@ -145,11 +145,11 @@ class Listed(Segments):
 
     def __init__(self, segments: Sequence[Segment]) -> None:
         self._segments = segments
-        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by closed contacts: one may have been built anew
+        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
         for segment in segments:
-            known.setdefault(segment.level.level.indices, (len(known), segment.level))
+            known.setdefault(segment.level.states, (len(known), segment.level))
         self.levels = [level for _, level in known.values()]
-        self.numbers = np.array([known[segment.level.level.indices][0] for segment in segments], np.int64)
+        self.numbers = np.array([known[segment.level.states][0] for segment in segments], np.int64)
         self.starts = np.array([segment.start for segment in segments])
         self.ends = np.array([segment.end for segment in segments])
 
@@ -180,10 +180,10 @@ class Listed(Segments):
         return found
 
     @property
-    def works(self) -> tuple[float, float]:
+    def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        damping, varying = np.sum([s.works for s in self._segments], axis=0).tolist()
-        return damping, varying
+        damping, varying, friction = np.sum([s.works for s in self._segments], axis=0).tolist()
+        return damping, varying, friction
 
 
 def owners(starts: np.ndarray, times: np.ndarray, side: str) -> np.ndarray:

@@ -7,7 +7,7 @@ on the way ends the trajectory early, with a status and its cause.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
@@ -44,7 +45,7 @@ def simulate(
     velocity: np.ndarray | None = None,
     loads: Sequence[Load] = (),
     compiled: bool | None = None,
-    start: Trajectory | None = None,
+    start: Trajectory | Equilibrium | None = None,
 ) -> Trajectory:
     """Motion of ``model`` from 0 to t_end [s], or from the end of the trajectory ``start``.
 
@@ -52,7 +53,9 @@ def simulate(
     start: a trajectory of the same model; its final state is handed on whole, what links hold and what contacts wait
     for included, so that also a truncated model moves as it would have without the break. Time goes on: the answer
     lasts from ``start.t_end`` to t_end, and that is the time of the loads. They are not part of the trajectory: give
-    them again, or others, which then begin to act with a jump.
+    them again, or others, which then begin to act with a jump. Or an ``equilibrium`` of the model, whose displacement
+    is the start, at rest, with the springs of friction as they are stretched there; given as a displacement alone, they
+    are not stretched. The forces are not part of it either.
     compiled: False for the loop as plain Python; True, or None, for the compiled one, plain Python where numba is not
     installed and None is given; the answer is the same to round-off.
     The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
@@ -68,7 +71,9 @@ def simulate(
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     run = Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start)
     if start is not None:
-        _check_going_on(run)
+        _check_start(run)
+    if isinstance(start, Equilibrium):
+        run = replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     trajectory = replace(trajectory, warnings=warnings_of(trajectory, tolerance))
@@ -86,7 +91,8 @@ class Run:
     velocity: np.ndarray | None = None
     loads: Sequence[Load] = ()
     compiled: bool | None = None
-    start: Trajectory | None = None
+    start: Trajectory | Equilibrium | None = None
+    stretches: Mapping[str, float] | None = None
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -105,8 +111,9 @@ class Run:
         excitation = Excitation.of(self.model, self.loads, self.t_end, finer)
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        levels = levels_of(self.model, excitation, self.start.t_end if self.start else 0.0, self.t_end)
-        start = _start(self, excitation) if self.start is None else going_on(self.start, levels)
+        before = self.start if isinstance(self.start, Trajectory) else None
+        levels = levels_of(self.model, excitation, before.t_end if before else 0.0, self.t_end)
+        start = _start(self, excitation) if before is None else going_on(before, levels)
         return motion_of(levels, start, self.compiled)
 
     def _decided(self) -> Trajectory:
@@ -120,7 +127,7 @@ class Run:
 
     def _again(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
         """The run from y, y' (m,) in base coordinates."""
-        if self.start is not None:
+        if isinstance(self.start, Trajectory):
             return replace(self, start=nudged(self.start, v)).trajectory()
         shapes = self.model.base.modes.shapes
         return replace(self, displacement=shapes @ y, velocity=shapes @ v).trajectory()
@@ -172,8 +179,12 @@ def _start(run: Run, excitation: Excitation) -> Start:
     if model.held:
         states = _first_states(model, v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds))
     states[penetrating + touching] = 1
-    held = np.array([gaps[i] for i in model.held])  # where it starts a link has no stretch
-    return Start(y, v, tuple(penetrating), tuple(touching), base.gaps - moved, tuple(states.tolist()), held)
+    stretches = run.stretches or {}
+    held = np.array([gaps[i] - stretches.get(model.contacts[i].name, 0.0) for i in model.held])
+    left = base.gaps - moved
+    left[list(model.held)] -= held
+    sprung = tuple(sorted([*penetrating, *(i for i in model.held if states[i] == 0)]))
+    return Start(y, v, sprung, tuple(touching), left, tuple(states.tolist()), held)
 
 
 def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -202,13 +213,21 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
     return states
 
 
-def _check_going_on(run: Run) -> None:
-    """Refuse a trajectory from whose end this run cannot go on."""
+def _check_start(run: Run) -> None:
+    """Refuse a trajectory from whose end this run cannot go on, and an equilibrium of another model."""
     start = run.start
-    if not isinstance(start, Trajectory):
-        raise MultiPhiTypeError(f"start: got {type(start).__name__}, need a Trajectory")
+    if not isinstance(start, (Trajectory, Equilibrium)):
+        raise MultiPhiTypeError(f"start: got {type(start).__name__}, need a Trajectory or an Equilibrium")
     if run.displacement is not None or run.velocity is not None:
         raise MultiPhiValueError("start: got a displacement or velocity as well, need one of them")
+    if isinstance(start, Equilibrium):
+        names = {run.model.contacts[i].name for i in run.model.held}
+        if set(start.stretches) != names:
+            raise MultiPhiValueError(
+                f"start: got an equilibrium with the friction {', '.join(start.stretches) or 'none'}, need that of the "
+                f"model, {', '.join(sorted(names)) or 'none'}"
+            )
+        return
     if start.model is not (run.model.decided or run.model):
         raise MultiPhiValueError("start: got a trajectory of another model, need one of the same object")
     if start.status != "ok":

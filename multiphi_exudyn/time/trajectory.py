@@ -19,7 +19,9 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.time.friction_rows import force_row, patch_row
 from multiphi_exudyn.time.segment import Segment, Segments, listed
 
 __all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
@@ -32,7 +34,8 @@ INSTANTS = 1001  # at which a nudged run is compared, beside the events
 class Start:
     """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 
-    gaps: (c,) [m] of all contacts at y = 0, as stops that have moved leave them.
+    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
+    held places, leave them.
     states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
     time [s], state: when the run begins, and of one that goes on from another what that has come to.
     """
@@ -62,9 +65,11 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Energies [J]: initial + work_of_loads = final + impact + truncation_kinetic + truncation_strain + damping.
+    """Energies [J]: initial + work_of_loads = final + all that was lost, which are the other rows.
 
-    residual: what is left over of that equation.
+    work_of_loads: that of moving stops and counter-surfaces too. friction: limits times ways slipped on the
+    counter-surfaces, and what springs drop by where a static limit lets go. residual: what is left over of the
+    equation.
     """
 
     initial: float
@@ -73,12 +78,13 @@ class Ledger:
     truncation_kinetic: float
     truncation_strain: float
     damping: float
+    friction: float
     final: float
 
     @property
     def residual(self) -> float:
         """initial + work - losses - final [J]; round-off if everything is accounted for."""
-        lost = self.impact + self.truncation_kinetic + self.truncation_strain + self.damping
+        lost = self.impact + self.truncation_kinetic + self.truncation_strain + self.damping + self.friction
         return self.initial + self.work_of_loads - lost - self.final
 
 
@@ -138,7 +144,7 @@ class Trajectory:
 
     def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Gap [m] of a contact: a float, or (k,)."""
-        i = self.model.index(contact)
+        i = self._contact("gap", contact)
 
         def function(level: LoadedLevel) -> np.ndarray:
             gap = level.level.gap_rows[i]
@@ -148,7 +154,7 @@ class Trajectory:
 
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
-        i = self.model.index(contact)
+        i = self._contact("contact_force", contact)
 
         def function(level: LoadedLevel) -> np.ndarray:
             own = level.level
@@ -161,7 +167,7 @@ class Trajectory:
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
         """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
-        i = self.model.index(contact)
+        i = self._contact("contact_impulse", contact)
         first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
         if first > last:
             raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
@@ -177,7 +183,47 @@ class Trajectory:
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
         """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
-        i = self.model.index(contact)
+        return self._intervals(self._contact("contact_intervals", contact))
+
+    def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """T [N] of a friction, whose force on the structure is -h T: a float, or (k,)."""
+        i = self._friction("friction_force", name)
+        return self._values(t, side, lambda level: force_row(level, i))
+
+    def slip(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """How far [m] along +h the patch of a friction has moved on its counter-surface since the start.
+
+        A float, or (k,). Exact: it does not change by a bit while the patch sticks.
+        """
+        i = self._friction("slip", name)
+        begun = self._values(self.start.time, "right", lambda level: patch_row(level, i))
+        return self._values(t, side, lambda level: patch_row(level, i)) - begun
+
+    def stick_intervals(self, name: str) -> np.ndarray:
+        """[[sticks from, slips from], ...] (k, 2) [s]; the first may begin at the start, the last end at t_end.
+
+        Instants are left out: a block without a spring that turns sticks at one and slips on.
+        """
+        return np.array(self._intervals(self._friction("stick_intervals", name))).reshape(-1, 2)
+
+    def _contact(self, what: str, name: str) -> int:
+        """Position of what is no friction."""
+        i = self.model.index(name)
+        if isinstance(self.model.contacts[i], Friction):
+            raise MultiPhiValueError(
+                f"{what}: got the friction {name!r}, need a contact (friction_force, slip, stick_intervals)"
+            )
+        return i
+
+    def _friction(self, what: str, name: str) -> int:
+        """Position of a friction."""
+        i = self.model.index(name)
+        if not isinstance(self.model.contacts[i], Friction):
+            raise MultiPhiValueError(f"{what}: got {name!r}, which has no friction, need the name of a Friction")
+        return i
+
+    def _intervals(self, i: int) -> list[tuple[float, float]]:
+        """When the link of an element holds [s], instants left out."""
         intervals: list[tuple[float, float]] = []
         own = self._segments
         closed = np.array([i in level.level.indices for level in own.levels], bool)
@@ -199,7 +245,7 @@ class Trajectory:
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = self.start_loss + total_loss(self.events)
-        damped, varying = self._segments.works
+        damped, varying, rubbed = self._segments.works
         y0, last = self.start.displacement, self.final
         assert last is not None, "a run with segments has a final state"
         reached = last.level.configuration(last.displacement)
@@ -210,6 +256,7 @@ class Trajectory:
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
             damping=losses.damping + damped,
+            friction=losses.friction + rubbed,
             final=last.kinetic + float(last.level.strain(last.displacement)),
         )
 
@@ -228,7 +275,7 @@ class Trajectory:
         Looked for where the event rule let the gap be negative, ``samples`` in the shortest period of the level and
         at least as many in a segment.
         """
-        i = self.model.index(contact)
+        i = self._contact("deepest_gap", contact)
         depth = 0.0
         for segment in self.segments:
             if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:

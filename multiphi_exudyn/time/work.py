@@ -1,7 +1,8 @@
-"""Work of damping and of what varies in time over recorded segments, in closed form.
+"""Work of damping, of what varies in time and of friction over recorded segments, in closed form.
 
     damping   integral of xi'.D xi'
     varying   integral of sum_k  w_k a_k.xi' + w_k' (b_k.xi + c_k.xi' + d_k.xi'' + e_k)
+    friction  integral of f.xi': limits times ways slipped
 
 f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so that f g is one of their products,
 
@@ -32,6 +33,7 @@ from multiphi_exudyn.events.arrays import (
     POWER,
     PRESCRIBED,
     RESPONSE,
+    RUBBING,
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
     WORK_WAVES,
@@ -65,7 +67,7 @@ def integrate_works(
     scratch: Waves,
     works: Numbers,
 ) -> int:
-    """Work (segments, 2) [J] of damping and of what varies; OK or NEED. scratch: ``work_waves`` of them."""
+    """Work (segments, 3) [J] of damping, what varies and friction; OK or NEED. scratch: ``work_waves`` of them."""
     for i in range(segments):
         level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
         if level == 0:
@@ -75,16 +77,17 @@ def integrate_works(
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
         place, sums = 0, 4 * n * p + 2 * q * p
+        exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
+        for part in range(3):
+            works[3 * i + part] = 0.0
+        add_friction(ints, numbers, waves, works, 3 * i + 2)
         list_terms(ints, numbers, waves, scratch)
         weigh_terms(ints, numbers, scratch)
-        exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
         raised = sums + 8 * p  # powers of t / T at the end
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
-        works[2 * i] = 0.0
-        works[2 * i + 1] = 0.0
-        add_constants(ints, numbers, waves, scratch, works, 2 * i + 1)
+        add_constants(ints, numbers, waves, scratch, works, 3 * i + 1)
         while place < p:
             other, length = place, chain(ints, place)
             while other < p:
@@ -93,7 +96,7 @@ def integrate_works(
                     for mirrored in range(2):
                         integrate(
                             ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
-                            works, 2 * i,
+                            works, 3 * i,
                         )  # fmt: skip
                 other += further
             place += length
@@ -255,3 +258,18 @@ def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, wo
         for j in range(ints[FLOW_FREE], p):
             began = 1.0 if ints[ints[basis + POWERS] + j] == 0 else 0.0
             works[result] += constant * (scratch[j * n + n - q + k] * (waves[ints[WORK_WAVES] + j] - began)).real
+
+
+@compiled
+def add_friction(ints: Ints, numbers: Numbers, waves: Waves, works: Numbers, result: int) -> None:
+    """Adds the limits times the ways slipped, f times what xi has changed by, of the flow and its exponentials."""
+    level, c, free = ints[AFTER + LEVEL], ints[FLOW_WAVES], ints[FLOW_FREE]
+    r, row, moving = ints[level + MODES], ints[level + RUBBING], ints[level + MODES] + ints[PRESCRIBED]
+    for j in range(ints[FLOW_COUNT]):
+        shape, size, pushed = ints[ints[level + RESPONSE] + SHAPES] + j * r, r, 0j
+        if j >= free:
+            shape, size = ints[FLOW_FORCED] + (j - free) * moving, moving
+        for i in range(size):
+            pushed += numbers[row + i] * waves[shape + i]
+        began = 1.0 if ints[ints[ints[FLOW_BASIS] + POWERS] + j] == 0 else 0.0
+        works[result] += (pushed * waves[c + j] * (waves[ints[WORK_WAVES] + j] - began)).real

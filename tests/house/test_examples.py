@@ -4,11 +4,14 @@ import importlib
 import importlib.util
 import math
 import sys
+import warnings
 from pathlib import Path
 
 import exudyn as exu
 import numpy as np
 import pytest
+
+import multiphi_exudyn as mp
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -34,6 +37,18 @@ def test_paper_rig(capsys, monkeypatch, tmp_path):
     assert first == pytest.approx([0.06897, 0.06897], abs=2e-5)
     assert (tmp_path / "rig.png").stat().st_size > 10_000
     assert capsys.readouterr().out.count("ok") == 2
+
+
+def test_friction_ring(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("sys.argv", ["friction_ring.py", str(tmp_path / "ring.png")])
+    example = load("friction_ring")
+    monkeypatch.setattr(example, "MODES", (6, 8))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        errors = example.main()
+    assert errors[example.OWN][8] < 2e-4 < 8e-4 < errors[example.MASSLESS][8]
+    assert (tmp_path / "ring.png").stat().st_size > 10_000
+    assert "rigid: 39 events, sticks 0.290 s, takes 4.645 mJ of 5.051 mJ" in capsys.readouterr().out
 
 
 def test_parameter_study(capsys, tmp_path, monkeypatch):

@@ -1,7 +1,6 @@
 """Dry friction in the loop: an element given by its states alone.
 
-Exact answers: a block's free decay, the hysteresis loop of a Jenkins element, the period of a block on a belt, and the
-amplitude of J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931).
+Exact answers: a block's free decay and the hysteresis loop of a Jenkins element; others in test_friction_exact.py.
 """
 
 import itertools
@@ -22,15 +21,6 @@ from reference_models.rig import rig_beam, rig_damping
 def block(*elements, stiffness=4.0):
     structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
     return mp.MultiPhiModel(structure, elements, modes="all")
-
-
-def friction(run, name, t):
-    """T (k,): less the force of the link, or less the push."""
-    i = run.model.index(name)
-    states = run.model.contacts[i].states
-    segments = [next(s for s in run.segments if s.start <= time <= s.end) for time in t]
-    pushes = np.array([states[segment.level.states[i]].push for segment in segments])
-    return -run.contact_force(name, t) - pushes
 
 
 def kinds(run):
@@ -62,30 +52,6 @@ class TestFreeDecay:
         assert run.ledger.initial - run.ledger.final == pytest.approx(0.1 * way, rel=1e-13)
 
 
-def test_below_its_limit_a_block_holds_for_ever():
-    run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 1000.0, loads=[mp.HarmonicLoad("m", 0.0999, 1.0)])
-    assert not run.events
-    assert np.all(run.at("m", np.linspace(0, 1000.0, 101)) == 0.0)
-
-
-@pytest.mark.parametrize(("beta", "share", "expected"), [(0.7, 0.5, 1.744253936249), (0.5, 0.3, 1.333333333333)])
-def test_den_hartogs_amplitude_is_reached(beta, share, expected):
-    """m x'' + k x + F sign x' = k a cos, F = share k a: from the exact steady state at its turning point."""
-    v, u = 1 / (1 - beta**2), math.sin(math.pi / beta) / (beta * (1 + math.cos(math.pi / beta)))
-    amplitude = math.sqrt(v**2 - (share * u) ** 2)
-    assert amplitude == pytest.approx(expected, abs=1e-11)
-    phase = math.acos(amplitude / v)
-    model = block(mp.Friction("floor", "m", share), stiffness=1.0)
-    run = mp.simulate(
-        model,
-        4 * math.pi / beta,
-        displacement=[amplitude],
-        loads=[mp.HarmonicLoad("m", 1.0, beta / (2 * math.pi), phase)],
-    )
-    turns = run.at("m", math.pi / beta * np.arange(5))
-    assert_allclose(turns, amplitude * np.array([1, -1, 1, -1, 1]), rtol=1e-12)
-
-
 class TestJenkinsElement:
     """Moved to and fro by a rigid shaker, to which a load presses the block: x = X cos(W t)."""
 
@@ -105,7 +71,7 @@ class TestJenkinsElement:
         for part in (s for s in run.segments if s.start >= 2 * period - 1e-9 and s.end > s.start):
             t = part.start + (part.end - part.start) * (nodes + 1) / 2
             assert_allclose(run.at("m", t), self.reach * np.cos(2 * math.pi * self.hertz * t), rtol=0, atol=1e-13)
-            power = friction(run, "ring", t) * np.array([run.velocity(time)[0] for time in t])
+            power = run.friction_force("ring", t) * np.array([run.velocity(time)[0] for time in t])
             area += float(weights @ power) * (part.end - part.start) / 2
         assert area == pytest.approx(4 * self.limit * (self.reach - self.limit / self.stiffness), rel=1e-12)
 
@@ -119,15 +85,6 @@ class TestJenkinsElement:
         assert_allclose([e.time for e in run.events if e.kind == "slip"], np.array(starts) / w, rtol=1e-12)
         sticks = [e.time for e in run.events if e.kind == "stick"]
         assert_allclose(sticks, np.arange(1, len(sticks) + 1) / 2 / self.hertz, rtol=1e-12)
-
-
-def test_a_block_on_a_belt_has_its_period():
-    """m 1, k 25, V .3, N 10, limits .2 and .35: stick-slip of 1.3424777960769378 s."""
-    floor = mp.Friction("belt", "m", 2.0, static_limit=3.5, velocity=0.3)
-    run = mp.simulate(block(floor, stiffness=25.0), 12.0)
-    slips = [e.time for e in run.events if e.kind == "slip"]
-    assert len(slips) == 9
-    assert_allclose(np.diff(slips), 1.3424777960769378, rtol=1e-11)
 
 
 class TestChain:
@@ -210,9 +167,8 @@ class TestModel:
 
     def test_what_knows_contacts_alone_refuses_other_elements(self):
         load = mp.HarmonicLoad("m1", 1.0, 1.0)
-        for asked in (lambda m: m.static_equilibrium({"m1": 1.0}), lambda m: mp.steady_state(m, load)):
-            with pytest.raises(mp.MultiPhiValueError, match="got the elements ring, need contacts and force laws"):
-                asked(self.model())
+        with pytest.raises(mp.MultiPhiValueError, match="got the elements ring, need contacts and force laws"):
+            mp.steady_state(self.model(), load)
 
 
 def integrated(model, sliders, force, t_end):

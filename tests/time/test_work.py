@@ -13,7 +13,12 @@ from multiphi_exudyn.time.segment import Listed, listed
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
 RIGID = (mp.UnilateralContact("below", "m2", 0.1), mp.UnilateralContact("above", {"m0": -1.0}, 0.15))
+FRICTION = (
+    mp.Friction("below", "m2", 0.1, stiffness=60.0, static_limit=0.15, velocity=0.02),
+    mp.Friction("ring", {"m0": 1.0, "m1": -1.0}, 0.05, velocity=-0.01),
+)
 VISCOUS = (mp.UnilateralContact("below", "m2", 0.1, 50.0, damping=1.0),)
+ELEMENTS = {"compliant": COMPLIANT, "rigid": RIGID, "viscous": VISCOUS, "friction": FRICTION}
 DAMPINGS = {"none": None, "modal": mp.ModalDamping([0.02, 0.01, 0.03]), "coupled": np.diag([0.1, 0.05, 0.2])}
 MOTION = mp.StopMotion("below", mp.Harmonic(0.05, 0.7))
 LOADS = {
@@ -42,16 +47,16 @@ def assert_works_of_segments(run):
 
 
 @pytest.mark.parametrize("damping", DAMPINGS.values(), ids=DAMPINGS)
-@pytest.mark.parametrize("contacts", [COMPLIANT, RIGID, VISCOUS], ids=["compliant", "rigid", "viscous"])
+@pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
 @pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
-def test_works_are_those_of_each_segment(loads, contacts, damping):
-    assert_works_of_segments(run_of(damping, contacts, loads))
+def test_works_are_those_of_each_segment(loads, elements, damping):
+    assert_works_of_segments(run_of(damping, elements, loads))
 
 
 @pytest.mark.parametrize("damping", DAMPINGS.values(), ids=DAMPINGS)
-@pytest.mark.parametrize("contacts", [COMPLIANT, RIGID, VISCOUS], ids=["compliant", "rigid", "viscous"])
-def test_works_of_moving_stops_are_those_of_each_segment(contacts, damping):
-    assert_works_of_segments(run_of(damping, contacts, [MOTION, *LOADS["harmonic"]], start=None))
+@pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
+def test_works_of_moving_stops_are_those_of_each_segment(elements, damping):
+    assert_works_of_segments(run_of(damping, elements, [MOTION, *LOADS["harmonic"]], start=None))
 
 
 @pytest.mark.parametrize("t_end", [20.0, 400.0])
@@ -85,4 +90,4 @@ def test_plain_python_gives_the_same(monkeypatch):
 
 def test_a_run_without_modes_does_no_work():
     run = mp.simulate(oscillator(), 1.0)
-    assert run.segments.works == (0.0, 0.0)
+    assert run.segments.works == (0.0, 0.0, 0.0)

@@ -1,0 +1,220 @@
+"""Exact answers with dry friction, through the front door, and what must be the same: mirrored, coupled, many.
+
+Source: J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931).
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from small_structures import chain, random_structure, stop
+
+import multiphi_exudyn as mp
+
+
+def block(*elements, stiffness=4.0, mass=1.0):
+    structure = mp.LinearStructure([[mass]], [[stiffness]], points={"m": 0})
+    return mp.MultiPhiModel(structure, elements, modes="all")
+
+
+def assert_balanced(run, share=1e-12):
+    assert run.status == "ok"
+    size = max(np.max(np.abs(run.energy(np.linspace(run.start.time, run.t_end, 101)))), abs(run.ledger.work_of_loads))
+    assert abs(run.ledger.residual) <= share * size
+
+
+@pytest.mark.parametrize(
+    ("beta", "share", "expected"),
+    [(0.7, 0.5, 1.744253936249), (0.5, 0.3, 1.333333333333), (1.5, 0.4, 0.653197264742)],
+)
+class TestDenHartog:
+    """m x'' + k x + F sign x' = a k cos: the amplitude of slip without stops, f = F / (a k), beta = w / w_n."""
+
+    def amplitude(self, beta, share):
+        v, u = 1 / (1 - beta**2), math.sin(math.pi / beta) / (beta * (1 + math.cos(math.pi / beta)))
+        return math.sqrt(v**2 - (share * u) ** 2), v, u
+
+    def run(self, beta, share, periods, phase, start):
+        model = block(mp.Friction("floor", "m", share), stiffness=1.0)
+        load = mp.HarmonicLoad("m", 1.0, beta / (2 * math.pi), phase)
+        return mp.simulate(model, periods * 2 * math.pi / beta, displacement=[start], loads=[load])
+
+    def test_repeats_from_a_turning_point(self, beta, share, expected):
+        """There x = x0, x' = 0, V cos(phase) = x0 and V sin(phase) = -f U."""
+        x0, v, u = self.amplitude(beta, share)
+        assert x0 == pytest.approx(expected, abs=1e-12)
+        run = self.run(beta, share, 3, math.atan2(-share * u / v, x0 / v), x0)
+        turns = run.at("m", math.pi / beta * np.arange(7))
+        assert_allclose(turns, x0 * (-1.0) ** np.arange(7), rtol=1e-11)
+        assert not len(run.stick_intervals("floor"))
+        assert run.ledger.friction == pytest.approx(share * 4 * x0 * 3, rel=1e-11)
+        assert_balanced(run)
+
+    def test_is_where_a_run_from_rest_leads(self, beta, share, expected):
+        """Friction alone takes the free motion away, at beta = 1/2 that of the double frequency last."""
+        run = self.run(beta, share, 400, 0.0, 0.0)
+        turns = [run.at("m", event.time) for event in run.events if event.kind == "stick"][-10:]
+        assert_allclose(np.mean(np.abs(turns)), self.amplitude(beta, share)[0], rtol=1e-9)
+
+
+class TestJenkins:
+    """Moved by a rigid shaker as x = X cos(W t): a loop of area 4 F (X - F / k) in every period."""
+
+    reach, limit, stiffness, hertz = 0.3, 2.0, 25.0, 0.7
+
+    def run(self, periods, sign=1.0):
+        element = mp.Friction("ring", {"m": sign}, self.limit, stiffness=self.stiffness)
+        loads = [mp.ConstantLoad("m", -100.0), mp.StopMotion("shaker", mp.Harmonic(self.reach, self.hertz))]
+        model = block(stop("m", 0.0, name="shaker"), element)
+        return mp.simulate(model, periods / self.hertz, displacement=[self.reach], loads=loads)
+
+    def test_area_is_what_the_ledger_has(self):
+        each = 4 * self.limit * (self.reach - self.limit / self.stiffness)
+        found = [self.run(periods).ledger.friction for periods in (2, 3, 7)]
+        assert_allclose(np.diff(found), [each, 4 * each], rtol=1e-12)
+
+    def test_force_and_slip_are_exact(self):
+        """From x = X down: T falls along k until -F, and the patch slips 2 X - 2 F / k in a half cycle from then on."""
+        run, half = self.run(3), 0.5 / self.hertz
+        t = np.linspace(0, half, 41)
+        x = self.reach * np.cos(2 * math.pi * self.hertz * t)
+        expected = np.maximum(self.stiffness * (x - self.reach), -self.limit)
+        assert_allclose(run.friction_force("ring", t, "left"), expected, rtol=0, atol=1e-11)
+        assert_allclose(
+            run.slip("ring", t), np.minimum(x - self.reach + self.limit / self.stiffness, 0), rtol=0, atol=1e-13
+        )
+        way = 2 * self.reach - 2 * self.limit / self.stiffness
+        slips = run.slip("ring", half * np.arange(1, 6))
+        assert_allclose(np.diff(slips), way * np.array([1, -1, 1, -1]), rtol=1e-12)
+
+    def test_a_direction_turned_round_turns_force_and_slip(self):
+        one, other, t = self.run(2), self.run(2, -1.0), np.linspace(0, 2 / self.hertz, 50)
+        assert np.array_equal(one.friction_force("ring", t), -other.friction_force("ring", t))
+        assert np.array_equal(one.slip("ring", t), -other.slip("ring", t))
+
+
+class TestHolding:
+    """Below the limit nothing slips, not by a bit, for a million periods; it costs nothing to know that."""
+
+    @pytest.mark.parametrize("stiffness", [math.inf, 200.0])
+    def test_of_a_swinging_chain_lasts_a_million_periods(self, stiffness):
+        structure = chain(3, stiffness=50.0, damping=mp.ModalDamping([0.02] * 3))
+        model = mp.MultiPhiModel(structure, [mp.Friction("ring", "m1", 1.0, stiffness=stiffness)], modes="all")
+        run = mp.simulate(model, 1e6 / 0.3, loads=[mp.HarmonicLoad("m2", 0.05, 0.3)])
+        assert run.slip("ring", 1e6 / 0.3) == 0.0
+        assert np.all(run.slip("ring", np.linspace(0, 1e6 / 0.3, 1001)) == 0.0)
+        assert not run.events
+        assert np.max(np.abs(run.at("m2", np.linspace(0, 100, 101)))) > 1e-3
+        assert run.stats.function_evaluations < 1000
+        assert_allclose(run.stick_intervals("ring"), [[0.0, 1e6 / 0.3]])
+
+    def test_of_a_block_under_almost_its_limit(self):
+        run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 1e6, loads=[mp.HarmonicLoad("m", 0.1 - 1e-9, 1.0)])
+        assert not run.events
+        assert run.at("m", 1e6) == run.slip("floor", 1e6) == 0.0
+
+    def test_above_it_slips_in_the_first_period(self):
+        run = mp.simulate(block(mp.Friction("floor", "m", 0.1)), 2.0, loads=[mp.HarmonicLoad("m", 0.1 + 1e-9, 1.0)])
+        assert run.events
+        assert run.slip("floor", 2.0) != 0.0
+
+
+class TestTwoBodies:
+    """A block slides on another that is free: both go on with the speed of their common momentum."""
+
+    def run(self, limit, stiffness=math.inf, masses=(2.0, 3.0), speed=1.5):
+        bodies = {
+            name: mp.LinearStructure([[mass]], [[0.0]], points={"p": 0})
+            for name, mass in zip("ab", masses, strict=True)
+        }
+        rub = mp.Friction("rub", {"a.p": 1.0, "b.p": -1.0}, limit, stiffness=stiffness)
+        model = mp.MultiPhiModel(mp.assemble(bodies), [rub], modes="all")
+        return mp.simulate(model, 5.0, velocity=[speed, 0.0])
+
+    def test_stop_against_each_other_after_an_exact_time(self):
+        run = self.run(0.8)
+        inverse = 1 / 2.0 + 1 / 3.0
+        (event,) = run.events
+        assert event.time == pytest.approx(1.5 / (0.8 * inverse), rel=1e-13)
+        assert_allclose(run.velocity(5.0), 2.0 * 1.5 / 5.0, rtol=1e-13)
+        assert run.slip("rub", 5.0) == pytest.approx(1.5**2 / (2 * 0.8 * inverse), rel=1e-13)
+        assert run.ledger.friction == pytest.approx(1.5**2 / (2 * inverse), rel=1e-13)
+        assert_balanced(run)
+
+    def test_momentum_stays_with_a_spring_between(self):
+        run = self.run(0.8, 30.0)
+        t = np.linspace(0, 5, 51)
+        assert_allclose(np.array([2.0, 3.0]) @ run.velocity(t), 3.0, rtol=1e-12)
+        assert_balanced(run)
+
+
+class TestMirrored:
+    @settings(derandomize=True, max_examples=12, deadline=None)
+    @given(st.integers(0, 10**6), st.sampled_from(["all", 3]))
+    def test_chains_move_mirrored(self, seed, modes):
+        n, mass, springs, _, random = random_structure(seed)
+        structure = mp.LinearStructure(mass, springs, points={f"m{i}": i for i in range(n)})
+        places = [f"m{i}" for i in random.permutation(n)]
+        velocity, limits = random.normal(size=n), random.uniform(0.05, 0.5, 2)
+
+        def run(sign):
+            elements = [
+                mp.Friction("one", places[0], limits[0], velocity=0.1 * sign),
+                mp.Friction("two", {places[1]: 1.0, places[2]: -1.0}, limits[1], 1.2 * limits[1], 30.0),
+            ]
+            load = mp.HarmonicLoad(places[2], 1.3 * sign, 0.4)
+            return mp.simulate(
+                mp.MultiPhiModel(structure, elements, modes=modes), 3.0, velocity=sign * velocity, loads=[load]
+            )
+
+        one, other, t = run(1.0), run(-1.0), np.linspace(0, 3, 31)
+        assert one.status == other.status == "ok"
+        assert [(e.time, e.kind) for e in one.events] == [(e.time, e.kind) for e in other.events]
+        assert np.array_equal(one.displacement(t), -other.displacement(t))
+        for name in ("one", "two"):
+            assert np.array_equal(one.friction_force(name, t), -other.friction_force(name, t))
+            assert np.array_equal(one.slip(name, t), -other.slip(name, t))
+        assert one.ledger == other.ledger
+
+
+class TestMany:
+    def test_springs_of_a_long_chain(self):
+        """Twenty of them, 3^20 levels: those visited are built, forces keep their limits and the ledger closes."""
+        n = 20
+        elements = [mp.Friction(f"f{i}", f"m{i}", 0.02 * (1 + i % 3), stiffness=5.0) for i in range(n)]
+        model = mp.MultiPhiModel(chain(n, stiffness=9.0), elements, modes="all")
+        run = mp.simulate(model, 4.0, loads=[mp.HarmonicLoad(f"m{n - 1}", 1.3, 0.31)])
+        assert len({event.contact for event in run.events}) > 5
+        assert_balanced(run, 1e-11)
+        t = np.linspace(0, 4, 41)
+        for element in elements[::5]:
+            assert np.all(np.abs(run.friction_force(element.name, t)) <= element.limit * (1 + 1e-9))
+
+    def test_springs_at_one_place_share_the_force(self):
+        """Two Jenkins elements side by side, an Iwan model: each has its own exact break."""
+        loads = [mp.ConstantLoad("m", -100.0), mp.StopMotion("shaker", mp.Smooth(lambda t: 0.1 * t))]
+        elements = [mp.Friction("soft", "m", 1.0, stiffness=10.0), mp.Friction("stiff", "m", 2.0, stiffness=40.0)]
+        run = mp.simulate(block(stop("m", 0.0, name="shaker"), *elements), 2.0, velocity=[0.1], loads=loads)
+        slips = [event for event in run.events if event.kind == "slip"]
+        assert_allclose([event.time for event in slips], [0.5, 1.0], rtol=1e-9)
+        assert [event.contact for event in slips] == ["stiff", "soft"]
+        assert_allclose(run.friction_force("soft", 0.4), 0.4, rtol=1e-9)
+        assert_balanced(run, 1e-10)
+
+    def test_blocks_without_springs_on_a_chain_are_the_limit_of_stiff_ones(self):
+        limits = (0.2, 0.1, 0.3)
+        runs = []
+        for stiffness in (math.inf, 1e6, 1e8):
+            elements = [mp.Friction(f"f{i}", f"m{2 * i}", limit, stiffness=stiffness) for i, limit in enumerate(limits)]
+            model = mp.MultiPhiModel(chain(6, stiffness=20.0), elements, modes="all")
+            runs.append(mp.simulate(model, 4.0, loads=[mp.HarmonicLoad("m5", 1.3, 0.6)]))
+        t = np.linspace(0, 4, 101)
+        x = [run.displacement(t) for run in runs]
+        errors = [np.max(np.abs(given - x[0])) / np.max(np.abs(x[0])) for given in x[1:]]
+        assert len(runs[0].events) > 10
+        assert errors[0] < 1e-2
+        assert errors[1] < 0.2 * errors[0]
+        assert_balanced(runs[0], 1e-11)
