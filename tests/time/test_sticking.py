@@ -114,6 +114,7 @@ def test_two_on_one_point_are_one_with_the_sum_of_their_limits():
     assert [run.status for run in runs] == ["ok"] * 3
     for run in runs[1:]:
         assert_allclose(run.at("m", t), runs[0].at("m", t), rtol=0, atol=1e-14)
+        assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_body_on_three_pads_turns_and_comes_to_rest():
