@@ -17,11 +17,15 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
     10      a contact with friction       changes.turn_wishes, phases.is_denied
+    11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
+    11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
+    12      friction at rest              sticking.stick_together, sticking.choose, independence.thin_out
+    12      its impacts                   striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
 Order: excitation, pieces, channels, loaded_level, defect_forms, transition, state, exits, loaded_levels, arrays,
-state_arrays, signals, maps, defect_sums, energies, drive, flow, impact, phases, independence, changes, resting,
-striking, switching, decision, waiting, start, channel_arrays, element_arrays, scratch_arrays, level_parts,
-level_records, level_tables, level_arrays.
+state_arrays, signals, maps, defect_sums, energies, drive, flow, impact, phases, changes, independence, rebounds,
+resting, striking, switching, sticking, decision, waiting, start, channel_arrays, element_arrays, scratch_arrays,
+level_parts, level_records, level_tables, level_arrays.
 """

@@ -47,6 +47,16 @@ bases of two levels need not agree, so the law says what happens then; each sent
    is always taken is decided after it, at the same instant. With a spring it sticks while its force, beyond the limit
    by truncation, comes back to it. Where its pressure falls to zero it opens, and keeps no friction.
    -> changes.turn_wishes, phases.is_denied
+11. A rigid contact with restitution e that strikes leaves its stop with -e times its speed, and so do all that touch
+   and are struck with it, in one impact (Moreau); those that are coupled have one e. Who is driven back to its stop is
+   struck again at once. A bounce too low to be seen is the last: it takes as long as all that would follow, and where
+   it lands e is zero.
+   -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
+12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together: their forces within
+   their limits, static ones until they slip, are complementary to their accelerations. What that leaves to the next
+   derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others push with
+   their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an impulse.
+   -> sticking.stick_together, sticking.choose, independence.thin_out, striking.slide_on
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
@@ -86,7 +96,9 @@ from multiphi_exudyn.events.arrays import (
     FREED,
     HEARD,
     KINDS,
+    LANDING,
     LEVEL,
+    LIMITS,
     LOST,
     LOST_NOW,
     NOT_ADMISSIBLE,
@@ -103,13 +115,16 @@ from multiphi_exudyn.events.arrays import (
     SIGNAL,
     STATES,
     STRIKING,
+    TOGETHER,
     TRANSITIONS_NOW,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held, turn_wishes
 from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
+from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching, keep_landing
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
+from multiphi_exudyn.events.sticking import stick_together
 from multiphi_exudyn.events.striking import close_without_impact, impact
 from multiphi_exudyn.events.switching import switch
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -133,6 +148,8 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     ints[CHANGE_COUNT] = first
     ints[TRANSITIONS_NOW] = 0
     copy_state(ints, numbers, REACHED, WORKED)
+    forget_bounces(ints)
+    ints[TOGETHER] = 0
     clear_turning_speeds(ints, numbers, WORKED)
     status = settle(ints, numbers, waves)
     if status < 0:
@@ -148,6 +165,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         hold_back(ints, WORKED)
         clear(numbers, LOST)
         ints[CHANGE_COUNT] = first
+    keep_landing(ints, numbers)
     return OK
 
 
@@ -160,7 +178,8 @@ def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         ints[ints[AGAIN] + i] = 0
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
         exit_ = exits + k * EXIT_INTS
-        if ints[ints[REACHED + PHASES] + k] == ARMED and row_sign(ints, numbers, REACHED, exit_ + SIGNAL, 0.0) < 0:
+        waits = ints[ints[REACHED + PHASES] + k] in (ARMED, LANDING)
+        if waits and row_sign(ints, numbers, REACHED, exit_ + SIGNAL, 0.0) < 0:
             ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
             asking = 1
     ints[CHANGE_COUNT] = 0
@@ -279,13 +298,22 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
     turn_wishes(ints, numbers, asking)
     strikes, before = 0, ints[CHANGE_COUNT]
     clear(numbers, LOST_NOW)
+    hear_touching(ints, numbers, asking)
     for i in range(c):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[striking + i] = 1 if rigid and ints[ints[HEARD] + i] == 1 and ints[states + i] == OPEN else 0
         strikes += 1 if ints[striking + i] == 1 and ints[asking + i] != NOBODY else 0
         asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
+        if numbers[ints[LIMITS] + i] > 0.0:  # which bears no impulse: in slip, one way or the other
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
     if strikes == 0:
+        status = stick_together(ints, numbers, waves, asking)
+        left = 0
+        for i in range(c):
+            left += 1 if ints[asking + i] != NOBODY else 0
+        if status < 0 or left == 0:
+            return status
         return switch(ints, numbers, waves, asking)
     status = impact(ints, numbers, waves)
     if status < 0:

@@ -9,6 +9,7 @@ from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mechanics.element import friction_spring
+from multiphi_exudyn.mechanics.friction import Friction
 
 __all__ = ["describe_elements"]
 
@@ -25,6 +26,10 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     chains = np.full(c, -1)
     for number, chain in enumerate(model.chains):
         chains[list(chain)] = number
+    limits = np.zeros((2, c))
+    for i, element in enumerate(model.contacts):
+        if isinstance(element, Friction) and element.rigid:
+            limits[:, i] = element.limit, element.most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
     given = {
@@ -37,6 +42,9 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
         a.DIRECTIONS: put("numbers", units[:, :c].T),
+        a.LIMITS: put("numbers", limits[0]),
+        a.STATIC_LIMITS: put("numbers", limits[1]),
+        a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
         **_frictions(buffers, model),
     }
     for slot, value in given.items():

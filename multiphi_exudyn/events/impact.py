@@ -1,10 +1,10 @@
 """Impact in flat arrays: rigid contacts strike, or their motion presses them to their stops.
 
-    v+ = v- + A^T p,   p = argmin |v- + A^T p|,  p >= 0,   A = H^T Phi_l                         (Moreau, restitution 0)
+    v+ = v- + A^T p,   p >= 0,  A v+ >= wanted, complementary,   A = H^T Phi_l         (Moreau; restitution 0: wanted 0)
 
 Where others hang on the structure an impulse A^T p gives it B A^T p, B = F F^T the mobility that they leave it:
 
-    v+ = v- + F z,   z = argmin |z|,  A F z >= -A v-
+    v+ = v- + F z,   z = argmin |z|,  A F z >= wanted - A v-
 
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
 """
@@ -23,27 +23,32 @@ from multiphi_exudyn.events.arrays import (
     ELEMENTS,
     FAILED,
     GAPS,
-    LEAST,
-    LEAST_INTS,
-    LEAST_NUMBERS,
-    LEAST_SIZES,
+    HIGHEST,
+    LEADERS,
     LEVEL,
+    LOWEST,
     MOBILITY,
     MODES,
+    MOVED,
     OK,
     PLACE,
+    RATIOS,
     REACH,
     ROWS,
+    SMALL_PROBLEM,
     SPEED,
     SPEEDS,
     SQUEEZED,
     STOP_WORK,
     UNSETTLED,
+    VALUE_SIZES,
+    VALUES,
 )
 from multiphi_exudyn.events.energies import kinetic
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import EXCLUDED, UNDECIDED, norm, shortest_vector
+from multiphi_exudyn.mathematics.complementarity import EXCLUDED, UNDECIDED, pose, solve
+from multiphi_exudyn.mathematics.free_rows import EXCLUDED_ROWS, EXCLUDING, norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "resting_size", "speed_size", "unseen_speed"]
@@ -65,11 +70,19 @@ def fill_rows(ints: Ints, numbers: Numbers, level: int, contacts: int, count: in
 
 @compiled
 def nearest(
-    ints: Ints, numbers: Numbers, level: int, contacts: int, count: int, vector: int, sizes: int, multipliers: int
+    ints: Ints,
+    numbers: Numbers,
+    level: int,
+    contacts: int,
+    count: int,
+    vector: int,
+    sizes: int,
+    wanted: int,
+    multipliers: int,
 ) -> int:
-    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= 0, and its multipliers (count,); OK or FAILED.
+    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (count,); OK or FAILED.
 
-    sizes: (count,) of the terms of rows v beside those of v itself, -1 for none.
+    sizes: (count,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero.
     """
     r = ints[level + MODES]
     n = r + ints[CHANNELS]
@@ -78,20 +91,25 @@ def nearest(
         for i in range(n):
             value += numbers[row + i] * numbers[vector + i]
             terms += abs(numbers[row + i]) * abs(numbers[vector + i])
-        numbers[ints[LEAST] + k] = -value
-        numbers[ints[LEAST_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
+        numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 else value
+        numbers[ints[VALUE_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
+        numbers[ints[LOWEST] + k] = 0.0
+        numbers[ints[HIGHEST] + k] = math.inf
+        ints[ints[LEADERS] + k] = -1
     if ints[level + MOBILITY] >= 0:
         limit_rows(ints, numbers, level, count)
-    answer = shortest_vector(
-        ints, numbers, ints[ROWS], n, ints[LEAST], ints[LEAST_SIZES], count, r, ints[CHANGE], multipliers,
-        ints[LEAST_NUMBERS], ints[LEAST_INTS],
+    problem = ints[SMALL_PROBLEM]
+    pose(
+        ints, problem, count, r, n, ints[ROWS], ints[ROWS], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
+        ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], multipliers,
     )  # fmt: skip
+    answer = solve(ints, numbers, problem)
     if answer == EXCLUDED:
         ints[CAUSE] = SQUEEZED
         for i in range(ints[ELEMENTS]):
             ints[ints[CAUSED_BY] + i] = 0
-        for k in range(ints[ints[LEAST_INTS]]):
-            ints[ints[CAUSED_BY] + ints[contacts + ints[ints[LEAST_INTS] + 1 + 2 * count + k]]] = 1
+        for k in range(ints[problem + EXCLUDING]):
+            ints[ints[CAUSED_BY] + ints[contacts + ints[ints[problem + EXCLUDED_ROWS] + k]]] = 1
         return FAILED
     if answer == UNDECIDED:
         ints[CAUSE] = UNSETTLED
@@ -117,13 +135,13 @@ def limit_rows(ints: Ints, numbers: Numbers, level: int, count: int) -> None:
         for j in range(r):
             numbers[row + j] = 0.0 if held else numbers[moved + j]
         if held:
-            numbers[ints[LEAST] + k] = 0.0
+            numbers[ints[VALUES] + k] = 0.0
 
 
 @compiled
 def limit_change(ints: Ints, numbers: Numbers, level: int) -> None:
     """The change z (r,) becomes F z."""
-    r, given = ints[level + MODES], ints[LEAST_NUMBERS]
+    r, given = ints[level + MODES], ints[MOVED]
     for i in range(r):
         numbers[given + i] = numbers[ints[CHANGE] + i]
     for i in range(r):
@@ -140,24 +158,28 @@ def collide(
     contacts: int,
     count: int,
     held: int,
+    wanted: int,
     result: int,
     impulses: int,
     losses: int,
 ) -> int:
     """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
 
-    held: the last so many contacts keep no speed away from their stop either. impulses: (count + held,) [N s].
+    held: the last so many contacts keep no speed away from their stop either. wanted: gap velocities (count + held,)
+    that they are to have at least, -1 for zero. impulses: (count + held,) [N s].
     What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
     underflows, and what is left of a place where it has come to rest would swing, and strike again: both become zero.
     """
     level = ints[state + LEVEL]
     r, channels = ints[level + MODES], ints[CHANNELS]
     fill_rows(ints, numbers, level, contacts, count, held)
-    if nearest(ints, numbers, level, contacts, count + held, ints[state + SPEED], -1, impulses) < 0:
+    if nearest(ints, numbers, level, contacts, count + held, ints[state + SPEED], -1, wanted, impulses) < 0:
         return FAILED
     plastic = 0.0
     for k in range(count + held):
-        plastic += 0.5 * numbers[impulses + k] * numbers[ints[LEAST] + k]
+        plastic -= 0.5 * numbers[impulses + k] * numbers[ints[VALUES] + k]
+        if wanted >= 0:
+            plastic -= numbers[impulses + k] * numbers[wanted + k]
     copy_state(ints, numbers, state, result)
     v, before, x, reach = ints[result + SPEED], ints[state + SPEED], ints[result + PLACE], ints[state + REACH]
     for i in range(r):

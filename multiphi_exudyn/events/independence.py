@@ -12,14 +12,20 @@ from multiphi_exudyn.events.arrays import (
     INDEPENDENCE,
     JOIN_NUMBERS,
     JOINED,
+    LEVEL,
+    LIMITS,
+    STATES,
     UNION,
     WORKED,
 )
+from multiphi_exudyn.events.changes import NOBODY, is_held
 from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.free_rows import norm
 
-__all__ = ["join"]
+__all__ = ["join", "thin_out"]
+
+STICK = 0  # state of a friction element
 
 
 @compiled
@@ -52,6 +58,21 @@ def join(ints: Ints, numbers: Numbers, closing: int) -> int:
     for i in range(c):
         ints[closing + i] = ints[joined + i]
     return left
+
+
+@compiled
+def thin_out(ints: Ints, numbers: Numbers, wishes: int) -> None:
+    """12. Of friction elements that wish to stick each stays that does not follow from those that are held already."""
+    union, states = ints[UNION], ints[ints[WORKED + LEVEL] + STATES]
+    for i in range(ints[ELEMENTS]):
+        held = numbers[ints[LIMITS] + i] > 0.0 and ints[states + i] == STICK and ints[wishes + i] == NOBODY
+        ints[union + i] = 1 if held or is_held(ints, WORKED, i) == 1 else 0
+    for i in range(ints[ELEMENTS]):
+        if numbers[ints[LIMITS] + i] > 0.0 and ints[wishes + i] == STICK:
+            ints[union + i] = 1
+            if independent(ints, numbers, union) == 0:
+                ints[union + i] = 0
+                ints[wishes + i] = NOBODY
 
 
 @compiled

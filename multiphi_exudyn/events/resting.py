@@ -60,10 +60,11 @@ from multiphi_exudyn.events.impact import (
 from multiphi_exudyn.events.independence import join
 from multiphi_exudyn.events.maps import find_level, find_map, move
 from multiphi_exudyn.events.phases import first_exit, phase_of
+from multiphi_exudyn.events.rebounds import has_rebounded
 from multiphi_exudyn.events.signals import sign_of
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.free_rows import norm
 
 __all__ = ["press", "reaction_sign", "same_speed", "stay_closed"]
 
@@ -114,7 +115,7 @@ def list_resting(ints: Ints, numbers: Numbers, count: int, unseen: int) -> int:
         for i in range(n):
             speed += numbers[row + i] * numbers[v + i]
         size = RESTING * (speed_size(ints, numbers, RELEASED, row) + speed_size(ints, numbers, STRUCK, row))
-        if unseen == 1:
+        if unseen == 1 and has_rebounded(ints, numbers, k) == 0:
             size = max(size, unseen_speed(ints, numbers, STRUCK, ints[ints[TOUCHING] + k], row))
         if abs(speed) <= size:
             ints[ints[RESTING_LIST] + rest] = ints[ints[TOUCHING] + k]
@@ -137,7 +138,7 @@ def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
         size = resting_size(numbers, ints[ACCELERATION_TERMS], ints[RELEASED_TERMS], ints[ROWS] + k * n, n)
         numbers[ints[RESTING_SIZES] + k] = size
     sizes, forces = ints[RESTING_SIZES], ints[FURTHER]
-    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, ints[ACCELERATION], sizes, forces) < 0:
+    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, ints[ACCELERATION], sizes, -1, forces) < 0:
         return FAILED
     for i in range(ints[level + MODES]):
         numbers[ints[ACCELERATION] + i] += numbers[ints[CHANGE] + i]
@@ -201,7 +202,7 @@ def calm(ints: Ints, numbers: Numbers, count: int) -> int:
     if moving == 0:
         copy_state(ints, numbers, STRUCK, STILL)
         return OK
-    status = collide(ints, numbers, STRUCK, touching, count, held, STILL, ints[FURTHER], LOST_STILLED)
+    status = collide(ints, numbers, STRUCK, touching, count, held, -1, STILL, ints[FURTHER], LOST_STILLED)
     if status < 0:
         return status
     for h in range(held):

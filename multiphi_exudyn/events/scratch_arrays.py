@@ -8,11 +8,13 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.decision import ROUNDS
 from multiphi_exudyn.mathematics import basis_arrays, zero_crossing
-from multiphi_exudyn.mathematics.least_distance_arrays import least_distance_ints, least_distance_numbers
+from multiphi_exudyn.mathematics.complementarity import lay_out, problem_ints, problem_numbers
 
 __all__ = ["ScratchArrays"]
 
 POWERS = 96  # of a response to one term: where a carrier meets a pole it takes some 40
+OF_ELEMENTS = (*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY, a.LASTS, a.GROUPS)
+OF_A_PROBLEM = (a.VALUES, a.VALUE_SIZES, a.LOWEST, a.HIGHEST, a.RATIOS, a.WANTED)
 STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
 
 
@@ -28,7 +30,9 @@ class ScratchArrays:
         self._buffers, self._terms = buffers, terms
         self._elements = int(ints[a.ELEMENTS])
         self._rigid = int(np.sum(ints[ints[a.KINDS] :][: self._elements] == a.RIGID))
-        self._struck = max(2 * self._rigid, 1)
+        sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
+        self._struck = max(2 * self._rigid, int(sliding), 1)
+        self._together = self._rigid + int(sliding)  # that may be held at once
         self.coordinates = self.exponentials = self.exits = 0
         self.changes = ROUNDS * (3 * self._elements + 1)
         self.powers = ints[a.FORCED_ROOM] = POWERS
@@ -44,6 +48,7 @@ class ScratchArrays:
             return
         self.coordinates, self.exponentials, self.exits = n, p, exits
         self._take(self._of_levels(n, p, max(2 * exits, 1)))
+        self._reserve_problem(n)
         self._reserve_flow(p)
         for state in STATES_OF_A_RUN:
             old = self._buffers.ints[state : state + a.STATE_INTS].copy()
@@ -76,24 +81,24 @@ class ScratchArrays:
     def _sets(self) -> dict[str, dict[int, int]]:
         """Memory that depends on the elements alone."""
         ints, c, struck, changes = self._buffers.ints, self._elements, self._struck, self.changes
-        m, rigid = int(ints[a.COORDINATES]), self._rigid
+        m = int(ints[a.COORDINATES])
         return {
-            "ints": dict.fromkeys((*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY), 2 * c + 1)
-            | {a.CHAIN_MARKS: int(ints[a.CHAIN_COUNT]), a.LEAST_INTS: least_distance_ints(struck)}
+            "ints": dict.fromkeys(OF_ELEMENTS, 2 * c + 1)
+            | {a.CHAIN_MARKS: int(ints[a.CHAIN_COUNT]), a.SMALL_PROBLEM: problem_ints(struck), a.LEADERS: struck}
             | {a.CHANGES: a.CHANGE_WIDTH * changes},
-            "numbers": dict.fromkeys((a.IMPULSES, a.FURTHER, a.LEAST, a.LEAST_SIZES, a.RESTING_SIZES), struck)
-            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(rigid, m)), a.CHANGE_IMPULSES: changes}
+            "numbers": dict.fromkeys((*OF_A_PROBLEM, a.IMPULSES, a.FURTHER, a.RESTING_SIZES), struck)
+            | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(self._together, m)), a.CHANGE_IMPULSES: changes}
             | {a.FOUND: zero_crossing.RESULT},
         }
 
     def _of_levels(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
         """Memory that depends on the levels. Impacts happen in all modes too, at the start."""
         ints, struck, terms = self._buffers.ints, self._struck, self._terms
-        wide = max(int(ints[a.COORDINATES] + ints[a.CHANNELS]), n) if self._rigid else n
+        wide = self._wide(n)
         q, room = int(ints[a.PRESCRIBED]), max(self.powers, terms) if ints[a.CHANNELS] else 0
         return {
             "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
-            | {a.ROWS: struck * wide, a.LEAST_NUMBERS: least_distance_numbers(struck, wide), a.CHANGE: wide}
+            | {a.ROWS: struck * wide, a.MOVED: wide, a.CHANGE: wide}
             | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
             | {a.CONSTANTS: signals, a.NOISES: signals}
             | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},
@@ -102,6 +107,16 @@ class ScratchArrays:
             | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)}
             | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: (2 + p) * room, a.FLOW_FORCED: q * room * n},
         }
+
+    def _wide(self, n: int) -> int:
+        """The most unknowns of an impact; it may happen in all modes too."""
+        ints = self._buffers.ints
+        return max(int(ints[a.COORDINATES] + ints[a.CHANNELS]), n) if self._rigid else n
+
+    def _reserve_problem(self, n: int) -> None:
+        """Memory for the small problem of impacts (complementarity.py)."""
+        memory = self._buffers.take("numbers", problem_numbers(self._struck, self._wide(n)))
+        lay_out(self._buffers.ints, int(self._buffers.ints[a.SMALL_PROBLEM]), self._struck, self._wide(n), memory)
 
     def _reserve_flow(self, p: int) -> None:
         """A record for the basis of a motion with channels, of p exponentials."""

@@ -29,6 +29,7 @@ from multiphi_exudyn.events.arrays import (
     IMPULSES,
     KINDS,
     LEVEL,
+    LIMITS,
     LOSSES,
     LOST,
     LOST_AT_START,
@@ -50,6 +51,7 @@ from multiphi_exudyn.events.arrays import (
     STRIKING,
     TOUCHING,
     TRANSITIONS_NOW,
+    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, clear
@@ -57,11 +59,12 @@ from multiphi_exudyn.events.decision import decide
 from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.impact import collide
 from multiphi_exudyn.events.maps import find_level, find_map, move
+from multiphi_exudyn.events.rebounds import rebound
 from multiphi_exudyn.events.signals import gap
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.striking import impact, list_changes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.least_distance_arrays import norm
+from multiphi_exudyn.mathematics.free_rows import norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["begin"]
@@ -75,9 +78,14 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """
     states, count, strikes = ints[ints[GIVEN + LEVEL] + STATES], 0, 0
     measure(ints, numbers, GIVEN)
+    touching = 0
+    for i in range(ints[ELEMENTS]):
+        touching += ints[states + i] if ints[ints[KINDS] + i] == RIGID else 0
     for i in range(ints[ELEMENTS]):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
+        if numbers[ints[LIMITS] + i] > 0.0 and touching > 0:  # which bears no impulse (striking.py)
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
         ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
         ints[ints[FREED] + i] = 0
         ints[ints[ASKING] + i] = NOBODY
@@ -121,7 +129,9 @@ def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -
         return status
     strikes = 1 if ints[CHANGE_COUNT] > 0 else 0
     ints[CHANGE_COUNT] = 0
-    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
+    if rebound(ints, numbers, GIVEN, count) < 0:
+        return FAILED
+    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, ints[WANTED], SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
         return FAILED
     list_changes(ints, numbers, count)
     return strikes

@@ -22,6 +22,7 @@ class Phase(Enum):
     RECOVERING = "recovering"
     REFUSED = "refused"
     HELD_BACK = "held back"
+    LANDING = "landing"
 
 
 @dataclass(frozen=True)

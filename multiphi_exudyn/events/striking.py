@@ -5,22 +5,26 @@ from __future__ import annotations
 from multiphi_exudyn.events.arrays import (
     AFTER,
     CHANGE_COUNT,
+    CHANNELS,
     CLOSE,
     CLOSED,
     COMPLIANT_KEY,
     DENIED,
     ELEMENTS,
     ENTERED_STATE,
+    FAILED,
     FURTHER,
     HELD,
     IMPULSES,
     KEY,
     KINDS,
     LEVEL,
+    LIMITS,
     LOSSES,
     LOST_IN_IMPACT,
     LOST_NOW,
     LOST_STILLED,
+    MODES,
     NEED,
     OK,
     OPEN,
@@ -28,22 +32,27 @@ from multiphi_exudyn.events.arrays import (
     RELEASED,
     RIGID,
     SHARED,
+    SPEED,
+    SPEEDS,
     STATES,
     STILL,
     STRIKING,
     STRUCK,
     TOUCHING,
+    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, clear, enter, is_held, note, transfer
 from multiphi_exudyn.events.energies import kinetic, lose
-from multiphi_exudyn.events.impact import collide
+from multiphi_exudyn.events.impact import RESTING, collide, speed_size
 from multiphi_exudyn.events.independence import join
-from multiphi_exudyn.events.maps import find_level
+from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
+from multiphi_exudyn.events.rebounds import bounce, last_bounce, rebound
 from multiphi_exudyn.events.resting import press, reaction_sign, same_speed, stay_closed
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.free_rows import product
 
 __all__ = ["close_without_impact", "impact", "list_changes"]
 
@@ -65,14 +74,24 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     if status < 0:
         return status
     clear(numbers, LOST_IN_IMPACT)
-    status = collide(ints, numbers, RELEASED, touching, count, 0, STRUCK, ints[IMPULSES], LOST_IN_IMPACT)
-    if status < 0:
-        return status
+    bouncing = rebound(ints, numbers, RELEASED, count)
+    wanted = ints[WANTED] if bouncing > 0 else -1
+    if bouncing < 0:
+        return FAILED
+    if collide(ints, numbers, RELEASED, touching, count, 0, wanted, STRUCK, ints[IMPULSES], LOST_IN_IMPACT) < 0:
+        return FAILED
+    if bouncing > 0 and bounce(ints, numbers, count) < 0:
+        return FAILED
     same = same_speed(ints, numbers, RELEASED, STRUCK)
     if same == 1:
         for k in range(count):
             numbers[ints[IMPULSES] + k] = 0.0  # round-off of them: nothing was struck
     closed = press(ints, numbers, waves, count)
+    last = last_bounce(ints, numbers, count) if bouncing > 0 and closed >= 0 else 0
+    if last < 0:
+        return FAILED
+    if last > 0:
+        closed = press(ints, numbers, waves, count)
     if closed < 0:
         return closed
     copy_state(ints, numbers, STRUCK, AFTER)
@@ -93,7 +112,33 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         copy_state(ints, numbers, STRUCK, AFTER)
     for k in range(LOSSES):
         numbers[LOST_NOW + k] += numbers[LOST_IN_IMPACT + k]
-    list_changes(ints, numbers, count)
+    status = slide_on(ints, numbers)
+    if status >= 0:
+        list_changes(ints, numbers, count)
+    return status
+
+
+@compiled
+def slide_on(ints: Ints, numbers: Numbers) -> int:
+    """12. AFTER: rigid friction bears no impulse; who has a speed then slips that way, others stay. OK or NEED."""
+    level, key, turned = ints[AFTER + LEVEL], ints[KEY], 0
+    n, before = ints[level + MODES] + ints[CHANNELS], ints[ints[WORKED + LEVEL] + STATES]
+    for i in range(ints[ELEMENTS]):
+        ints[key + i] = ints[ints[level + STATES] + i]
+        if numbers[ints[LIMITS] + i] > 0.0:
+            row = ints[level + SPEEDS] + i * (n + 1)
+            speed = product(numbers, row, ints[AFTER + SPEED], n)
+            rests = abs(speed) <= RESTING * speed_size(ints, numbers, AFTER, row)
+            ints[key + i] = ints[before + i] if rests else (1 if speed > 0.0 else 2)
+            turned += 1 if ints[key + i] != ints[ints[level + STATES] + i] else 0
+    if turned == 0:
+        return OK
+    level = find_level(ints, key)
+    status = level if level < 0 else move(ints, numbers, AFTER, AFTER, level, ENTERED_STATE)
+    if status < 0:
+        return status
+    lose(ints, numbers, AFTER, ENTERED_STATE, 0.0, LOST_NOW)
+    copy_state(ints, numbers, ENTERED_STATE, AFTER)
     return OK
 
 

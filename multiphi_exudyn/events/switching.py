@@ -30,6 +30,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.changes import NOBODY, enter, flag_asking, note, transfer
 from multiphi_exudyn.events.impact import collide
+from multiphi_exudyn.events.independence import thin_out
 from multiphi_exudyn.events.phases import becomes, entered_signal, first_exit, is_denied, update_phases
 from multiphi_exudyn.events.resting import same_speed
 from multiphi_exudyn.events.signals import row_sign
@@ -48,6 +49,7 @@ def switch(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
     c, wishes, singles, at = ints[ELEMENTS], ints[WISHES], ints[SINGLES], -1
     for i in range(c):
         ints[wishes + i] = ints[asking + i]
+    thin_out(ints, numbers, wishes)
     while True:
         wished = 0
         for i in range(c):
@@ -138,7 +140,7 @@ def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
             opened += 1
     if opened > 0:
         touching = ints[TOUCHING]
-        status = collide(ints, numbers, ENTERED_STATE, touching, opened, 0, STRUCK, ints[IMPULSES], LOST_NOW)
+        status = collide(ints, numbers, ENTERED_STATE, touching, opened, 0, -1, STRUCK, ints[IMPULSES], LOST_NOW)
         if status < 0:
             return status
         if same_speed(ints, numbers, ENTERED_STATE, STRUCK) == 0:

@@ -28,6 +28,7 @@ from multiphi_exudyn.events.arrays import (
     FALLEN,
     FLOW_BASIS,
     FLOW_COUNT,
+    LANDING,
     LEVEL,
     MODES,
     NOISES,
@@ -78,7 +79,7 @@ def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         if is_end(ints, level, k) == 0 and (chain < 0 or ints[ints[CHAIN_MARKS] + chain] == 0):
             continue
         phase = ints[phases + k]
-        if phase == ARMED:
+        if phase in (ARMED, LANDING):
             count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
             continue
         count = wait_for(ints, numbers, waves, count, k, 0, -1.0, 0, 0)

@@ -2,7 +2,7 @@
 
     g(x) = h.x + gap,   open where g > 0;   the contact force lambda >= 0 [N] acts along +h.
 
-    rigid      0 <= lambda, g >= 0, lambda g = 0
+    rigid      0 <= lambda, g >= 0, lambda g = 0, and where it strikes with g'- < 0: g'+ >= -e g'-  (Moreau)
     compliant  lambda = k max(0, -g)
     viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
 
@@ -68,6 +68,7 @@ class UnilateralContact:
     tangential: h_t, as h is given; needed where there is friction.
     tangential_stiffness: k_t [N/m] of the spring in series with the friction, infinite for none.
     tangential_velocity: v_t [m/s] of the counter-surface along +h_t.
+    restitution: e from 0 to 1 of a rigid contact. Those that are struck together, and are coupled, need one e.
 
     Two contacts are equal only if they are the same object.
     """
@@ -81,6 +82,7 @@ class UnilateralContact:
     tangential: At | None = None
     static_friction: float | None = None
     tangential_stiffness: float = math.inf
+    restitution: float = 0.0
     tangential_velocity: float = 0.0
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
@@ -88,7 +90,8 @@ class UnilateralContact:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"contact name: got {self.name!r}, need a non-empty string")
-        for name in ("gap", "stiffness", "damping", "friction", "tangential_stiffness", "tangential_velocity"):
+        tangential = "friction", "tangential_stiffness", "tangential_velocity"
+        for name in ("gap", "stiffness", "damping", "restitution", *tangential):
             object.__setattr__(self, name, self._number(name, getattr(self, name)))
         if self.static_friction is not None:
             object.__setattr__(self, "static_friction", self._number("static_friction", self.static_friction))
@@ -100,6 +103,11 @@ class UnilateralContact:
             raise self._refused("damping", "need a finite value >= 0")
         if self.rigid and self.damping:
             raise self._refused("damping", "need a finite stiffness", " beside an infinite stiffness")
+        if not 0 <= self.restitution <= 1:
+            raise self._refused("restitution", "need a value from 0 to 1")
+        if self.restitution and not self.rigid:
+            needed = "need an infinite one: a spring loses nothing, its damper does"
+            raise self._refused("restitution", needed, " beside a finite stiffness")
         self._check_friction()
 
     def _check_friction(self) -> None:

@@ -87,6 +87,7 @@ from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_
 from multiphi_exudyn.events.energies import kinetic, pattern_work, potential
 from multiphi_exudyn.events.flow import expand, state_at
 from multiphi_exudyn.events.maps import find_map
+from multiphi_exudyn.events.rebounds import only_bounces
 from multiphi_exudyn.events.start import begin
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.waiting import arm, flag_again, watch, who_asks
@@ -288,7 +289,7 @@ def carry_on(ints: Ints, numbers: Numbers, level: int, status: int) -> int:
     numbers[last] = numbers[LAST_DECISION]
     numbers[last + 1] = numbers[ints[level + HIGHEST_FREQUENCY]]
     numbers[LAST_DECISION] = numbers[TIME]
-    ints[DECISIONS] += 1
+    ints[DECISIONS] += 1 - only_bounces(ints, numbers)  # a sequence of bounces ends by itself
     ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
     if status < 0:
         copy_state(ints, numbers, REACHED, CURRENT)

@@ -274,6 +274,7 @@ class Motion:
             a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
             a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
             + ("" if complete else " in the kept modes, need more of them"),
-            a.UNSETTLED: "least distance: round-off decides which inequalities push",
+            a.UNSETTLED: "impact: round-off decides which contacts push",
+            a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
         }
         return NumericalFailure(sentences[cause])

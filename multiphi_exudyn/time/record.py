@@ -26,7 +26,7 @@ from multiphi_exudyn.time.work import integrate_works, work_waves
 
 __all__ = ["PHASES", "Record"]
 
-PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK)  # in the order of their numbers
+PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
 states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
 

@@ -21,6 +21,7 @@ from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available
+from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, unchanging
@@ -218,6 +219,7 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
         states[i] = [state.name for state in contact.states].index(named)
         if contact.rigid and not contact.held and gaps[i] <= near[i]:
             states[i] = CLOSE
+    states = _independent(model, states)
     closed = [i for i, contact in enumerate(model.contacts) if states[i] != OPEN and not contact.held]
     touching = tuple(i for i in closed if model.contacts[i].rigid)
     stretches = run.stretches or {}
@@ -246,6 +248,23 @@ def started(run: Run) -> Run:
     if isinstance(start, Equilibrium):
         return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
     return run
+
+
+def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
+    """States of which, of rigid links that would stick, an independent set does; the others push till it is decided."""
+    found = np.zeros((0, len(model.base.directions)))
+    for i, element in enumerate(model.contacts):
+        if element.held and element.rigid and element.states[states[i]].holds:
+            row = model.base.directions[:, i]
+            left = row / np.linalg.norm(row)
+            for _ in range(2):
+                left = left - (found @ left) @ found
+            size = float(np.linalg.norm(left))
+            if size > INDEPENDENT:
+                found = np.vstack([found, left / size])
+            else:
+                states[i] = next(k for k, state in enumerate(element.states) if not state.holds)
+    return states
 
 
 def _check_start(run: Run) -> None:

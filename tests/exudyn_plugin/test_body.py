@@ -90,6 +90,17 @@ def observed_orders(errors):
 # ---------------------------------------------------------------------- alone: the native answer
 
 
+@pytest.mark.parametrize("e", [0.5, 0.9])
+def test_with_restitution_it_bounces_and_comes_to_rest_as_natively(e):
+    """A mass that its spring presses to its stop: two hundred bounces, the last of them in one step."""
+    structure = mp.LinearStructure([[1.0]], [[400.0]], points={"m": 0})
+    model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m", -0.02, restitution=e)], modes="all")
+    native = mp.simulate(model, 2.0, displacement=[0.1])
+    body = run(model, 1e-3, 2.0, displacement=[0.1], matchedStepSize=1e-3)
+    assert [(x.contact, x.kind) for x in body.events] == [(x.contact, x.kind) for x in native.events]
+    np.testing.assert_allclose([x.time for x in body.events], [x.time for x in native.events], rtol=1e-9)
+
+
 @pytest.mark.parametrize("damped", [True, False], ids=["damped", "undamped"])
 @pytest.mark.parametrize("stiffness", [COMPLIANT, math.inf], ids=["compliant", "rigid"])
 def test_matched_to_a_coarse_step_is_native(stiffness, damped):

@@ -1,6 +1,7 @@
 """Masses and constraints on interface coordinates beside rigid contacts: one impact of all that hangs together."""
 
 import math
+from dataclasses import replace
 
 import exudyn as exu
 import numpy as np
@@ -93,6 +94,23 @@ def test_a_mass_on_a_point_is_struck_with_the_structure(attach, matched):
         assert told(events) == told(native.events)
         pushed = [[e.impulse for e in each if e.impulse > 0] for each in (events, native.events)]
         assert np.allclose(*pushed, rtol=2e-3)
+
+
+@pytest.mark.parametrize("attach", [mass_on, mass_tied])
+def test_with_restitution_a_mass_on_a_point_rebounds_with_the_structure(attach):
+    def bouncing(model):
+        stops = [replace(contact, restitution=0.6) for contact in model.contacts]
+        return mp.MultiPhiModel(model.structure, stops, modes="all")
+
+    native = mp.simulate(bouncing(chain(math.inf, COUPLING, added_mass=MASS)), END, displacement=START)
+    assert sum(event.impulse > 0.3 for event in native.events) >= 5
+    shown = on_point(bouncing(chain(math.inf, COUPLING)), attach)
+    order, error, events = order_and_last(shown, lambda t: native.at("m2", t))
+    assert order > ORDER
+    assert error < 1e-4
+    assert told(events) == told(native.events)
+    pushed = [[e.impulse for e in each if e.impulse > 0] for each in (events, native.events)]
+    assert np.allclose(*pushed, rtol=2e-3)
 
 
 def stopped_twice(added_mass=0.0):

@@ -10,7 +10,8 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics import (
     basis_arrays,
     compiled,
-    least_distance_arrays,
+    complementarity,
+    free_rows,
     response_arrays,
     signal_bounds,
     zero_crossing,
@@ -146,18 +147,31 @@ class Search:
         )  # fmt: skip
 
 
+def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=None, run=fast):
+    """(x, z, answer, rows that exclude each other) of complementarity.py; pushes None: the rows themselves."""
+    (k, r), buffers = rows.shape, Buffers()
+    given = [buffers.put_numbers(rows)]
+    given.append(given[0] if pushes is None else buffers.put_numbers(pushes))
+    given += [buffers.put_numbers(each) for each in (values, sizes, low, high)]
+    led = buffers.put_ints(np.full(k, -1) if leaders is None else leaders)
+    tied = buffers.put_numbers(np.zeros(k) if ties is None else ties)
+    x, z = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))
+    scratch = buffers.put_numbers(np.full(complementarity.problem_numbers(k, r), np.nan))
+    problem = buffers.put_ints(np.full(complementarity.problem_ints(k), -1))
+    complementarity.lay_out(buffers.ints, problem, k, r, scratch)
+    complementarity.pose(buffers.ints, problem, k, r, r, *given, led, tied, x, z)
+    answer = run(complementarity.solve)(*buffers.all[:2], problem)
+    listed = buffers.ints[problem + free_rows.EXCLUDED_ROWS]
+    excluded = buffers.ints[listed:][: buffers.ints[problem + free_rows.EXCLUDING]].tolist()
+    return buffers.numbers[x : x + r].copy(), buffers.numbers[z : z + k].copy(), answer, excluded
+
+
 def distance_in_buffers(rows, least, sizes, run=fast):
     """``least_distance`` in buffers, with its failures."""
-    (k, r), buffers = rows.shape, Buffers()
-    given = [buffers.put_numbers(values) for values in (rows, least, sizes)]
-    x, p = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))
-    scratch = buffers.put_numbers(np.full(least_distance_arrays.least_distance_numbers(k, r), np.nan))
-    ints = buffers.put_ints(np.full(least_distance_arrays.least_distance_ints(k), -1))
-    answer = run(least_distance_arrays.shortest_vector)(
-        *buffers.all[:2], given[0], r, given[1], given[2], k, r, x, p, scratch, ints
-    )
-    if answer == least_distance_arrays.EXCLUDED:
-        raise Infeasible(buffers.ints[ints + 1 + 2 * k :][: buffers.ints[ints]].tolist())
-    if answer == least_distance_arrays.UNDECIDED:
+    zero = np.zeros(len(least))
+    x, p, answer, excluded = complementary(rows, None, -least, sizes, zero, zero + np.inf, run=run)
+    if answer == complementarity.EXCLUDED:
+        raise Infeasible(excluded)
+    if answer == complementarity.UNDECIDED:
         raise NumericalFailure("least distance: round-off decides which inequalities push")
-    return buffers.numbers[x : x + r].copy(), buffers.numbers[p : p + k].copy()
+    return x, p

@@ -15,7 +15,7 @@ NAME = re.compile(r"\b([a-z_]+)\.([A-Za-z_.]*[A-Za-z_])\b")
 ROW = re.compile(r"^    (\(38\.\d\)|\d+) (.*)$", re.MULTILINE)
 SENTENCE = re.compile(r"^(\d+)\. .*?^   -> (.*?)(?=^\S)", re.MULTILINE | re.DOTALL)
 NUMBERS = re.compile(r"(\d+(?:, \d+)*)\. ")
-SENTENCES = [str(number) for number in range(1, 11)]
+SENTENCES = [str(number) for number in range(1, 13)]
 
 
 def doc(thing: object) -> str:

@@ -56,6 +56,16 @@ def test_a_shipped_scene_of_the_rig_is_complete(name):
     assert any(isinstance(model, FullModel) for model in scene.models.values())
 
 
+def test_a_contact_of_a_scene_may_have_a_restitution(tmp_path):
+    rigid = changed(["contacts", 0], BEAM["contacts"][0] | {"stiffness": math.inf, "restitution": 0.4})
+    models = {"models": BEAM["models"][:1]}
+    (stop,) = mechanics_of(load_scene(write(tmp_path / "mine.toml", rigid | models))).contacts
+    assert stop.restitution == 0.4
+    soft = changed(["contacts", 0, "restitution"], 0.4)
+    assert "contact 'stop' restitution: got 0.4 beside a finite stiffness" in complaint(tmp_path, soft)
+    assert "restitution: got -1" in complaint(tmp_path, changed(["contacts", 0, "restitution"], -1.0))
+
+
 def test_a_scene_can_describe_its_own_beam(tmp_path):
     scene = load_scene(write(tmp_path / "mine.toml", BEAM))
     mechanics = mechanics_of(scene)

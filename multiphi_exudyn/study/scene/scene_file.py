@@ -54,6 +54,7 @@ class ContactSpec(Table):
     gap: Finite
     stiffness: Stiffness
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
+    restitution: NotNegative = 0.0  # of a rigid contact, up to 1
     count: Annotated[int, Field(ge=1)] = 1
 
     @property

@@ -1,0 +1,217 @@
+"""Rigid friction elements at rest are decided together, by sentence 12 of the law (decision.py).
+
+    h.x'' = A eta'' = A eta''_0 + A A^T z,   -limit <= f <= limit complementary to h.x'',   f = f_0 + z
+
+f is the force along +h, f_0 that of slip, eta''_0 the acceleration in the level in which all of them slip: those that
+stick or turn are at rest relative to their counter-surface. f = -limit: slip+, f = limit: slip-, between: stick.
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    ACCELERATION_TERMS,
+    CAUSE,
+    CHANGE,
+    CHANNELS,
+    ELEMENTS,
+    ENTERED_STATE,
+    EXIT_INTS,
+    FAILED,
+    FURTHER,
+    HIGHEST,
+    KEY,
+    LEADERS,
+    LEVEL,
+    LIMITS,
+    LOWEST,
+    MODES,
+    OK,
+    RATIOS,
+    RESTING_LIST,
+    ROWS,
+    SIGNAL,
+    SMALL_PROBLEM,
+    SPEED,
+    STATES,
+    STATIC_LIMITS,
+    TOGETHER,
+    UNSETTLED,
+    VALUE_SIZES,
+    VALUES,
+    WISHES,
+    WORKED,
+)
+from multiphi_exudyn.events.changes import NOBODY, enter, note, transfer
+from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
+from multiphi_exudyn.events.phases import first_exit
+from multiphi_exudyn.events.signals import row_sign
+from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, measure
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, product
+
+__all__ = ["stick_together"]
+
+STICK, FORWARD, BACKWARD = 0, 1, 2  # states of a friction element: stick, slip+, slip-
+
+
+@compiled
+def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
+    """12. Which rigid friction elements stick, and where the others slip; OK, NEED or FAILED.
+
+    Where any changes they ask no more. Once at an instant, where there are several.
+    """
+    count, wishes, key = list_at_rest(ints, numbers, asking), ints[WISHES], ints[KEY]
+    if count < 2 or ints[TOGETHER] == 1:
+        return OK
+    ints[TOGETHER] = 1
+    states = ints[ints[WORKED + LEVEL] + STATES]
+    for i in range(ints[ELEMENTS]):
+        ints[key + i] = ints[states + i]
+        ints[wishes + i] = ints[states + i]
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        ints[key + i] = FORWARD if ints[states + i] == STICK else ints[states + i]
+    status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+    if status < 0:
+        return status
+    pull(ints, numbers, count, asking)
+    falling = 1
+    while falling > 0:
+        if solve(ints, numbers, ints[SMALL_PROBLEM]) != SOLVED:
+            ints[CAUSE] = UNSETTLED
+            return FAILED
+        falling = choose(ints, numbers, count)
+    changed = 0
+    for i in range(ints[ELEMENTS]):
+        changed += 1 if ints[wishes + i] != ints[states + i] else 0
+    if changed == 0:
+        return OK
+    for i in range(ints[ELEMENTS]):
+        ints[key + i] = ints[wishes + i]
+    status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+    if status < 0:
+        return status
+    for i in range(ints[ELEMENTS]):
+        if ints[wishes + i] != ints[states + i]:
+            note(ints, numbers, i, ints[wishes + i], 0.0)
+    for k in range(count):
+        ints[asking + ints[ints[RESTING_LIST] + k]] = NOBODY
+    if stand_still(ints, numbers, count) < 0:
+        return FAILED
+    enter(ints, numbers, waves, ENTERED_STATE)
+    return OK
+
+
+@compiled
+def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
+    """ENTERED_STATE: those at rest have no speed; what is left of one for round-off would turn them. OK or FAILED."""
+    level, v, problem = ints[ENTERED_STATE + LEVEL], ints[ENTERED_STATE + SPEED], ints[SMALL_PROBLEM]
+    r = ints[level + MODES]
+    n = r + ints[CHANNELS]
+    fill_rows(ints, numbers, level, ints[RESTING_LIST], count, 0)
+    for k in range(count):
+        row, terms = ints[ROWS] + k * n, 0.0
+        for j in range(n):
+            terms += abs(numbers[row + j]) * abs(numbers[v + j])
+        numbers[ints[VALUES] + k] = product(numbers, row, v, n)
+        numbers[ints[VALUE_SIZES] + k] = terms
+        numbers[ints[LOWEST] + k] = -math.inf
+        numbers[ints[HIGHEST] + k] = math.inf
+    pose_rows(ints, count, r, n)
+    if solve(ints, numbers, problem) != SOLVED:
+        ints[CAUSE] = UNSETTLED
+        return FAILED
+    for i in range(r):
+        before = abs(numbers[v + i])
+        numbers[v + i] += numbers[ints[CHANGE] + i]
+        numbers[v + i] = 0.0 if abs(numbers[v + i]) <= RESTING * before else numbers[v + i]
+    measure(ints, numbers, ENTERED_STATE)
+    return OK
+
+
+@compiled
+def pose_rows(ints: Ints, count: int, r: int, n: int) -> None:
+    """The small problem of ROWS (count, n), with r unknowns."""
+    for k in range(count):
+        ints[ints[LEADERS] + k] = -1
+    pose(
+        ints, ints[SMALL_PROBLEM], count, r, n, ints[ROWS], ints[ROWS], ints[VALUES], ints[VALUE_SIZES],
+        ints[LOWEST], ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], ints[FURTHER],
+    )  # fmt: skip
+
+
+@compiled
+def list_at_rest(ints: Ints, numbers: Numbers, asking: int) -> int:
+    """How many rigid friction elements stick, or ask, or have no speed, where one asks; which: the resting list."""
+    states, count, asks = ints[ints[WORKED + LEVEL] + STATES], 0, 0
+    for i in range(ints[ELEMENTS]):
+        if numbers[ints[LIMITS] + i] > 0.0:
+            signal = first_exit(ints, ints[WORKED + LEVEL], i) + SIGNAL
+            rests = ints[states + i] == STICK or ints[asking + i] != NOBODY
+            if rests or row_sign(ints, numbers, WORKED, signal, 0.0) == 0:
+                ints[ints[RESTING_LIST] + count] = i
+                count += 1
+                asks += 1 if ints[asking + i] != NOBODY else 0
+    return count if asks > 0 else 0
+
+
+@compiled
+def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
+    """The problem of those at rest: what accelerates them where all of them slip, and what force they may add."""
+    level = ints[ENTERED_STATE + LEVEL]
+    n = ints[level + MODES] + ints[CHANNELS]
+    accelerate(ints, numbers, ENTERED_STATE, ints[ACCELERATION])
+    acceleration_sizes(ints, numbers, ENTERED_STATE, ints[ACCELERATION_TERMS])
+    fill_rows(ints, numbers, level, ints[RESTING_LIST], count, 0)
+    for k in range(count):
+        i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
+        limit = numbers[ints[LIMITS] + i]
+        most = numbers[ints[STATIC_LIMITS] + i]
+        slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
+        low, high = slipped - most, slipped + most
+        if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
+            low = slipped - limit if ints[asking + i] == FORWARD else slipped + limit
+            high = low
+        numbers[ints[LOWEST] + k] = low
+        numbers[ints[HIGHEST] + k] = high
+        numbers[ints[VALUES] + k] = product(numbers, row, ints[ACCELERATION], n)
+        numbers[ints[VALUE_SIZES] + k] = resting_size(
+            numbers, ints[ACCELERATION_TERMS], ints[ACCELERATION_TERMS], row, n
+        )
+    pose_rows(ints, count, ints[level + MODES], n)
+
+
+@compiled
+def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
+    """1 where an element that sticks asks to slip, with what it bears at its limit, and not beyond it."""
+    level = ints[WORKED + LEVEL]
+    if ints[ints[level + STATES] + element] != STICK or asked == NOBODY:
+        return 0
+    exit_ = first_exit(ints, level, element) + (asked - FORWARD) * EXIT_INTS
+    return 1 if row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0 else 0
+
+
+@compiled
+def choose(ints: Ints, numbers: Numbers, count: int) -> int:
+    """12. WISHES: the states of the solution; how many of them begin to slip, and fall from their static limit."""
+    falling = 0
+    for k in range(count):
+        i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
+        limit, most = numbers[ints[LIMITS] + i], numbers[ints[STATIC_LIMITS] + i]
+        slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
+        side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
+        if numbers[low] == numbers[high]:
+            entered = FORWARD if numbers[low] - slipped < 0.0 else BACKWARD
+        elif side != BETWEEN:
+            force = numbers[ints[FURTHER] + k] - slipped
+            entered = BACKWARD if side == ABOVE or force > 0.0 else FORWARD
+            if most > limit and abs(force) > limit:
+                numbers[low] = slipped - limit if entered == FORWARD else slipped + limit
+                numbers[high] = numbers[low]
+                falling += 1
+        ints[ints[WISHES] + i] = entered
+    return falling

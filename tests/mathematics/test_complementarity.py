@@ -1,0 +1,179 @@
+"""The small complementarity problem: against all 3^k states, symmetric or not, bounds tied to other rows or not."""
+
+import itertools
+
+import numpy as np
+import pytest
+from flat_records import as_they_are, complementary
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from multiphi_exudyn.mathematics.complementarity import EXCLUDED, SOLVED, UNDECIDED
+
+PLAIN, SKEW, COULOMB = "symmetric", "not symmetric", "tied bounds"
+NONE, SURE = -1, 1e-9
+
+
+def bounds(low, high, leaders, ties, z):
+    """The bounds (k,), (k,) that go with z."""
+    wide = np.where(leaders >= 0, ties * z[leaders], 0.0)
+    return low - wide, high + wide
+
+
+def is_complementary(W, b, low, high, leaders, ties, z, tolerance=SURE):
+    low, high = bounds(low, high, leaders, ties, z)
+    w, small = W @ z + b, tolerance * (1 + np.max(np.abs(z)))
+    inside = np.all(z >= low - small) and np.all(z <= high + small)
+    wrong = ((z > low + small) & (w > small)) | ((z < high - small) & (w < -small))
+    return bool(inside and not np.any(wrong))
+
+
+def enumerated(W, b, low, high, leaders, ties):
+    """All solutions, each once, found in all 3^k states."""
+    found = []
+    for sides in itertools.product((-1, 0, 1), repeat=len(b)):
+        matrix, wanted = W.copy(), -b.copy()
+        for i, side in enumerate(sides):
+            if side:
+                matrix[i], wanted[i] = np.eye(len(b))[i], low[i] if side < 0 else high[i]
+                if leaders[i] >= 0:
+                    matrix[i, leaders[i]] -= side * ties[i]
+        if not np.all(np.isfinite(wanted)) or np.linalg.cond(matrix) > 1e13:
+            continue
+        z = np.linalg.solve(matrix, wanted)
+        new = not any(np.allclose(z, other, rtol=1e-7, atol=1e-7) for other in found)
+        if is_complementary(W, b, low, high, leaders, ties, z) and new:
+            found.append(z)
+    return found
+
+
+def problem(random, kind, k, extra, at_rest):
+    """rows, pushes, b, low, high, leaders, ties: of k rows in k + extra unknowns; some of b zero."""
+    k = 2 * (k // 2) if kind == COULOMB else k
+    r, half = k + extra, k // 2
+    rows, leaders, ties = random.normal(size=(k, r)), np.full(k, NONE), np.zeros(k)
+    turn = random.normal(size=(r, r))
+    mobility = 0.3 * turn @ turn.T + random.uniform(0, 2) * (turn - turn.T) + 0.1 * np.eye(r)
+    pushes = rows @ mobility.T if kind == SKEW else None
+    sort = random.integers(0, 3, size=k)
+    low = np.choose(sort, [np.zeros(k), -random.uniform(0, 2, size=k), np.full(k, -np.inf)])
+    high = np.choose(sort, [np.full(k, np.inf), random.uniform(0, 2, size=k), np.full(k, np.inf)])
+    if kind == COULOMB:
+        leaders[half:], ties[half:] = np.arange(half), random.uniform(0, 1, size=half)
+        low, high = np.zeros(k), np.where(np.arange(k) < half, np.inf, 0.0)
+    b = rows @ random.normal(size=r)
+    return rows, pushes, np.where(random.random(k) < at_rest, 0.0, b), low, high, leaders, ties
+
+
+def solved(given, scale=1.0, run=None):
+    rows, pushes, b, low, high, leaders, ties = given
+    changed = {} if run is None else {"run": run}
+    pushes = None if pushes is None else scale * pushes
+    return complementary(scale * rows, pushes, b / scale, np.abs(b) / scale, low / scale**3, high / scale**3, leaders,
+                         ties, **changed)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [PLAIN, SKEW, COULOMB])
+@settings(derandomize=True, max_examples=100, deadline=None)
+@given(
+    st.integers(0, 2**31), st.integers(2, 5), st.integers(0, 2), st.sampled_from([0.0, 0.4]), st.sampled_from([-9, 9])
+)
+def test_is_the_one_of_all_states_that_is_complementary(kind, seed, k, extra, at_rest, power):
+    given = problem(np.random.default_rng(seed), kind, k, extra, at_rest)
+    rows, pushes, *rest = given
+    W = rows @ (rows if pushes is None else pushes).T
+    x, z, answer, _ = solved(given)
+    assert answer == SOLVED
+    assert_allclose(x, z @ (rows if pushes is None else pushes), rtol=0, atol=1e-11 * (1 + np.max(np.abs(z))))
+    expected = enumerated(W, *rest)
+    assert any(np.allclose(z, one, rtol=1e-6, atol=1e-6) for one in expected)
+    assert len(expected) == 1 or kind == COULOMB
+    scale = 2.0**power
+    scaled = solved(given, scale)
+    assert np.array_equal(scaled[1], z / scale**3)
+
+
+@settings(derandomize=True, max_examples=100, deadline=None)
+@given(st.integers(0, 2**31), st.integers(2, 5), st.integers(3, 12))
+def test_redundant_rows_and_nearly_parallel_ones_are_complementary_too(seed, k, digits):
+    """Friction on few unknowns: what x is does not hang on which of the rows bears what."""
+    random = np.random.default_rng(seed)
+    rows = random.normal(size=(k, 3))
+    for i in range(1, k):
+        if random.random() < 0.6:
+            nearly = 0.0 if random.random() < 0.5 else 10.0**-digits
+            rows[i] = random.choice([-2.0, 1.0]) * rows[random.integers(i)] + nearly * random.normal(size=3)
+    limits, b = random.uniform(0.1, 1, size=k), rows @ random.normal(size=3)
+    x, z, answer, _ = complementary(rows, None, b, np.abs(b), -limits, limits)
+    assert answer == SOLVED
+    assert is_complementary(rows @ rows.T, b, -limits, limits, np.full(k, NONE), np.zeros(k), z, 1e-8)
+    order = random.permutation(k)
+    other = complementary(rows[order], None, b[order], np.abs(b)[order], -limits[order], limits[order])
+    assert_allclose(other[0], x, rtol=0, atol=1e-8)
+
+
+def test_equal_friction_on_one_point_is_borne_by_both():
+    """Two limits of 1 and 2 against a pull of 2.5: it holds; against one of 4 both slip."""
+    rows, limits = np.ones((2, 1)), np.array([1.0, 2.0])
+    x, z, _, _ = complementary(rows, None, np.full(2, -2.5), np.full(2, 2.5), -limits, limits)
+    assert_allclose([x[0], np.sum(z)], 2.5, rtol=1e-15)
+    x, z, _, _ = complementary(rows, None, np.full(2, -4.0), np.full(2, 4.0), -limits, limits)
+    assert_allclose(z, limits, rtol=0, atol=0)
+
+
+def test_rows_that_exclude_each_other_are_named():
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [-2.0, 0.0]])
+    *_, answer, excluded = complementary(
+        rows, None, np.array([-1.0, -1.0, -1.0]), np.ones(3), np.zeros(3), np.full(3, np.inf)
+    )
+    assert answer == EXCLUDED
+    assert sorted(excluded) == [0, 2]
+
+
+def rod(angle, friction):
+    """A rod of mass 1, length 2, inertia 1/3, one end on the floor: rows h_n, h_t in (x, y, turn) over sqrt(M)."""
+    arm = np.array([-np.cos(angle), -np.sin(angle)])  # from the middle to the end that touches
+    rows = np.array([[0.0, 1.0, arm[0]], [1.0, 0.0, -arm[1]]]) / np.sqrt([1.0, 1.0, 1 / 3])
+    return rows, np.array([NONE, 0]), np.array([0.0, friction])
+
+
+class TestRodOnARoughFloor:
+    """One contact, p_n >= 0, |p_t| <= mu p_n: what sticks, slips or jams, in closed form."""
+
+    def impact(self, angle, friction, speeds):
+        rows, leaders, ties = rod(angle, friction)
+        b = rows @ (np.asarray(speeds, float) * np.sqrt([1.0, 1.0, 1 / 3]))
+        zero = np.zeros(2)
+        x, p, answer, _ = complementary(rows, None, b, np.abs(b), zero, np.array([np.inf, 0.0]), leaders, ties)
+        return rows @ x + b, p, answer, rows @ rows.T, b
+
+    def test_sticks_where_the_cone_allows_it(self):
+        after, p, answer, W, b = self.impact(1.0, 0.8, (0.0, -1.0, 0.0))
+        assert answer == SOLVED
+        assert_allclose(p, np.linalg.solve(W, -b), rtol=1e-13)
+        assert_allclose(after, 0.0, atol=1e-15)
+
+    def test_slips_where_it_does_not(self):
+        after, p, answer, W, b = self.impact(1.0, 0.1, (3.0, -1.0, 0.0))
+        assert answer == SOLVED
+        assert p[0] == pytest.approx(-b[0] / (W[0, 0] - 0.1 * W[0, 1]), rel=1e-13)
+        assert p[1] == pytest.approx(-0.1 * p[0], rel=1e-14)
+        assert after[1] > 0
+
+    def test_a_wrong_push_is_never_an_answer(self):
+        """Beyond the friction at which slip pushes the rod into the floor: solved by sticking, or told."""
+        for friction in (1.0, 2.0, 5.0):
+            for speed in (-3.0, -0.1, 0.1, 3.0):
+                _, p, answer, W, b = self.impact(1.2, friction, (speed, -0.2, 0.0))
+                assert answer in (SOLVED, UNDECIDED, EXCLUDED)
+                if answer == SOLVED:
+                    low, high = np.array([0.0, -friction * p[0]]), np.array([np.inf, friction * p[0]])
+                    assert is_complementary(W, b, low, high, np.full(2, NONE), np.zeros(2), p)
+
+
+def test_compiled_it_is_what_it_is_in_python():
+    for seed in range(10):
+        given = problem(np.random.default_rng(seed), COULOMB, 4, 1, 0.0)
+        for one, other in zip(solved(given)[:2], solved(given, run=as_they_are)[:2], strict=True):
+            assert_allclose(one, other, rtol=1e-13, atol=1e-15)

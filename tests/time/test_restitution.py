@@ -1,0 +1,192 @@
+"""Restitution of rigid contacts: exact bounces, their end, shared impacts, and where the energy goes."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.integrate
+from numpy.testing import assert_allclose
+from small_structures import chain, random_structure
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.mechanics.time_functions import Harmonic
+from reference_models.rig import rig_beam, rig_damping
+
+G = 9.81
+
+
+def ball(restitution, t_end, gap=0.0, height=1.0, **options):
+    """A ball of 1 kg that falls from a height above the floor."""
+    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"ball": 0})
+    floor = mp.UnilateralContact("floor", "ball", gap, restitution=restitution)
+    model = mp.MultiPhiModel(structure, [floor], modes="all")
+    return mp.simulate(model, t_end, displacement=[height - gap], loads=[mp.ConstantLoad("ball", -G)], **options)
+
+
+def balls(gaps, restitutions, velocity, t_end=1.0):
+    """Equal free balls in a row."""
+    n = len(velocity)
+    structure = mp.LinearStructure(np.eye(n), np.zeros((n, n)), points={f"m{i}": i for i in range(n)})
+    contacts = [
+        mp.UnilateralContact(f"c{i}", {f"m{i + 1}": 1.0, f"m{i}": -1.0}, gap, restitution=e)
+        for i, (gap, e) in enumerate(zip(gaps, restitutions, strict=True))
+    ]
+    return mp.simulate(mp.MultiPhiModel(structure, contacts, modes="all"), t_end, velocity=velocity)
+
+
+class TestBouncingBall:
+    @pytest.mark.parametrize(("e", "rests"), [(0.5, 1.354570922957), (0.8, 4.063712768872), (0.9, 8.578949178729)])
+    def test_comes_to_rest_at_the_exact_time(self, e, rests):
+        """sqrt(2 h/g) (1 + e)/(1 - e)."""
+        run = ball(e, 10.0)
+        assert run.status == "ok"
+        intervals = run.contact_intervals("floor")
+        assert intervals[-1][0] == pytest.approx(rests, abs=1e-12)
+        assert intervals[-1][1] == 10.0
+        assert run.contact_force("floor", 10.0) == pytest.approx(G, rel=1e-12)
+        assert run.at("ball", 10.0) == pytest.approx(0.0, abs=1e-15)
+
+    @pytest.mark.parametrize("e", [0.3, 0.7, 0.97])
+    def test_comes_to_rest_where_its_gap_is_a_difference_of_lengths_too(self, e):
+        """A floor 1 m below zero: a gap has the round-off of 1 m, and its bounces end where they are that low."""
+        rests = math.sqrt(2 / G) * (1 + e) / (1 - e)
+        run = ball(e, 1.1 * rests, gap=1.0)
+        assert run.status == "ok"
+        assert run.contact_intervals("floor")[-1][0] == pytest.approx(rests, rel=1e-8)
+
+    def test_strikes_at_the_exact_times_with_the_exact_speeds(self):
+        run, first = ball(0.5, 1.4), math.sqrt(2 / G)
+        strikes = [event for event in run.events if event.kind == "close"]
+        n = np.arange(20)
+        assert_allclose([s.time for s in strikes[:20]], first * (3 - 2 * 0.5**n), rtol=1e-12)
+        assert_allclose([s.impulse for s in strikes[:20]], 1.5 * math.sqrt(2 * G) * 0.5**n, rtol=1e-9)
+        assert_allclose([s.loss.impact for s in strikes[:20]], 0.75 * G * 0.25**n, rtol=1e-8)
+        assert run.ledger.impact == pytest.approx(G, rel=1e-9)
+
+    def test_without_a_loss_bounces_for_ever(self):
+        run = ball(1.0, 20.0)
+        assert run.status == "ok"
+        period = 2 * math.sqrt(2 / G)
+        assert_allclose(run.at("ball", period * np.arange(1, 20)), 1.0, rtol=1e-11)
+        assert run.ledger.impact == pytest.approx(0.0, abs=1e-12)
+
+    @pytest.mark.parametrize("until", [0.7, 1.3545, 1.35457092295])
+    def test_goes_on_from_where_a_run_has_ended(self, until):
+        whole, first = ball(0.5, 2.0), ball(0.5, until)
+        rest = mp.simulate(first.model, 2.0, start=first, loads=[mp.ConstantLoad("ball", -G)])
+        at_rest = [run.contact_intervals("floor")[-1][0] for run in (rest, whole)]
+        assert at_rest[0] == pytest.approx(at_rest[1], abs=1e-12)
+
+    def test_in_other_units_bounces_as_often(self):
+        lengths = [ball(0.8, 5.0), ball(0.8, 5.0 * 2.0**10, height=2.0**20)]
+        assert len(lengths[0].events) == len(lengths[1].events)
+        assert_allclose([e.time * 2.0**10 for e in lengths[0].events], [e.time for e in lengths[1].events], rtol=1e-15)
+
+
+class TestBallsInARow:
+    @pytest.mark.parametrize("gap", [0.0, 0.25])
+    @pytest.mark.parametrize(
+        ("e", "after"), [(1.0, (-1 / 3, 2 / 3, 2 / 3)), (0.5, (0.0, 0.5, 0.5)), (0.0, (1 / 3, 1 / 3, 1 / 3))]
+    )
+    def test_that_touch_are_struck_in_one_impact(self, gap, e, after):
+        """The first one comes from a distance, or touches: Moreau's law for all three."""
+        run = balls([gap, 0.0], [e, e], [1.0, 0.0, 0.0])
+        assert_allclose(run.velocity(1.0), after, atol=1e-15)
+        assert run.ledger.impact == pytest.approx(0.5 - 0.5 * float(np.square(after).sum()), abs=1e-15)
+
+    def test_that_do_not_touch_hand_the_speed_on(self):
+        run = balls([0.1, 1e-9, 1e-9], [1.0] * 3, [1.0, 0.0, 0.0, 0.0])
+        assert_allclose(run.velocity(1.0), [0.0, 0.0, 0.0, 1.0], atol=1e-12)
+
+    def test_driven_back_to_their_neighbour_strike_again_at_once(self):
+        """A heavy ball between two light ones that come: admissible and without a gain, whatever the sequence."""
+        run = balls([0.0, 0.0, 0.0], [1.0] * 3, [2.0, 0.3, 0.3, -1.0])
+        after = run.velocity(1.0)
+        assert np.all(np.diff(after) >= -1e-12)
+        assert float(after @ after) == pytest.approx(4 + 0.18 + 1, rel=1e-13)
+        assert np.sum(after) == pytest.approx(1.6, rel=1e-13)
+
+    def test_of_several_restitutions_are_refused_by_name(self):
+        run = balls([0.0, 0.0], [0.5, 0.9], [1.0, 0.0, -1.0])
+        assert run.status == "failed"
+        assert "c0, c1: struck together with several restitutions" in run.message
+
+    def test_of_which_only_one_strikes_may_have_several(self):
+        run = balls([0.0, 0.0], [0.5, 0.9], [1.0, 0.0, 0.0])
+        assert run.status == "ok"
+        assert_allclose(run.velocity(1.0), [0.0, 0.5, 0.5], atol=1e-15)
+
+    def test_that_are_not_coupled_may_have_several(self):
+        structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"a": 0, "b": 1})
+        floors = [mp.UnilateralContact(at, at, 1.0, restitution=e) for at, e in (("a", 0.5), ("b", 0.9))]
+        run = mp.simulate(mp.MultiPhiModel(structure, floors, modes="all"), 1.5, velocity=[-1.0, -1.0])
+        assert_allclose(run.velocity(1.5), [0.5, 0.9], rtol=1e-14)
+
+
+def test_a_moving_stop_gives_its_speed_on():
+    """Struck at rest by a stop that rises at s: it leaves with (1 + e) s."""
+    structure = mp.LinearStructure([[2.0]], [[0.0]], points={"m": 0})
+    model = mp.MultiPhiModel(structure, [mp.UnilateralContact("table", "m", 0.3, restitution=0.6)], modes="all")
+    run = mp.simulate(model, 0.4, loads=[mp.StopMotion("table", Harmonic(0.5, 1.0, -math.pi / 2))])
+    strike = math.asin(0.6) / (2 * math.pi)
+    assert run.events[0].time == pytest.approx(strike, rel=1e-12)
+    assert run.velocity(0.4)[0] == pytest.approx(1.6 * 0.5 * 2 * math.pi * 0.8, rel=1e-12)
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-13)
+
+
+def integrated(structure, row, gap, e, velocity, t_end):
+    """Times of the strikes and the last state, by DOP853 from strike to strike."""
+    mass, stiffness, n = np.asarray(structure.mass), np.asarray(structure.stiffness), len(row)
+    state, t, times, push = np.concatenate([np.zeros(n), velocity]), 0.0, [], np.linalg.solve(mass, row)
+
+    def slope(_, z):
+        return np.concatenate([z[n:], -np.linalg.solve(mass, stiffness @ z[:n])])
+
+    def reached(_, z):
+        return row @ z[:n] + gap
+
+    reached.terminal, reached.direction = True, -1.0
+    while True:
+        found = scipy.integrate.solve_ivp(slope, (t, t_end), state, "DOP853", events=reached, rtol=1e-12, atol=1e-14)
+        t, state = found.t[-1], found.y[:, -1].copy()
+        if found.status == 0:
+            return times, state
+        times.append(t)
+        state[n:] -= push * (1 + e) * (row @ state[n:]) / (row @ push)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flexible_structures_strike_as_an_integrator_says(seed):
+    n, mass, stiffness, _, random = random_structure(seed)
+    structure = mp.LinearStructure(mass, stiffness, points={f"m{i}": i for i in range(n)})
+    velocity, e = random.normal(size=n), 0.7
+    stop = mp.UnilateralContact("stop", f"m{n - 1}", 0.05, restitution=e)
+    run = mp.simulate(mp.MultiPhiModel(structure, [stop], modes="all"), 2.0, velocity=velocity)
+    times, state = integrated(structure, np.eye(n)[n - 1], 0.05, e, velocity, 2.0)
+    assert run.status == "ok"
+    assert_allclose([event.time for event in run.events if event.kind == "close"], times, rtol=1e-9)
+    assert_allclose(run.displacement(2.0), state[:n], rtol=0, atol=1e-8)
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-12 * run.ledger.initial)
+
+
+@pytest.mark.parametrize("e", [0.5, 0.9])
+def test_on_a_spring_a_long_sequence_of_bounces_is_no_chatter(e):
+    """Pressed to its stop by its spring: it comes to rest, and stays."""
+    model = mp.MultiPhiModel(chain(1), [mp.UnilateralContact("stop", "m0", -0.2, restitution=e)], modes="all")
+    run = mp.simulate(model, 60.0, displacement=[1.0])
+    assert run.status == "ok"
+    assert run.contact_intervals("stop")[-1][1] == 60.0
+    assert run.at("m0", 60.0) == pytest.approx(0.2, abs=1e-15)
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("modes", [6, 12])
+def test_a_truncated_beam_rebounds_and_its_ledger_closes(modes):
+    beam = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
+    support = mp.UnilateralContact("support", "node2", 1.35e-3, restitution=0.5)
+    model = mp.MultiPhiModel(beam, [support], modes=modes)
+    start = mp.MultiPhiModel(beam, [], modes="all").static_equilibrium({"node3": 1.0})
+    run = mp.simulate(model, 0.2, displacement=start * 0.02 / float(beam.row("node3") @ start))
+    assert run.status == "ok"
+    assert run.ledger.impact > 0
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-10 * run.ledger.initial)

@@ -1,0 +1,157 @@
+"""Several rigid friction elements: which stick and which slip is decided together, redundant ones included.
+
+Compared with an integrator of its own: matrix exponentials in steps, events by bisection, and at each of them all 3^k
+states tried, of which that is taken whose motion is admissible right after.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+import scipy.linalg
+from numpy.testing import assert_allclose
+from small_structures import chain
+
+import multiphi_exudyn as mp
+
+AHEAD, STEP = 1e-5, 5e-3
+
+
+class Integrator:
+    """M x'' + K x = f - H^T T, |T| <= limits."""
+
+    def __init__(self, mass, stiffness, load, rows, limits):
+        self.push, self.stiffness, self.load, self.rows, self.limits = (
+            np.linalg.inv(mass), stiffness, load, rows, limits,
+        )  # fmt: skip
+        self.n = len(mass)
+
+    def parts(self, states):
+        """Those that stick, what they bear per force, the forces of the others and the loads."""
+        stuck = [i for i, state in enumerate(states) if state == 0]
+        force = self.load - self.rows.T @ (np.array(states) * self.limits)
+        rows = self.rows[stuck]
+        bears = np.linalg.pinv(rows @ self.push @ rows.T, rcond=1e-10) @ rows @ self.push
+        return stuck, bears, force
+
+    def after(self, states, z, time):
+        n, (stuck, bears, force) = self.n, self.parts(states)
+        free = self.push @ (np.eye(n) - self.rows[stuck].T @ bears)
+        matrix = np.zeros((2 * n + 1, 2 * n + 1))
+        matrix[:n, n:-1], matrix[n:-1, :n], matrix[n:-1, -1] = np.eye(n), -free @ self.stiffness, free @ force
+        return scipy.linalg.expm(matrix * time) @ z
+
+    def signals(self, states, z):
+        stuck, bears, force = self.parts(states)
+        borne = bears @ (force - self.stiffness @ z[: self.n])
+        slips = [state * (row @ z[self.n : -1]) for state, row in zip(states, self.rows, strict=True) if state]
+        return np.concatenate([self.limits[stuck] - np.abs(borne), slips])
+
+    def decided(self, states, z):
+        speeds = self.rows @ z[self.n : -1]
+        resting = np.abs(speeds) <= 1e-9 * (1 + np.max(np.abs(z)))
+        choices = [(0, 1, -1) if rests else (int(np.sign(v)),) for rests, v in zip(resting, speeds, strict=True)]
+        for new in sorted(itertools.product(*choices), key=lambda new: np.count_nonzero(np.subtract(new, states))):
+            start, rows = z.copy(), self.rows[self.parts(new)[0]]
+            start[self.n : -1] -= self.push @ rows.T @ np.linalg.pinv(rows @ self.push @ rows.T) @ rows @ z[self.n : -1]
+            if all(np.all(self.signals(new, self.after(new, start, t)) >= -1e-10) for t in (AHEAD / 2, AHEAD)):
+                return new, start
+        raise AssertionError("no state is admissible")
+
+    def run(self, displacement, velocity, t_end):
+        z, t = np.concatenate([displacement, velocity, [1.0]]), 0.0
+        states, z = self.decided((0,) * len(self.rows), z)
+        while t < t_end:
+            low, high = 0.0, min(STEP, t_end - t)
+            ahead = self.after(states, z, high)
+            if np.all(self.signals(states, ahead) >= -1e-11):
+                z, t = ahead, t + high
+                continue
+            while high - low > 1e-15:
+                middle = (low + high) / 2
+                wrong = np.any(self.signals(states, self.after(states, z, middle)) < -1e-13)
+                low, high = (low, middle) if wrong else (middle, high)
+                if middle in (low, high) and high - low < 1e-14:
+                    break
+            z, t = self.after(states, z, high), t + high
+            states, z = self.decided(states, z)
+        return z[: self.n]
+
+
+def elements(rows, limits):
+    return [mp.Friction(f"f{i}", row, limit) for i, (row, limit) in enumerate(zip(rows, limits, strict=True))]
+
+
+def simulated(mass, stiffness, load, rows, limits, displacement, velocity, t_end):
+    structure, n = mp.LinearStructure(mass, stiffness), len(mass)
+    model = mp.MultiPhiModel(structure, elements(rows, limits), modes="all")
+    loads = [mp.ConstantLoad(np.eye(n)[i], load[i]) for i in range(n)]
+    return mp.simulate(model, t_end, displacement=displacement, velocity=velocity, loads=loads)
+
+
+@pytest.mark.parametrize("redundant", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_random_ones_move_as_an_integrator_says(seed, redundant):
+    """Also without springs, where all come to rest at one instant; redundant: more of them than unknowns."""
+    random = np.random.default_rng(100 + seed)
+    n, turn = int(random.integers(1, 4)), random.normal(size=(3, 3))
+    k = n + 2 if redundant else n
+    mass, stiffness = np.diag(random.uniform(0.5, 2, n)), (turn @ turn.T)[:n, :n] * random.choice([0.0, 2.0])
+    rows, limits = random.normal(size=(k, n)), np.round(random.uniform(0.1, 0.6, k), 1)
+    load, start = random.normal(size=n), (random.normal(size=n), random.normal(size=n))
+    run = simulated(mass, stiffness, load, rows, limits, *start, 3.0)
+    assert run.status == "ok"
+    assert_allclose(run.displacement(3.0), Integrator(mass, stiffness, load, rows, limits).run(*start, 3.0), atol=1e-8)
+
+
+def test_two_on_one_point_are_one_with_the_sum_of_their_limits():
+    structure, load = mp.LinearStructure([[1.0]], [[4.0]], points={"m": 0}), mp.HarmonicLoad("m", 1.0, 0.2)
+    runs = [
+        mp.simulate(mp.MultiPhiModel(structure, elements(["m"] * len(limits), limits), modes="all"), 20.0, loads=[load])
+        for limits in ([0.3], [0.1, 0.2], [0.2, 0.05, 0.05])
+    ]
+    t = np.linspace(0, 20, 201)
+    assert [run.status for run in runs] == ["ok"] * 3
+    for run in runs[1:]:
+        assert_allclose(run.at("m", t), runs[0].at("m", t), rtol=0, atol=1e-14)
+        assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_body_on_three_pads_turns_and_comes_to_rest():
+    """Two unknowns, three pads: the same as an integrator, and it rests for ever."""
+    mass, rows, limits = np.diag([3.0, 1.0]), np.array([[1.0, -1.0], [1.0, 0.0], [1.0, 1.0]]), np.full(3, 0.3)
+    given = mass, np.zeros((2, 2)), np.zeros(2), rows, limits
+    run = simulated(*given, np.zeros(2), [1.0, 0.8], 20.0)
+    assert run.status == "ok"
+    assert_allclose(run.displacement(4.0), Integrator(*given).run(np.zeros(2), [1.0, 0.8], 4.0), atol=1e-9)
+    assert np.all(run.velocity(20.0) == 0.0)
+
+
+def test_blocks_that_slide_together_stop_together():
+    model = mp.MultiPhiModel(chain(4, ends=0), elements(["m0", "m1", "m2", "m3"], [0.3] * 4), modes="all")
+    run = mp.simulate(model, 20.0, velocity=np.ones(4))
+    assert [(event.time, event.kind) for event in run.events] == [(pytest.approx(1 / 0.3, rel=1e-14), "stick")] * 4
+    assert_allclose(run.displacement(20.0), 1 / 0.6, rtol=1e-13)
+
+
+def test_mirrored_blocks_are_mirrored():
+    model = mp.MultiPhiModel(chain(5, ends=0), elements([f"m{i}" for i in range(5)], [0.3] * 5), modes="all")
+    start = np.linspace(0, 2, 5) ** 2
+    runs = [mp.simulate(model, 20.0, displacement=sign * start) for sign in (1, -1)]
+    assert [event.time for event in runs[0].events] == [event.time for event in runs[1].events]
+    assert np.array_equal(runs[0].displacement(20.0), -runs[1].displacement(20.0))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+def test_what_sticks_bears_no_impulse(gap, e):
+    """A free block strikes one that friction holds: half of the speed, and rebound, then 2 F of both or F of one."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"a": 0, "b": 1})
+    contact = mp.UnilateralContact("ab", {"b": 1.0, "a": -1.0}, gap, restitution=e)
+    model = mp.MultiPhiModel(structure, [contact, mp.Friction("floor", "b", 0.1)], modes="all")
+    run = mp.simulate(model, gap + 1.0, velocity=[1.0, 0.0])
+    assert run.status == "ok"
+    after = np.array([1 - e, 1 + e]) / 2
+    lost = [0.05, 0.05] if e == 0 else [0.0, 0.1]
+    assert_allclose(run.velocity(gap + 1.0), after - lost, rtol=1e-12)
+    assert run.ledger.impact == pytest.approx(0.25 * (1 - e**2), rel=1e-12)
