@@ -93,13 +93,13 @@ ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED
 HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
 
-JUDGED = 113  # whether levels leave modes out, so that defects are added up
+JUDGED = 211  # whether levels leave modes out, so that defects are added up
 
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
 LIMITS, STATIC_LIMITS, TOGETHER = 200, 201, 202  # of rigid friction, zero of others; whether it has been decided
-RUN_INTS = 211
+RUN_INTS = 212
 
 # ---------------------------------------------------------------------- run record, numbers
 

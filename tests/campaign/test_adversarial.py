@@ -311,7 +311,7 @@ class TestTheChecksSee:
     def test_the_lowest_value_between_samples(self):
         """1 - 1e-9 + cos(omega t) dips 1e-9 below zero for an instant that 24 samples a period do not meet."""
         run = run_of(built(self.CASE), t_end=0.01)
-        signal = Signal(run.segments[0], 0, False)
+        signal = Signal(run.segments[0], 0, "gap", 1.0, 0.0)
         signal.basis = dataclasses.replace(signal.basis, rates=np.array([1j]), powers=np.zeros(1, int))
         signal.coefficients, signal.constant = np.ones(1, complex), 1 - 1e-9
         assert signal.lowest(5.0, 24.0) == pytest.approx((-1e-9, math.pi), rel=1e-4)

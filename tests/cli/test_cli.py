@@ -62,10 +62,10 @@ def test_end_time_and_folder_are_taken_from_the_command_line(scene, tmp_path):
 def test_a_failed_model_is_exit_code_1_and_still_a_report(scene, tmp_path, monkeypatch, capsys):
     simulate = reduced_runner.simulate
 
-    def failing(model, t_end, displacement, loads):
+    def failing(model, t_end, start, loads):
         if model.modes == 6:
             raise RuntimeError("did not converge\nat 0.02 s")
-        return simulate(model, t_end, displacement=displacement)
+        return simulate(model, t_end, start=start)
 
     monkeypatch.setattr(reduced_runner, "simulate", failing)
     assert cli.main(["compare", scene]) == 1

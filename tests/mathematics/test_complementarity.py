@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from flat_records import as_they_are, complementary
+from buffer_records import as_they_are, complementary
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose

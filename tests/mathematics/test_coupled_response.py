@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flat_records import Buffers
+from buffer_records import Buffers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
