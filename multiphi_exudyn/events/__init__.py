@@ -10,12 +10,13 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
     2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, independence.join
     3       a rigid contact opens         switching.is_firm, switching.open_and_enter
-    4       a compliant contact changes   switching.try_wishes, switching.switch
+    4       a compliant contact changes   switching.try_wishes, switching.switch, phases.is_denied
     5       recovering                    phases.phase_of, waiting.watch
     6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again
     7       a viscous contact             switching.is_relaxing
     8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
+    10      a contact with friction       changes.turn_wishes, phases.is_denied
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 

@@ -7,8 +7,8 @@ record    where                   what stands in it
 --------  ----------------------  -------------------------------------------------------------------------------------
 run       ints[0 ...]             sizes, where tables and scratch memory begin, states, counts, what is needed, causes
           numbers[0 ...]          times, energies lost, what a failure is told with
-element   ints[ints[KINDS] + i]   COMPLIANT, RIGID, VISCOUS or SLIDING; chain, stiffness, direction (m,), and the
-                                  stretch that its link keeps where it does not hold, in tables of their own
+element   ints[ints[KINDS] + i]   COMPLIANT, RIGID, VISCOUS or SLIDING; chain, stiffness, direction (m,), and what
+                                  friction does with its spring, in tables of their own
 level     ints[level ...]         its key (c,), a small integer for every element; sizes; where its parts begin:
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
@@ -16,7 +16,8 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
                                   f.xi', as in work.py;
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
-                                  that the element would have in the level entered alone, -1 while nobody needed it
+                                  that the element would have in the level entered alone, -1 while nobody needed it;
+                                  the speed on which the state asked for hangs, and the others
 signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
                                   are set, of which terms T and c are sums, (n_m, n_l + 1), else -1
@@ -24,7 +25,7 @@ state     ints[state ...]         level, where xi, xi' and their scales stand, t
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
           SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
-event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event)
+event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event), left
           EVENT_NUMBERS           time, six losses, impulse
 
 A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
@@ -42,7 +43,12 @@ __all__ = ["Buffers"]
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 PRESCRIBED = 46  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
 KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
-STRETCHES = 113
+STICKS, HELD_LINKS, SPRINGS, DROPS = (
+    113,
+    114,
+    115,
+    116,
+)  # of friction: sticking state, link, spring, what slip drops
 LEVELS, LEVEL_SLOTS, MAPS, MAP_SLOTS = 9, 10, 11, 12  # tables by key
 PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
     13,
@@ -103,16 +109,18 @@ BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4
 COMPLIANT, RIGID, VISCOUS, SLIDING = 0, 1, 2, 3
 FRESH, GOING_ON = 1, 2
 OPEN, CLOSE = 0, 1  # states of a contact
-STICK = 0  # of friction
 ARMED, RECOVERING, REFUSED, HELD_BACK = 0, 1, 2, 3
 
 NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
 DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
-LEVEL_INTS = 24
+RUBBINGS = 23  # how many forces of friction go with others in the last of them
+FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
+LEVEL_INTS = 26
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
-EXIT_INTS = 7
+TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then
+EXIT_INTS = 12
 ROW, WAVE, RATED = 0, 1, 2
 
 MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS = 0, 1, 2, 3, 5
@@ -123,10 +131,10 @@ LEVEL, PLACE, SPEED, REACH, SWING, PHASES, SETTLED = 0, 1, 2, 3, 4, 5, 6
 STATE_INTS = 8
 
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
-CHANGE_WIDTH = 2  # ints: element, state entered or SHARED
+CHANGE_WIDTH = 3  # ints: element, state entered or SHARED, state left
 SHARED = -1
 SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
-EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 2, 8
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 8
 
 # ---------------------------------------------------------------------- answers
 

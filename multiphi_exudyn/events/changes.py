@@ -6,12 +6,19 @@ Sets of elements are flags (c,) in the ints; who asks, the state that each asks 
 from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
+    ASKED,
+    BACKWARD,
     CHANGE_COUNT,
     CHANGE_IMPULSES,
     CHANGE_WIDTH,
     CHANGES,
     CLOSE,
+    ELEMENT,
     ELEMENTS,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FORWARD,
     KINDS,
     LEVEL,
     LOSSES,
@@ -21,15 +28,17 @@ from multiphi_exudyn.events.arrays import (
     RIGID,
     STATES,
     TRANSITIONS_NOW,
+    TURN,
     WORKED,
 )
 from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
+from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
-__all__ = ["NOBODY", "clear", "enter", "flag_asking", "is_held", "note", "transfer"]
+__all__ = ["NOBODY", "clear", "enter", "flag_asking", "is_held", "note", "transfer", "turn_wishes"]
 
 NOBODY = -1  # in place of the state that an element asks for
 
@@ -39,6 +48,19 @@ def flag_asking(ints: Ints, asking: int, flags: int) -> None:
     """Flags (c,) of those that ask."""
     for i in range(ints[ELEMENTS]):
         ints[flags + i] = 1 if ints[asking + i] != NOBODY else 0
+
+
+@compiled
+def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
+    """10. Where the state that an element of WORKED asks for hangs on a speed, the one that belongs to its sign."""
+    level = ints[WORKED + LEVEL]
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        element = ints[exit_ + ELEMENT]
+        if ints[exit_ + TURN] >= 0 and ints[asking + element] == ints[exit_ + ASKED]:
+            sign = row_sign(ints, numbers, WORKED, exit_ + TURN)
+            if sign != 0:
+                ints[asking + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
 
 
 @compiled
@@ -54,6 +76,7 @@ def note(ints: Ints, numbers: Numbers, element: int, entered: int, impulse: floa
     k = ints[CHANGE_COUNT]
     ints[ints[CHANGES] + k * CHANGE_WIDTH] = element
     ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] = entered
+    ints[ints[CHANGES] + k * CHANGE_WIDTH + 2] = ints[ints[ints[WORKED + LEVEL] + STATES] + element]
     numbers[ints[CHANGE_IMPULSES] + k] = impulse
     ints[CHANGE_COUNT] = k + 1
 

@@ -14,12 +14,13 @@ In xi every gap and contact force is again linear. Without channels xi = eta, an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from multiphi_exudyn.events.excitation import Excitation, columns
 from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
@@ -65,7 +66,22 @@ class Channels:
 
     @classmethod
     def of(cls, level: Level, excitation: Excitation) -> Channels:
-        """Of a level under an excitation."""
+        """Of a level under an excitation; contacts that slide have the friction that goes with their forces."""
+        if not isinstance(level, SlidingLevel):
+            return cls._of(level, excitation, level)
+        plain = cls._of(level.plain, excitation, level)
+        prescribed, sliders = np.arange(plain.force.shape[1]) < excitation.prescribed, list(level.sliders)
+        contact_force = np.where(prescribed, level.answered(plain.contact_force), plain.contact_force)
+        contact_rate = level.answered(plain.contact_force_rate)
+        force = plain.force + prescribed * (level.pulled @ contact_force[sliders])
+        rate = plain.force_rate + level.pulled @ contact_rate[sliders]
+        return replace(
+            plain, force=force, force_rate=rate, contact_force=contact_force, contact_force_rate=contact_rate
+        )
+
+    @classmethod
+    def _of(cls, level: Level, excitation: Excitation, still: Level) -> Channels:
+        """Of a level without friction; still: the one whose state of rest is meant where channels are constant."""
         base, index = level.base, list(level.indices)
         rigid = np.isinf(base.stiffnesses[index])
         stops, directions = excitation.stops[index], base.directions[:, index]
@@ -77,6 +93,9 @@ class Channels:
         forces_loaded = np.where(rigid[:, None], drop_round_off(forces_loaded, sizes), forces_loaded)
         unloaded = np.zeros_like(excitation.patterns)
         moved, forces_moved = _at_rest(level, unloaded, -stops)
+        if still is not level:
+            constant = slice(excitation.prescribed, None)
+            moved[:, constant], forces_moved[:, constant] = _at_rest(still, unloaded[:, constant], -stops[:, constant])
         carried, _ = _at_rest(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
         centre = _centre(force, level.computed)
         loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # of all modes nothing is left out

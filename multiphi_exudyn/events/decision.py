@@ -24,7 +24,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> switching.is_firm, switching.open_and_enter
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
-   -> switching.try_wishes, switching.switch
+   -> switching.try_wishes, switching.switch, phases.is_denied
 5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
    armed when s reaches zero, and asks again if s turns down before.
    -> phases.phase_of, waiting.watch
@@ -42,6 +42,10 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
 9. A sign is that of the first derivative that is not round-off.
    -> signals.row_sign, signals.rate_sign, phases.becomes
+10. A contact with friction that closes sticks where it hits; without a spring it slides in the direction in which it
+   moves, and sticks where it does not. Whether it goes on sticking, or sliding, does not keep it from closing: what
+   is always taken is decided after it, at the same instant.
+   -> changes.turn_wishes, phases.is_denied
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
@@ -99,7 +103,7 @@ from multiphi_exudyn.events.arrays import (
     TRANSITIONS_NOW,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held
+from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held, turn_wishes
 from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
@@ -254,6 +258,7 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
     HEARD: all that touch at this instant. FREED: those of them whose reaction has fallen to zero at it.
     """
     c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
+    turn_wishes(ints, numbers, asking)
     strikes, before = 0, ints[CHANGE_COUNT]
     clear(numbers, LOST_NOW)
     for i in range(c):

@@ -6,22 +6,26 @@ from multiphi_exudyn.events.arrays import (
     CARRIED,
     CHANNELS,
     DAMPING,
+    DROPS,
     ELEMENTS,
+    FOLLOW_COUNT,
+    FOLLOWS,
     FRICTION,
+    HELD_LINKS,
     KINDS,
     KINETIC,
     LEVEL,
     MODES,
+    OPEN,
     PATTERNS,
     PLACE,
     POTENTIAL,
-    SLIDING,
     SPEED,
+    SPRINGS,
     STATES,
-    STICK,
+    STICKS,
     STIFFNESSES,
     STRAIN,
-    STRETCHES,
     VISCOUS,
 )
 from multiphi_exudyn.events.signals import gap
@@ -66,6 +70,13 @@ def potential(ints: Ints, numbers: Numbers, state: int) -> float:
         for j in range(q):
             total += 0.5 * numbers[row + r + j] * numbers[x + r + j] * numbers[x + r + k]
         row += n
+    row = ints[level + FOLLOWS]
+    for _ in range(ints[level + FOLLOW_COUNT]):
+        stretch = numbers[row + n]
+        for i in range(n):
+            stretch += numbers[row + i] * numbers[x + i]
+        total += 0.5 * stretch * stretch
+        row += n + 1
     return total
 
 
@@ -94,13 +105,15 @@ def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float,
     relaxed, dropped = 0.0, 0.0
     states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
-        if ints[ints[KINDS] + i] == VISCOUS and ints[states + i] != ints[later + i]:
+        opened, opens = ints[states + i] == OPEN, ints[later + i] == OPEN
+        if ints[ints[KINDS] + i] == VISCOUS and opened != opens:
             depth = gap(ints, numbers, before, i)
             stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
-            relaxed += stored if ints[states + i] > ints[later + i] else -stored
-        if ints[ints[KINDS] + i] == SLIDING and ints[states + i] == STICK and ints[later + i] != STICK:
-            stretch, kept = gap(ints, numbers, before, i), numbers[ints[STRETCHES] + i]
-            dropped += 0.5 * numbers[ints[STIFFNESSES] + i] * (stretch * stretch - kept * kept)
+            relaxed += stored if opens else -stored
+        sticks = ints[ints[STICKS] + i]
+        if sticks >= 0 and ints[states + i] == sticks and ints[later + i] != sticks:
+            stretch = gap(ints, numbers, before, ints[ints[HELD_LINKS] + i])
+            dropped += 0.5 * numbers[ints[SPRINGS] + i] * stretch * stretch * numbers[ints[DROPS] + i]
     numbers[losses + KINETIC] += kinetic(ints, numbers, before) - kinetic(ints, numbers, after) - collided
     numbers[losses + STRAIN] += potential(ints, numbers, before) - potential(ints, numbers, after) - relaxed - dropped
     numbers[losses + DAMPING] += relaxed

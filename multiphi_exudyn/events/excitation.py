@@ -104,10 +104,10 @@ class Excitation:
         channels.add_surfaces()
         channels.add_static(static_load(model, loads))
         patterns = columns(channels.patterns, base.modes.count)
-        stops = columns(channels.stops, len(model.contacts))
+        stops = columns(channels.stops, len(model.links))
         if model.held:
             patterns = np.hstack([patterns, np.zeros((base.modes.count, len(model.held)))])
-            stops = np.hstack([stops, np.eye(len(model.contacts))[:, list(model.held)]])
+            stops = np.hstack([stops, np.eye(len(model.links))[:, list(model.held)]])
         rate_of = *channels.rate_of, *(-1 for _ in model.held)
         found = cls(channels.static, patterns, stops, tuple(channels.histories), rate_of, end)
         if found.effort(end) > MOST_EFFORT:
@@ -204,7 +204,7 @@ class _Channels:
         elif isinstance(load, StopMotion):
             self._check_stop(load.contact)
             stop = self._no_stop()
-            stop[self._model.index(load.contact)] = 1.0
+            stop[self._model.pressing_links(self._model.index(load.contact))] = 1.0
             self._check_smooth(stop, load.course)
             self._move(stop, self._history(load.course))
         elif isinstance(load, BaseMotion):
@@ -217,7 +217,7 @@ class _Channels:
 
     def add_surfaces(self) -> None:
         """Counter-surfaces that move, each with its constant speed, are one channel: the time."""
-        speeds = np.array([contact.velocity for contact in self._model.contacts])
+        speeds = np.array([link.velocity for link in self._model.links])
         if np.any(speeds):
             self._move(speeds, PiecewiseExponential.line(1.0))
 
@@ -243,8 +243,8 @@ class _Channels:
         fixed = self._no_stop()
         for name in load.fixed_stops:
             self._check_stop(name)
-            i = self._model.index(name)
-            fixed[i] = -float(structure.row(self._model.contacts[i].direction) @ moved)
+            for k in self._model.link_places[self._model.index(name)]:
+                fixed[k] = -float(structure.row(self._model.links[k].direction) @ moved)
         if np.any(fixed):
             self._check_smooth(fixed, load.course)
             self._move(fixed, self._history(load.course))
@@ -256,7 +256,7 @@ class _Channels:
 
     def _check_smooth(self, stop: np.ndarray, course: TimeFunction) -> None:
         """Refuse samples where they move a rigid contact's stop."""
-        rigid = [c.name for c, moves in zip(self._model.contacts, stop, strict=True) if moves and c.rigid]
+        rigid = [link.name for link, moves in zip(self._model.links, stop, strict=True) if moves and link.rigid]
         if rigid and isinstance(course, Sampled):
             raise MultiPhiTypeError(
                 f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
@@ -266,7 +266,7 @@ class _Channels:
         """Stops that move by their entries of (c,) times a history."""
         nothing = np.zeros(self._model.base.modes.count)
         self._append(nothing, stop, history)
-        moving = [contact for contact, moves in zip(self._model.contacts, stop, strict=True) if moves]
+        moving = [link for link, moves in zip(self._model.links, stop, strict=True) if moves]
         rigid = [contact.name for contact in moving if contact.rigid]
         viscous = [contact.name for contact in moving if contact.damping]
         if rigid or viscous:
@@ -295,7 +295,7 @@ class _Channels:
         return self._model.base.modal_load(self._model.structure.row(at))
 
     def _no_stop(self) -> np.ndarray:
-        return np.zeros(len(self._model.contacts))
+        return np.zeros(len(self._model.links))
 
     def _history(self, course: TimeFunction) -> PiecewiseExponential:
         """The course of the load that is added; what is wrong with it is told with the load's name."""

@@ -38,13 +38,16 @@ def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
     """s of an element's exit in a level."""
-    own = level.level
-    position, rate = exit_.gap * own.gap_rows[element], exit_.rate * own.gap_rows[element]
-    constant = exit_.constant + exit_.gap * float(level.gap_constants[element])
-    if exit_.force:
-        k = own.indices.index(element)
-        position, rate = position + exit_.force * own.force_rows[k], rate + exit_.force * own.force_rate_rows[k]
-        constant += exit_.force * float(level.asymptotic.forces[k])
+    own, constant = level.level, exit_.constant
+    position, rate = np.zeros(own.modes), np.zeros(own.modes)
+    for share in exit_.shares:
+        link = own.base.link_places[element][share.link]
+        position, rate = position + share.gap * own.gap_rows[link], rate + share.rate * own.gap_rows[link]
+        constant += share.gap * float(level.gap_constants[link])
+        if share.force:
+            k = own.indices.index(link)
+            position, rate = position + share.force * own.force_rows[k], rate + share.force * own.force_rate_rows[k]
+            constant += share.force * float(level.asymptotic.forces[k])
     return Row(position, rate, constant)
 
 

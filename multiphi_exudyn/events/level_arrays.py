@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.least_distance_arrays import least_distance_ints, least_distance_numbers
-from multiphi_exudyn.mechanics.element import Exit
+from multiphi_exudyn.mechanics.element import Exit, Share, friction_spring
 
 __all__ = ["LevelArrays"]
 
@@ -226,8 +226,8 @@ class LevelArrays:
         take("numbers", a.RUN_NUMBERS)
         base, c = model.base, len(model.contacts)
         viscous = base.dampings > 0
-        kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))
-        kinds[list(model.held)] = a.SLIDING
+        kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))[:c]
+        kinds[[i for i in model.held if i < c]] = a.SLIDING
         chains = np.full(c, -1)
         for number, chain in enumerate(model.chains):
             chains[list(chain)] = number
@@ -240,15 +240,27 @@ class LevelArrays:
             a.KINDS: put("ints", kinds),
             a.CHAINS: put("ints", chains),
             a.CHAIN_COUNT: len(model.chains),
-            a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)),
-            a.STRETCHES: put("numbers", [max(state.stretch for state in c.states) for c in model.contacts]),
-            a.DIRECTIONS: put("numbers", units.T),
+            a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
+            a.DIRECTIONS: put("numbers", units[:, :c].T),
+            **self._frictions(),
         }
         for slot, value in given.items():
             self.ints[slot] = value
         self.numbers[a.INDEPENDENCE] = INDEPENDENT
         self._rehash(SLOTS, SLOTS)
         self._reserve_sets(c, int(np.sum(kinds == a.RIGID)))
+
+    def _frictions(self) -> dict[int, int]:
+        """What the elements with a held link do with its spring."""
+        model, put = self.levels.model, self.buffers.put
+        found = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
+        places = [links[int(row[1])] for links, row in zip(model.link_places, found, strict=True)]
+        return {
+            a.STICKS: put("ints", found[:, 0]),
+            a.HELD_LINKS: put("ints", places),
+            a.SPRINGS: put("numbers", found[:, 2]),
+            a.DROPS: put("numbers", found[:, 3]),
+        }
 
     def _reserve_sets(self, c: int, rigid: int) -> None:
         """Scratch memory that depends on the number of elements alone."""
@@ -313,7 +325,7 @@ class LevelArrays:
             "ints": {a.WAITING: 2 * signals, a.FALLEN: signals},
             "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 2 * p}
             | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)}
-            | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: 2 * room, a.FLOW_FORCED: q * room * n},
+            | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: (2 + p) * room, a.FLOW_FORCED: q * room * n},
         }
 
     def _carry_over(self, state: int, old: np.ndarray) -> None:
@@ -378,6 +390,7 @@ class LevelArrays:
             a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
             a.CARRIED: -1,
             a.MOBILITY: -1,
+            a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
             **{slot: put("numbers", values) for slot, values in parts.items()},
         }
         given.setdefault(a.SPEEDS, given[a.GAPS])
@@ -397,10 +410,11 @@ class LevelArrays:
     def add_powers(self, level: int) -> None:
         """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
-            damping, varying, rubbing = powers(self.loaded[int(self.ints[level + a.NUMBER])])
+            damping, varying, rubbing, pairs = powers(self.loaded[int(self.ints[level + a.NUMBER])])
             self.ints[level + a.DISSIPATION] = self.buffers.put("numbers", (damping + damping.T) / 2)
             self.ints[level + a.POWER] = self.buffers.put("numbers", varying)
-            self.ints[level + a.RUBBING] = self.buffers.put("numbers", rubbing)
+            self.ints[level + a.RUBBING] = self.buffers.put("numbers", np.append(rubbing, pairs))
+            self.ints[level + a.RUBBINGS] = len(pairs)
 
     @property
     def most(self) -> tuple[int, int]:
@@ -415,12 +429,14 @@ class LevelArrays:
         """The record of a level's response (response_arrays.py)."""
         response, put = level.response, self.buffers.put
         maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-        alone = (level.squares == 0) & ~np.any(level.damping, axis=1) | response.diagonal
-        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
-        basis, reached = self._basis(response.basis), self.buffers.take("ints", 2 * len(poles))
+        basis, reached = self._basis(response.basis), self.buffers.take("ints", 2 * len(response.poles))
         places = [put("waves", values) for values in maps]
         places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
-        places += [put("ints", alone), put("ints", poles)]
+        chains = [len(response.chains)]
+        for chain in response.chains:
+            parts = chain.mixing, chain.shapes.T, chain.pushes
+            chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
+        places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
         record = put("ints", [level.modes, basis, reached, *places])
         response_arrays.reached_modes(self.ints, self.buffers.waves, record)
         return record
@@ -439,8 +455,17 @@ class LevelArrays:
         for k, (i, exit_) in enumerate(exits):
             asked = after(level, i, exit_)[i]
             values = [i, asked, exit_.firmness, *self._signal(level, signal_row(level, i, exit_)), -1]
+            values += self._turn(level, i, exit_)
             self.ints[records + a.EXIT_INTS * k : records + a.EXIT_INTS * (k + 1)] = values
         return records
+
+    def _turn(self, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
+        """The signal of the speed that may turn an exit, and the states that it asks for then."""
+        if exit_.turn is None:
+            return [-1] * (a.EXIT_INTS - a.TURN)
+        speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
+        asked = [after(level, element, Exit(name))[element] for name in (exit_.turn.forward, exit_.turn.backward)]
+        return [*self._signal(level, speed), *asked]
 
     def _signal(self, level: LoadedLevel, row: Row) -> list[int]:
         """A signal's record."""
@@ -453,11 +478,12 @@ class LevelArrays:
         """The signal that an exit's element would have in the level entered alone."""
         level = self.loaded[int(self.ints[source + a.NUMBER])]
         element, exit_ = exits_of(level)[exit_number]
-        target = self.loaded[int(self.ints[self.level(after(level, element, exit_)) + a.NUMBER])]
+        entered = self.level(after(level, element, exit_))  # may make the buffers anew
+        target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
-        entered = self.buffers.put("ints", self._signal(level, row))
+        signal = self.buffers.put("ints", self._signal(level, row))
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
-        self.ints[record + a.ENTERED] = entered
+        self.ints[record + a.ENTERED] = signal
         if self.held is not None:
             self.held.change_entered(source, record)
 

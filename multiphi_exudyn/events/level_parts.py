@@ -18,12 +18,14 @@ __all__ = ["base_parts", "from_base", "level_parts", "powers"]
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
     """Motion, gaps and energies of a level."""
     own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
-    motion = [-np.diag(modal.squares), channels.force, -modal.damping, channels.force_rate, level.asymptotic.drive]
+    stiffness, damping = np.diag(modal.squares) + modal.coupling, modal.damping_matrix
+    motion = [-stiffness, channels.force, -damping, channels.force_rate, level.asymptotic.drive]
     moved, patterns = channels.carried.T, level.excitation.patterns.T
     parts = {
         a.MOTION: np.column_stack(motion),
         a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
         a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
+        a.FOLLOWS: form.follows,
         a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
     }
     if own.speed_rows is not own.gap_rows:
@@ -56,22 +58,35 @@ def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, l
     return place, np.concatenate([-(vectors @ rest), np.zeros(q)]), speed, sizes
 
 
-def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py."""
+def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py.
+
+    And of friction that goes with other forces (s, 4 n + 1): T, the speed on which it works, that of its constant part,
+    and this.
+    """
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
     modal, patterns, static = level.modal, level.excitation.patterns, level.excitation.static + base.preload
     moved = np.hstack([modal.vectors, carried])
     springs = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
     held = springs * level.gap_constants[index]
-    given = carried.T @ base.directions - level.excitation.stops.T  # by the forces of elements
+    given = carried.T @ base.pushes - level.excitation.stops.T  # by the forces of elements
     worked = given[:, index]
     placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
     placed[:, modal.modes :] -= carried.T @ patterns
     speed = worked @ drags + carried.T @ base.damping @ moved
     constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
     constant -= given @ level.pushes
+    pairs = []
+    for i in level.rubbing_elements:
+        held = next(k for k in base.link_places[i] if base.links[k].held)
+        (place, rate, still), moves = level.rubbing(i), level.excitation.stops[held]
+        pairs.append(np.concatenate([place, rate, own.speed_rows[held], own.gap_rows[held], [still]]))
+        placed -= np.outer(moves, place)
+        speed -= np.outer(moves, rate)
+        constant -= still * moves
     damping = moved.T @ base.damping @ moved + own.speed_rows[index].T @ drags
     damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
     varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
-    return damping, varying, -(level.pushes @ own.gap_rows)
+    rubbing = np.array(pairs).reshape(-1, 4 * own.modes + 1)
+    return damping, varying, -(level.pushes @ own.gap_rows), rubbing

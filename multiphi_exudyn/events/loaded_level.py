@@ -45,18 +45,24 @@ class StrainForm:
 
 @dataclass(frozen=True)
 class PotentialForm:
-    """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q)."""
+    """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q).
+
+    And 1/2 |follows (xi, 1)|^2 (s, r + q + 1), of springs whose stretch goes with the force of a link.
+    """
 
     constant: float
     linear: np.ndarray
     squares: np.ndarray
     rows: np.ndarray
+    follows: np.ndarray
 
     def __call__(self, xi: np.ndarray) -> float:
         r = len(self.squares)
         eta, w = xi[:r], xi[r:]
         mixed = w @ (self.rows[:, :r] @ eta + 0.5 * self.rows[:, r:] @ w)
-        return self.constant + float(self.linear @ xi + 0.5 * self.squares @ (eta * eta) + mixed)
+        stretched = self.follows[:, :-1] @ xi + self.follows[:, -1]
+        own = self.linear @ xi + 0.5 * self.squares @ (eta * eta) + 0.5 * stretched @ stretched
+        return self.constant + float(own + mixed)
 
 
 @dataclass(frozen=True)
@@ -132,9 +138,10 @@ class LoadedLevel:
 
     @functools.cached_property
     def pushes(self) -> np.ndarray:
-        """Constant forces (c,) [N] of its elements along their directions."""
-        given = zip(self.level.base.contacts, self.states, strict=True)
-        return np.array([element.states[state].push for element, state in given])
+        """Constant forces (l,) [N] of its elements along their links' directions: of the first ones."""
+        base = self.level.base
+        given = [element.states[state].push for element, state in zip(base.contacts, self.states, strict=True)]
+        return np.array([*given, *[0.0] * (len(base.links) - len(given))])
 
     @functools.cached_property
     def driven(self) -> bool:
@@ -175,8 +182,10 @@ class LoadedLevel:
         bent = np.linalg.qr(base.modes.omega[:, None] * motion, mode="r")
         gaps = np.column_stack([own.gap_rows[index], self.gap_constants[index]])
         given = np.flatnonzero(own.squares != own.computed)
-        rows = np.vstack([bent, gaps, np.eye(len(own.squares), motion.shape[1])[given]])
-        weights = [np.ones(len(bent)), base.stiffnesses[index], (own.squares - own.computed)[given]]
+        stretched = self.follows
+        rows = np.vstack([bent, gaps, np.eye(len(own.squares), motion.shape[1])[given], stretched])
+        softer = (own.squares - own.computed)[given]
+        weights = [np.ones(len(bent)), base.stiffnesses[index], softer, np.ones(len(stretched))]
         linear = -(base.preload @ motion)
         constant = base.energy_offset + self.stored + float(linear[-1])
         return StrainForm(np.concatenate(weights), rows[:, :-1], rows[:, -1], linear[:-1], constant)
@@ -199,7 +208,38 @@ class LoadedLevel:
         load = base.modes.omega**2 * y - base.preload - static
         along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
         constant = rest.strain + self.stored - float(static @ y)
-        return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form)
+        return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form, self.follows)
+
+    def rubbing(self, element: int) -> tuple[np.ndarray, np.ndarray, float]:
+        """T [N] of friction that goes with the force of a link: rows of xi and xi', and constant; zero without."""
+        own, rubs = self.level, self.level.base.contacts[element].states[self.states[element]].rubs
+        if rubs is None:
+            return np.zeros(own.modes), np.zeros(own.modes), 0.0
+        k = own.indices.index(own.base.link_places[element][rubs[0]])
+        return rubs[1] * own.force_rows[k], rubs[1] * own.force_rate_rows[k], rubs[1] * self.asymptotic.forces[k]
+
+    def stretch(self, element: int) -> tuple[np.ndarray, float]:
+        """What an element's held link keeps of its stretch [m] while it does not hold: row.xi + constant."""
+        base, (row, _, constant) = self.level.base, self.rubbing(element)
+        held = next(k for k in base.link_places[element] if base.links[k].held)
+        stretch = base.contacts[element].states[self.states[element]].stretch
+        return row / base.stiffnesses[held], stretch + constant / base.stiffnesses[held]
+
+    @functools.cached_property
+    def rubbing_elements(self) -> tuple[int, ...]:
+        """Those whose friction goes with the force of a link."""
+        given = enumerate(zip(self.level.base.contacts, self.states, strict=True))
+        return tuple(i for i, (element, state) in given if element.states[state].rubs is not None)
+
+    @functools.cached_property
+    def follows(self) -> np.ndarray:
+        """Rows (s, r + q + 1) of their springs' stretches, times the root of the stiffness."""
+        rows, base = list[np.ndarray](), self.level.base
+        for i in self.rubbing_elements:
+            stiffness = next(base.stiffnesses[k] for k in base.link_places[i] if base.links[k].held)
+            if np.isfinite(stiffness):
+                rows.append(np.sqrt(stiffness) * np.append(*self.stretch(i)))
+        return np.array(rows).reshape(-1, self.level.modes + 1)
 
     def configuration(self, displacement: np.ndarray) -> np.ndarray:
         """y (m, ...) in base coordinates."""

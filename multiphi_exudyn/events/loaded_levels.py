@@ -72,7 +72,7 @@ class LoadedLevels:
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray) -> LoadedLevels:
         """Levels under a static ``load`` (m,) in base coordinates alone."""
-        return cls(model, Excitation.constant(load, len(model.contacts), model.held))
+        return cls(model, Excitation.constant(load, len(model.links), model.held))
 
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""

@@ -58,6 +58,7 @@ __all__ = [
     "entered_signal",
     "first_exit",
     "hold_back",
+    "is_denied",
     "is_end",
     "is_refused",
     "keep_entered",
@@ -143,6 +144,18 @@ def is_end(ints: Ints, level: int, exit_number: int) -> int:
     """1 where an exit is among those that are always looked at."""
     for e in range(ints[level + END_COUNT]):
         if ints[ints[level + ENDS] + e] == exit_number:
+            return 1
+    return 0
+
+
+@compiled
+def is_denied(ints: Ints, state: int, element: int) -> int:
+    """4, 10. 1 where an exit of an element is refused but for those that are always taken: they follow at once."""
+    level = ints[state + LEVEL]
+    first = ints[level + FIRST_EXITS] + element
+    for k in range(ints[first], ints[first + 1]):
+        firm = ints[ints[level + EXITS] + k * EXIT_INTS + FIRMNESS] >= ALWAYS_TAKEN
+        if ints[ints[state + PHASES] + k] == REFUSED and not firm:
             return 1
     return 0
 

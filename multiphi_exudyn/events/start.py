@@ -18,7 +18,6 @@ from multiphi_exudyn.events.arrays import (
     ASKING,
     CHANGE_COUNT,
     CHANNELS,
-    CLOSE,
     COMPLIANT_KEY,
     COORDINATES,
     ELEMENTS,
@@ -45,7 +44,7 @@ from multiphi_exudyn.events.arrays import (
     SLIDING,
     SLOWED,
     STATES,
-    STICK,
+    STICKS,
     STIFFNESSES,
     STRAIN,
     STRIKING,
@@ -156,7 +155,8 @@ def springs(ints: Ints, numbers: Numbers, state: int) -> float:
     """Strain energy [J] of the compliant contacts that are closed in the key of a state's level, and of friction."""
     states, total = ints[ints[state + LEVEL] + STATES], 0.0
     for i in range(ints[ELEMENTS]):
-        if ints[states + i] == (STICK if ints[ints[KINDS] + i] == SLIDING else CLOSE):
+        sliding = ints[ints[KINDS] + i] == SLIDING
+        if ints[states + i] == ints[ints[STICKS] + i] if sliding else ints[states + i] != OPEN:
             depth = gap(ints, numbers, state, i)
             total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
     return total

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
     ASKED,
-    CLOSE,
     DENIED,
     ELEMENTS,
     ENTERED_STATE,
@@ -18,6 +17,7 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     LOST_NOW,
     OK,
+    OPEN,
     PUSHED,
     RIGID,
     SINGLES,
@@ -30,7 +30,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.changes import NOBODY, enter, flag_asking, note, transfer
 from multiphi_exudyn.events.impact import collide
-from multiphi_exudyn.events.phases import becomes, entered_signal, first_exit, is_refused, update_phases
+from multiphi_exudyn.events.phases import becomes, entered_signal, first_exit, is_denied, update_phases
 from multiphi_exudyn.events.resting import same_speed
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -90,7 +90,7 @@ def try_wishes(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     for i in range(ints[ELEMENTS]):
         ints[ints[DENIED] + i] = 0
         wished = ints[wishes + i]
-        if wished != NOBODY and is_firm(ints, i, wished) == 0 and is_refused(ints, ENTERED_STATE, i) == 1:
+        if wished != NOBODY and is_firm(ints, i, wished) == 0 and is_denied(ints, ENTERED_STATE, i) == 1:
             relaxes = is_relaxing(ints, numbers, waves, ENTERED_STATE, i)
             if relaxes < 0:
                 return relaxes
@@ -115,7 +115,7 @@ def is_firm(ints: Ints, element: int, asked: int) -> int:
 def is_relaxing(ints: Ints, numbers: Numbers, waves: Waves, state: int, element: int) -> int:
     """7. 1 where a viscous contact is open where closed it would pull; or NEED."""
     level = ints[state + LEVEL]
-    if ints[ints[KINDS] + element] != VISCOUS or ints[ints[level + STATES] + element] == CLOSE:
+    if ints[ints[KINDS] + element] != VISCOUS or ints[ints[level + STATES] + element] != OPEN:
         return 0
     exit_ = first_exit(ints, level, element)
     signal = entered_signal(ints, level, exit_)

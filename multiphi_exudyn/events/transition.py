@@ -30,6 +30,7 @@ import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.modal_base import ModalBase
 
 __all__ = ["Transition", "modal_projection"]
 
@@ -93,13 +94,15 @@ class Transition:
         """What is added to w: (q, r_l + q) times xi_l, and (q,): the excess of q over the stretch it is to have."""
         source, excitation = self.source, self.source.excitation
         rows, constants = np.zeros((excitation.channels, len(source.level.squares))), np.zeros(excitation.channels)
-        elements = source.level.base.contacts
-        places = [i for i, element in enumerate(elements) if element.held]
-        for k, i in enumerate(places, start=excitation.prescribed):
-            before = elements[i].states[source.states[i]]
-            if elements[i].states[self.target.states[i]].holds and not before.holds:
-                rows[k] = source.level.gap_rows[i]
-                constants[k] = source.gap_constants[i] - before.stretch
+        base = source.level.base
+        places = {link: k for k, link in enumerate(_held_links(base), start=excitation.prescribed)}
+        for i, (element, links) in enumerate(zip(base.contacts, base.link_places, strict=True)):
+            before, after = element.states[source.states[i]], element.states[self.target.states[i]]
+            for number, link in enumerate(links):
+                if link in places and number in after.holds and number not in before.holds:
+                    stretch, constant = source.stretch(i)
+                    rows[places[link]] = source.level.gap_rows[link] - stretch
+                    constants[places[link]] = source.gap_constants[link] - constant
         return rows, constants
 
     def _map(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -117,6 +120,11 @@ class Transition:
     def velocity(self, xi_t: np.ndarray) -> np.ndarray:
         """xi'_m from xi'_l."""
         return self.velocity_matrix @ xi_t
+
+
+def _held_links(base: ModalBase) -> list[int]:
+    """The links with a held place, in the order of their channels."""
+    return [k for k, link in enumerate(base.links) if link.held]
 
 
 def modal_projection(target: Level, source: Level) -> np.ndarray:

@@ -31,8 +31,8 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
     closed = list(indices)
     closed_directions = base.closed_directions(closed, base.gaps[closed])
-    if not independent(base, held := [i for i in closed if base.contacts[i].rigid]):
-        names = ", ".join(base.contacts[i].name for i in held)
+    if not independent(base, held := [i for i in closed if base.links[i].rigid]):
+        names = ", ".join(base.links[i].name for i in held)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     turned, _ = closed_directions.orthogonal
     squares, vectors, accuracy = level_modes(base, turned, modes)
@@ -48,7 +48,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
-        closed=tuple(base.contacts[i].name for i in closed),
+        closed=tuple(base.links[i].name for i in closed),
         indices=indices,
         base=base,
         squares=squares,
@@ -126,7 +126,7 @@ def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
 def _following(base: ModalBase, held: Sequence[int]) -> np.ndarray:
     """Which contacts (c,) follow from these rigid ones, which are independent: their gaps do not move."""
     if not held:
-        return np.zeros(len(base.contacts), bool)
+        return np.zeros(len(base.links), bool)
     units, (q, _) = _units(base.directions), np.linalg.qr(base.directions[:, list(held)])
     left = units - q @ (q.T @ units)
     return np.asarray(np.linalg.norm(left, axis=0) <= INDEPENDENT)

@@ -22,7 +22,8 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.static_response import static_response
-from multiphi_exudyn.mathematics.free_response import ModalResponse, modal_response
+from multiphi_exudyn.mathematics.coupled_response import modal_response
+from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.modes import NEAR
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.arguments import real_array
@@ -122,6 +123,16 @@ class Level:
         return np.diagonal(self.damping) / doubled
 
     @property
+    def coupling(self) -> np.ndarray:
+        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide (sliding.py)."""
+        return np.zeros((self.modes, self.modes))
+
+    @property
+    def damping_matrix(self) -> np.ndarray:
+        """Of the motion (r, r) [1/s]: D, but where contacts slide."""
+        return self.damping
+
+    @property
     def speed_rows(self) -> np.ndarray:
         """Gap velocities (c, r) from eta', as impacts see them."""
         return self.gap_rows
@@ -169,7 +180,7 @@ class Level:
     @functools.cached_property
     def response(self) -> ModalResponse:
         """Closed form of the level's motion."""
-        return modal_response(self.squares, self.damping)
+        return modal_response(self.squares, self.damping_matrix, self.coupling)
 
     def apart(self, modes: int) -> int | None:
         """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
@@ -257,6 +268,6 @@ class Level:
         self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
     ) -> np.ndarray:
         """lambda (k,) of the closed contacts from the forces along their directions."""
-        index, closing = list(self.indices), np.zeros(len(self.base.contacts))
+        index, closing = list(self.indices), np.zeros(len(self.base.links))
         closing[index] = self.base.directions[:, index].T @ configuration + gaps
         return self.base.contact_forces(closed_directions, along, closing)[index]

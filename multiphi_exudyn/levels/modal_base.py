@@ -26,6 +26,7 @@ from multiphi_exudyn.mathematics.modes import Modes, complete_modes, lowest_mode
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.element import AnyLink, Link, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, LawSpring
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -41,14 +42,16 @@ CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-
 class ModalBase:
     """The structure and its contacts in coordinates y of its own modes, x = Phi y.
 
-    modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, c).
-    contacts: as given. complete: whether m = n. mass: M (n, n), the structure's own.
+    modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, l) of
+    the l links; pushes: F (m, l), along which their forces act. contacts: elements (c,) as given, whose first links
+    come first (element.py). complete: whether m = n. mass: M (n, n), the structure's own.
     """
 
     modes: Modes
     points: np.ndarray
     damping: np.ndarray
     directions: np.ndarray
+    pushes: np.ndarray
     contacts: tuple[Contact, ...]
     complete: bool
     mass: Matrix
@@ -67,30 +70,46 @@ class ModalBase:
         return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
 
     @functools.cached_property
+    def links(self) -> tuple[AnyLink, ...]:
+        """All links (l,)."""
+        return links_of(self.contacts)
+
+    @functools.cached_property
+    def link_places(self) -> tuple[tuple[int, ...], ...]:
+        """Where every element's links stand among them (c,)."""
+        return link_places(self.contacts)
+
+    @functools.cached_property
+    def oblique(self) -> dict[int, int]:
+        """Links whose force acts along another direction than theirs, each with the first link of its element."""
+        given = ((k, places[0]) for places in self.link_places for k in places[1:])
+        return {k: first for k, first in given if is_oblique(self.links[k])}
+
+    @functools.cached_property
     def gaps(self) -> np.ndarray:
-        """Initial gaps (c,) [m]."""
-        return np.array([contact.gap for contact in self.contacts])
+        """Initial gaps (l,) [m]."""
+        return np.array([link.gap for link in self.links])
 
     @functools.cached_property
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
-        """|H| (m, c) and |gaps| (c,): with them a gap's round-off is judged."""
+        """|H| (m, l) and |gaps| (l,): with them a gap's round-off is judged."""
         return np.abs(self.directions), np.abs(self.gaps)
 
     @functools.cached_property
     def stiffnesses(self) -> np.ndarray:
-        """Contact stiffnesses (c,) [N/m], inf where rigid."""
-        return np.array([contact.stiffness for contact in self.contacts])
+        """Stiffnesses (l,) [N/m], inf where rigid."""
+        return np.array([link.stiffness for link in self.links])
 
     @functools.cached_property
     def dampings(self) -> np.ndarray:
-        """Contact dampings (c,) [N s/m]."""
-        return np.array([contact.damping for contact in self.contacts])
+        """Dampings (l,) [N s/m]."""
+        return np.array([link.damping for link in self.links])
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:
-        """``direction_indices`` of the contacts, all others of one direction up to its sign taken together as well."""
-        first = direction_indices(self.contacts)
-        plain = [i for i, c in enumerate(self.contacts) if not isinstance(c, LawSpring)]
+        """``direction_indices`` of the links, all others of one direction up to its sign taken together as well."""
+        first = direction_indices(self.links)
+        plain = [i for i, link in enumerate(self.links) if not isinstance(link, LawSpring)]
         for k, i in enumerate(plain):
             before = [j for j in plain[:k] if first[j] == j]
             first[i] = next((before[same] for same in self._parallel(i, before)), i)
@@ -111,12 +130,12 @@ class ModalBase:
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:
         """Every force law by the position of its first spring."""
-        given = ((i, self.contacts[i]) for i in sorted(set(self.direction_indices)))
-        return {i: contact.law for i, contact in given if isinstance(contact, LawSpring)}
+        given = ((i, self.links[i]) for i in sorted(set(self.direction_indices)))
+        return {i: link.law for i, link in given if isinstance(link, LawSpring)}
 
     def label(self, contact: int) -> str:
-        """What a contact is called: its name, for a spring of a force law the law's."""
-        given = self.contacts[contact]
+        """What a link is called: its name, for a spring of a force law the law's."""
+        given = self.links[contact]
         return given.law.name if isinstance(given, LawSpring) else given.name
 
     @functools.cached_property
@@ -184,11 +203,11 @@ class ModalBase:
         return [[i for i in members if i not in further], *([i] for i in further)]
 
     def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
-        """lambda (c,) [N] from the forces (d,) along closed directions and the gaps (c,) there; zero where open.
+        """lambda (l,) [N] from the forces (d,) along closed directions and the gaps (l,) there; zero where open.
 
         Springs of one direction have what their gaps say, and a rigid contact among them the rest.
         """
-        forces = np.zeros(len(self.contacts))
+        forces = np.zeros(len(self.links))
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:
@@ -205,31 +224,46 @@ class ModalBase:
 
 def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> ModalBase:
     """The base of a structure: all its modes where that is affordable, else enough for ``modes`` of any level."""
-    rows = np.array([structure.row(contact.direction) for contact in contacts]).reshape(-1, structure.n)
+    links = links_of(contacts)
+    rows = np.array([structure.row(link.direction) for link in links]).reshape(-1, structure.n)
+    pushed = np.array([_pushed(structure, link) for link in links]).reshape(-1, structure.n)
     points = structure.point_rows
     complete = structure.n <= COMPLETE or modes == "all"
     if complete:
         found = complete_modes(_dense(structure.mass), _dense(structure.stiffness))
     else:
         count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
-        distinct = rows[sorted(set(direction_indices(contacts)))]
+        distinct = rows[sorted(set(direction_indices(links)))]
         found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))
     found = found.turned(points)
     return ModalBase(
         modes=found,
         points=points @ found.shapes,
         damping=_base_damping(structure, found),
-        directions=drop_round_off(found.shapes.T @ rows.T, np.abs(found.shapes.T) @ np.abs(rows.T)),
+        directions=_seen(found, rows),
+        pushes=_seen(found, pushed),
         contacts=tuple(contacts),
         complete=complete,
         mass=structure.mass,
     )
 
 
-def direction_indices(contacts: Sequence[Contact]) -> list[int]:
-    """For every contact itself, or its law's first spring, which has the same direction up to its sign."""
+def direction_indices(links: Sequence[AnyLink]) -> list[int]:
+    """For every link itself, or its law's first spring, which has the same direction up to its sign."""
     first: dict[ForceLaw, int] = {}
-    return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(contacts)]
+    return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(links)]
+
+
+def _pushed(structure: LinearStructure, link: AnyLink) -> np.ndarray:
+    """The row (n,) along which a link's force acts."""
+    if isinstance(link, Link) and link.push:
+        return np.sum([share * structure.row(at) for share, at in link.push], axis=0)
+    return structure.row(link.direction)
+
+
+def _seen(modes: Modes, rows: np.ndarray) -> np.ndarray:
+    """Rows (l, n) in base coordinates (m, l), zero where that is round-off."""
+    return drop_round_off(modes.shapes.T @ rows.T, np.abs(modes.shapes.T) @ np.abs(rows.T))
 
 
 def _dense(matrix: Matrix) -> np.ndarray:

@@ -85,7 +85,7 @@ def chosen_modes(
     their positions, with its lowest so many modes at least or all that it has.
     """
     count = max(FEWEST, base.modes.rigid + 1)
-    if any(contact.rigid for contact in base.contacts):
+    if any(link.rigid for link in base.links):
         count = max(count, RIGID)
     rows = np.array([structure.row(name) for name in structure.points]).reshape(-1, structure.n)
     of_points = _of_points(base, rows @ base.modes.shapes)

@@ -15,10 +15,11 @@ from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base, direction_indices
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
+from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -68,9 +69,9 @@ class MultiPhiModel:
         names = [contact.name for contact in self.contacts]
         if len(set(names)) < len(names):
             raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
-        for contact in self.contacts:
-            if not np.any(self.structure.row(contact.direction)):
-                raise MultiPhiValueError(f"contact {contact.name!r} direction: got a zero row, need a direction")
+        for link in self.links:
+            if not np.any(self.structure.row(link.direction)):
+                raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
         self._check_modes()
         _check_overrides(self.overrides)
         ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
@@ -120,23 +121,39 @@ class MultiPhiModel:
 
     @functools.cached_property
     def general(self) -> bool:
-        """Whether there are elements that are no contacts: with other states than open and closed."""
-        return any(not isinstance(contact, (UnilateralContact, LawSpring)) for contact in self.contacts)
+        """Whether there are elements with other states than open and closed."""
+        return any(not _opens_and_closes(contact) for contact in self.contacts)
 
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
-        """Positions of the elements whose link has a held place, one channel each."""
-        return tuple(i for i, contact in enumerate(self.contacts) if contact.held)
+        """Positions of the links that have a held place, one channel each."""
+        return tuple(i for i, link in enumerate(self.links) if link.held)
+
+    @functools.cached_property
+    def links(self) -> tuple[AnyLink, ...]:
+        """The links of all elements, the first ones first (element.py)."""
+        return links_of(self.contacts)
+
+    @functools.cached_property
+    def link_places(self) -> tuple[tuple[int, ...], ...]:
+        """Where every element's links stand among them."""
+        return link_places(self.contacts)
+
+    def pressing_links(self, element: int) -> list[int]:
+        """Positions of the links whose gap is that of an element's first one: they press with and without friction."""
+        places = self.link_places[element]
+        return [places[0], *(k for k in places[1:] if is_oblique(self.links[k]))]
 
     def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
         """Positions of the links that hold where the elements are in these states: they name the modes."""
-        given = zip(self.contacts, states, strict=True)
-        return tuple(i for i, (contact, state) in enumerate(given) if contact.states[state].holds)
+        given = zip(self.contacts, self.link_places, states, strict=True)
+        return tuple(sorted(places[k] for contact, places, state in given for k in contact.states[state].holds))
 
     def push(self, states: Sequence[int]) -> np.ndarray:
         """Load (m,) of the constant forces of elements in these states."""
         given = zip(self.contacts, states, strict=True)
-        return np.asarray(self.base.directions @ [contact.states[state].push for contact, state in given])
+        pushes = [contact.states[state].push for contact, state in given]
+        return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
 
     @property
     def levels_possible(self) -> int:
@@ -269,7 +286,7 @@ class MultiPhiModel:
         level = self._full(indices)
         level = level.truncated(self._modes_of(level))
         override = self.overrides.get(level.closed)
-        return self._levels.keep(indices, level if override is None else level.overridden(override))
+        return self._levels.keep(indices, sliding(level if override is None else level.overridden(override)))
 
     def _full(self, indices: tuple[int, ...]) -> Level:
         """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
@@ -312,6 +329,11 @@ class MultiPhiModel:
         if base.modes.rigid:
             raise MultiPhiValueError(
                 f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
+            )
+        rubbing = [contact.name for contact in self.contacts if contact.further]
+        if rubbing:
+            raise MultiPhiValueError(
+                f"static equilibrium: got friction at the contacts {', '.join(rubbing)}, need contacts without"
             )
         load = self.base_load(forces)
         if self.force_laws or self.general:
@@ -369,6 +391,10 @@ def _contacts(given: Any) -> tuple[Contact, ...]:
         if not isinstance(item, (Element, ForceLaw)):
             raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
     return expanded(items)
+
+
+def _opens_and_closes(element: Contact) -> bool:
+    return isinstance(element, LawSpring) or (isinstance(element, UnilateralContact) and not element.further)
 
 
 def _check_overrides(given: Any) -> None:

@@ -5,7 +5,7 @@ such a sum first falls through zero; functions of time as piecewise exponentials
 shortest vector that linear inequalities allow; what round-off is; functions on flat buffers, compiled or plain.
 
 Order: round_off, bounded_cache, buffer_function, machine_code, compilation, compiled_cache, compiled, modes,
-exponentials, basis_arrays, free_response, forced_response, response_arrays, signal_bounds, suspect, block_search,
-zero_crossing, least_distance, least_distance_arrays, corners, interpolation, piecewise_exponential,
-piecewise_linear_fit.
+exponentials, basis_arrays, free_response, motion_parts, coupled_response, forced_response, response_arrays,
+signal_bounds, suspect, block_search, zero_crossing, least_distance, least_distance_arrays, corners, interpolation,
+piecewise_exponential, piecewise_linear_fit.
 """

@@ -6,6 +6,7 @@ u = t/T, T the horizon, is solved mode by mode, D diagonal or not, as the sum of
 
     z' = s z + exp(mu t) p(t),   z = exp(mu t) w,   w' = (s - mu) w + p(t)
 
+z belongs to one pole, or to a chain of them (free_response.py), in which each is forced by those behind it as well.
 w is a polynomial of u. Far from the pole (|s - mu| T large) it is the finite one,
 
     w_k = ((k + 1) w_k+1 / T - p_k) / (s - mu),   k = D, ..., 0
@@ -44,18 +45,35 @@ def particular(
         return np.zeros((1, len(squares)), complex)
     if response.diagonal:
         return _uncoupled(squares, np.diagonal(damping) / 2, rate, forces, horizon)
-    alone = (squares == 0) & ~np.any(damping, axis=1)
-    free = _uncoupled(squares[alone], np.zeros(int(np.sum(alone))), rate, forces[:, alone], horizon)
-    poles = np.flatnonzero(np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0))
+    alone, poles = response.alone, response.poles
+    free = np.zeros((1, len(squares)), complex)
+    if np.any(alone):
+        own = _uncoupled(squares[alone], np.zeros(int(np.sum(alone))), rate, forces[:, alone], horizon)
+        free = _padded(free, len(own))
+        free[:, alone] = own
     maps = response.from_velocity[poles] / 2
     shapes, rates = response.shapes[:, poles], response.basis.rates[poles]
-    own = _first_order(rates - rate, forces @ maps.T, horizon) @ shapes.T
-    mirrored = _first_order(rates.conj() - rate, forces @ maps.conj().T, horizon) @ shapes.conj().T
-    total = _padded(own, len(mirrored)) + _padded(mirrored, len(own))
-    if np.any(alone):
-        total = _padded(total, len(free))
-        total[: len(free), alone] = free
-    return total
+    parts = [free]
+    for turned in (np.asarray, np.conj):
+        parts.append(_first_order(turned(rates) - rate, forces @ turned(maps).T, horizon) @ turned(shapes).T)
+        for chain in response.chains:
+            given = turned(chain.mixing), forces @ turned(chain.pushes).T / 2
+            parts.append(_chained(*given, rate, horizon) @ turned(chain.shapes).T)
+    longest = max(map(len, parts))
+    return np.asarray(sum(_padded(part, longest) for part in parts))
+
+
+def _chained(mixing: np.ndarray, forces: np.ndarray, rate: complex, horizon: float) -> np.ndarray:
+    """w (K + 1, m) of w' = (T - mu) w + p(t), T (m, m) upper triangular, p (D + 1, m): the last one first."""
+    found: list[np.ndarray] = []
+    for i in range(len(mixing) - 1, -1, -1):
+        longest = max([len(forces), *map(len, found)])
+        given = _padded(forces[:, [i]], longest)
+        for above, k in zip(found, range(len(mixing) - 1, i, -1), strict=True):
+            given = given + mixing[i, k] * _padded(above, longest)
+        found.append(_first_order(mixing[[i], [i]] - rate, given, horizon))
+    longest = max(map(len, found))
+    return np.hstack([_padded(w, longest) for w in reversed(found)])
 
 
 def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float) -> np.ndarray:

@@ -19,6 +19,8 @@ A response is a record in the ints:
     ints[response + UNCOUPLED]           where 1 for a mode with an equation of its own begins in the ints, (r,):
                                          eta'' + 2 delta eta' + omega^2 eta = p
     ints[response + POLES]               and 1 for an exponential of the other modes, (p,)
+    ints[response + CHAINS]              where the chains begin in the ints: their number, and of each its m components
+                                         and where T (m, m), V^T and B (m, r) begin in the waves, (number, 4)
 
 Forced response, as forced_response.py has it, to p = Re( exp(mu t) sum_d p_d u^d ), u = t/T, T the horizon:
 
@@ -37,6 +39,7 @@ from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.forced_response import COINCIDING, NEAREST_FAR, PER_DEGREE, TAYLOR
 
 __all__ = [
+    "CHAINS",
     "FREE",
     "FROM_DISPLACEMENT",
     "FROM_FORCE",
@@ -56,8 +59,9 @@ __all__ = [
 ]
 
 MODES, FREE, REACHED, FROM_DISPLACEMENT, FROM_VELOCITY, FROM_FORCE, SHAPES = 0, 1, 2, 3, 4, 5, 6
-SQUARES, HALF_DAMPING, UNCOUPLED, POLES = 7, 8, 9, 10
-RESPONSE = 11  # ints of the record
+SQUARES, HALF_DAMPING, UNCOUPLED, POLES, CHAINS = 7, 8, 9, 10, 11
+RESPONSE = 12  # ints of the record
+CHAIN = 4  # ints of a chain
 
 
 @compiled
@@ -129,7 +133,7 @@ def forced_response(
     """One response x (K + 1, r) to modal forces p (degree + 1, r) on a carrier, good for [0, horizon]: K + 1.
 
     carrier: where its mu stands in the waves. most: rows that there is room for, more than the degree; where a larger
-    number comes back, so many are needed, and x is nothing. scratch: 2 ``most`` waves.
+    number comes back, so many are needed, and x is nothing. scratch: (2 + m) ``most`` waves, m of the longest chain.
     """
     r, basis = ints[response + MODES], ints[response + FREE]
     rows = clear_rows(waves, result, r, 0, 1)
@@ -143,6 +147,12 @@ def forced_response(
                 rows = force_pole(
                     ints, waves, response, j, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
                 )
+    for k in range(ints[ints[response + CHAINS]]):
+        chain = ints[response + CHAINS] + 1 + k * CHAIN
+        for mirrored in range(2):
+            rows = force_chain(
+                ints, waves, chain, r, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
+            )
     return rows
 
 
@@ -252,6 +262,51 @@ def force_pole(
         for i in range(ints[reached], ints[reached + 1]):
             shape = waves[shapes + i]
             waves[x + k * r + i] += waves[scratch + k] * complex(shape.real, sign * shape.imag)
+    return rows
+
+
+@compiled
+def force_chain(
+    ints: Ints,
+    waves: Waves,
+    chain: int,
+    r: int,
+    mirrored: int,
+    carrier: int,
+    forces: int,
+    degree: int,
+    horizon: float,
+    rows: int,
+    most: int,
+    scratch: int,
+    x: int,
+) -> int:
+    """Adds the response of a chain, or of its conjugate, to x (rows, r), the last component first: its rows then."""
+    m, mixing, shapes, pushes = ints[chain], ints[chain + 1], ints[chain + 2], ints[chain + 3]
+    mu, sign, highest, given = waves[carrier], 1.0 - 2.0 * mirrored, degree, scratch + m * most
+    for i in range(m - 1, -1, -1):
+        for d in range(highest + 1):
+            push = 0j
+            for j in range(r if d <= degree else 0):
+                weight = waves[pushes + i * r + j]
+                push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * waves[forces + d * r + j]
+            for k in range(i + 1, m):
+                weight = waves[mixing + i * m + k]
+                push += complex(weight.real, sign * weight.imag) * waves[scratch + k * most + d]
+            waves[given + d] = push
+        pole, w = waves[mixing + i * m + i], scratch + i * most
+        distance = complex(pole.real, sign * pole.imag) - mu
+        own = first_order(waves, distance.real, distance.imag, given, highest, horizon, most, w)
+        if max(own, rows) > most:
+            return max(own, rows)
+        for d in range(own, most):
+            waves[w + d] = 0j
+        highest = max(highest, own - 1)
+        rows = clear_rows(waves, x, r, rows, own)
+        for d in range(own):
+            for j in range(r):
+                shape = waves[shapes + i * r + j]
+                waves[x + d * r + j] += waves[w + d] * complex(shape.real, sign * shape.imag)
     return rows
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["CLEAR", "ZERO", "drop_round_off", "sign_of"]
+__all__ = ["CLEAR", "DEFECTIVE", "ZERO", "drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
+DEFECTIVE = 1e6  # condition of eigenvectors; times round-off it is the motion's error, at a double root it is 1e8
 CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
 
 

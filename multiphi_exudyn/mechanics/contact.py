@@ -11,19 +11,43 @@ gap does: it never pulls. Inside its stop it closes again when k (-g) + c (-g') 
 takes is damping work, and so is the strain k g^2 / 2 that it still holds where it opens inside (the damper takes that
 while the spring relaxes), less what it holds where it closes again inside.
 
+Friction. Where a closed contact slides along h_t, with the force N = lambda,
+
+    stick   T = k_t (h_t.x - v_t t - w), without a spring h_t.x - v_t t = w and T its reaction,   |T| <= mu_s N
+    slip    T = s mu N,   s (h_t.x' - v_t - T' / k_t) >= 0,   s = +1 or -1
+
+The force on the structure is h N - h_t T. A contact that closes sticks where it is hit, or without a spring slides in
+the direction in which it moves; one that opens has T = 0.
+
+    normal            friction without a spring    with a spring k_t
+    compliant         works                        works
+    viscous           works                        refused: slip ends by N', which has an acceleration
+    rigid             works, but for its impacts   refused: so has N' of a reaction
+    force law         has none: a law is no contact, and has no N
+
 A stop 1.35 mm below a beam that bends along +z has h = +e_c and gap = 1.35e-3; a stop above it has
 h = -e_c; two bodies facing each other have one coefficient each.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ElementState, contact_states
+from multiphi_exudyn.mechanics.element import (
+    ALWAYS_TAKEN,
+    TAKEN_ONCE,
+    ElementState,
+    Exit,
+    Link,
+    Share,
+    Turn,
+    contact_states,
+)
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["UnilateralContact"]
@@ -38,6 +62,10 @@ class UnilateralContact:
     gap: distance [m] in the undeformed structure; negative is a preload.
     stiffness: k [N/m], infinite for a rigid contact.
     damping: c [N s/m] beside a finite stiffness.
+    friction: mu while it slides; static_friction: mu_s >= mu up to which it sticks, None: the same.
+    tangential: h_t, as h is given; needed where there is friction.
+    tangential_stiffness: k_t [N/m] of the spring in series with the friction, infinite for none.
+    tangential_velocity: v_t [m/s] of the counter-surface along +h_t.
 
     Two contacts are equal only if they are the same object.
     """
@@ -47,27 +75,53 @@ class UnilateralContact:
     gap: float
     stiffness: float = math.inf
     damping: float = 0.0
+    friction: float = 0.0
+    tangential: At | None = None
+    static_friction: float | None = None
+    tangential_stiffness: float = math.inf
+    tangential_velocity: float = 0.0
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"contact name: got {self.name!r}, need a non-empty string")
-        for name in ("gap", "stiffness", "damping"):
-            value = getattr(self, name)
-            if not is_real(value):
-                raise MultiPhiTypeError(f"contact {self.name!r} {name}: got {value!r}, need a number")
-            object.__setattr__(self, name, float(value))
+        for name in ("gap", "stiffness", "damping", "friction", "tangential_stiffness", "tangential_velocity"):
+            object.__setattr__(self, name, self._number(name, getattr(self, name)))
+        if self.static_friction is not None:
+            object.__setattr__(self, "static_friction", self._number("static_friction", self.static_friction))
         if not math.isfinite(self.gap):
-            raise MultiPhiValueError(f"contact {self.name!r} gap: got {self.gap!r}, need a finite distance")
+            raise self._refused("gap", "need a finite distance")
         if not self.stiffness > 0:
-            received = f"contact {self.name!r} stiffness: got {self.stiffness!r}"
-            raise MultiPhiValueError(f"{received}, need a value > 0 (or inf, rigid)")
+            raise self._refused("stiffness", "need a value > 0 (or inf, rigid)")
         if not (math.isfinite(self.damping) and self.damping >= 0):
-            raise MultiPhiValueError(f"contact {self.name!r} damping: got {self.damping!r}, need a finite value >= 0")
+            raise self._refused("damping", "need a finite value >= 0")
         if self.rigid and self.damping:
-            received = f"contact {self.name!r} damping: got {self.damping!r} beside an infinite stiffness"
-            raise MultiPhiValueError(f"{received}, need a finite stiffness")
+            raise self._refused("damping", "need a finite stiffness", " beside an infinite stiffness")
+        self._check_friction()
+
+    def _check_friction(self) -> None:
+        if not (math.isfinite(self.friction) and self.friction >= 0):
+            raise self._refused("friction", "need a finite coefficient >= 0")
+        if not (math.isfinite(self.most) and self.most >= self.friction):
+            raise self._refused("static_friction", f"need a finite coefficient >= the friction {self.friction!r}")
+        if self.tangential is None and self.most:
+            raise self._refused("friction", "need one as well", " without a tangential direction")
+        if not self.tangential_stiffness > 0:
+            raise self._refused("tangential_stiffness", "need a value > 0 (or inf, without a spring)")
+        if not math.isfinite(self.tangential_velocity):
+            raise self._refused("tangential_velocity", "need a finite speed")
+        if math.isfinite(self.tangential_stiffness) and (self.rigid or self.damping):
+            beside = " beside an infinite stiffness" if self.rigid else f" beside the damping {self.damping!r}"
+            raise self._refused("tangential_stiffness", "need inf, or an elastic contact", beside)
+
+    def _number(self, name: str, value: object) -> float:
+        if not is_real(value):
+            raise MultiPhiTypeError(f"contact {self.name!r} {name}: got {value!r}, need a number")
+        return float(value)  # type: ignore[arg-type]
+
+    def _refused(self, name: str, needed: str, beside: str = "") -> MultiPhiValueError:
+        return MultiPhiValueError(f"contact {self.name!r} {name}: got {getattr(self, name)!r}{beside}, {needed}")
 
     @property
     def rigid(self) -> bool:
@@ -75,14 +129,77 @@ class UnilateralContact:
         return math.isinf(self.stiffness)
 
     @property
-    def states(self) -> tuple[ElementState, ...]:
-        """Open and closed (element.py)."""
-        return contact_states(self.rigid, self.damping > 0)
+    def most(self) -> float:
+        """mu_s, up to which it sticks."""
+        return self.friction if self.static_friction is None else self.static_friction
 
-    def first_state(self, gap: float, rate: float) -> str:
+    @property
+    def drop(self) -> float:
+        """Part of the tangential spring's energy that is lost where it begins to slip."""
+        return 1 - (self.friction / self.most) ** 2 if self.most else 0.0
+
+    @functools.cached_property
+    def further(self) -> tuple[Link, ...]:
+        """Where there is friction: the tangential link, and the normal one with the friction of sliding to and fro."""
+        if self.tangential is None or not self.most:
+            return ()
+        along, normal = (self.direction, self.gap, self.stiffness, self.damping), (1.0, self.direction)
+        stick = Link(
+            f"{self.name}.tangential",
+            self.tangential,
+            0.0,
+            self.tangential_stiffness,
+            0.0,
+            self.tangential_velocity,
+            True,
+        )
+        slips = (
+            Link(f"{self.name}.slip{sign}", *along, push=(normal, (-s * self.friction, self.tangential)))
+            for sign, s in (("+", 1.0), ("-", -1.0))
+        )
+        return (stick, *slips)
+
+    @functools.cached_property
+    def states(self) -> tuple[ElementState, ...]:
+        """Open and closed (element.py); where there is friction, open, stick, slip+ and slip-."""
+        plain = contact_states(self.rigid, self.damping > 0)
+        if not self.further:
+            return plain
+        (closing,), (opening,) = (state.exits for state in plain)
+        stick = tuple(
+            Exit(f"slip{sign}", force=self.most, firmness=ALWAYS_TAKEN, further=(Share(1, force=s),))
+            for sign, s in (("+", 1.0), ("-", -1.0))
+        )
+        turn = Turn(1, "slip+", "slip-") if math.isinf(self.tangential_stiffness) else None
+        return (
+            ElementState("open", "open", (replace(closing, asked="stick", turn=turn),)),
+            ElementState("stick", "stick", (*stick, opening), holds=(0, 1)),
+            self._slip("+", 1.0, 2, opening),
+            self._slip("-", -1.0, 3, opening),
+        )
+
+    def _slip(self, sign: str, s: float, link: int, opening: Exit) -> ElementState:
+        """s (h_t.x' - v_t - s mu N' / k_t) >= 0, N' = -k h.x' of an elastic contact; and what opens it."""
+        share = Share(link, opening.gap, opening.rate, opening.force)
+        opens = Exit("open", firmness=opening.firmness, further=(share,))
+        if math.isinf(self.tangential_stiffness):
+            back = Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
+        else:
+            ratio = self.friction / self.tangential_stiffness
+            back = Exit("stick", rate=ratio * self.stiffness, firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
+        return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), rubs=(link, s * self.friction))
+
+    def first_state(self, gap: float, rate: float, *rates: float) -> str:
         """The state in which a run starts that begins with a gap [m], zero where it is round-off, and its rate [m/s].
 
-        A rigid contact starts open, and closes at once where it is pressed on; a viscous one never pulls.
+        A rigid contact starts open, and closes at once where it is pressed on; a viscous one never pulls. rates: of its
+        further links; without a spring it sticks only at rest on its counter-surface.
         """
         pulls = self.damping > 0 and self.stiffness * gap + self.damping * rate > 0
-        return "open" if gap >= 0 or self.rigid or pulls else "closed"
+        if gap >= 0 or self.rigid or pulls:
+            return "open"
+        if not rates:
+            return "closed"
+        if math.isfinite(self.tangential_stiffness) or rates[0] == 0:
+            return "stick"
+        return "slip+" if rates[0] > 0 else "slip-"

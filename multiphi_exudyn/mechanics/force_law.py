@@ -27,7 +27,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import Element, ElementState, contact_states
+from multiphi_exudyn.mechanics.element import Element, ElementState, Link, contact_states
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Contact", "ForceLaw", "Given", "LawSpring", "expanded"]
@@ -237,13 +237,15 @@ class LawSpring:
     damping: ClassVar[float] = 0.0
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
+    further: ClassVar[tuple[Link, ...]] = ()
+    drop: ClassVar[float] = 0.0
 
     @property
     def states(self) -> tuple[ElementState, ...]:
         """Open and closed (element.py)."""
         return contact_states(rigid=False, viscous=False)
 
-    def first_state(self, gap: float, rate: float) -> str:
+    def first_state(self, gap: float, rate: float, *rates: float) -> str:
         """The state in which a run starts that begins with a gap [m]."""
         return "open" if gap >= 0 else "closed"
 

@@ -18,7 +18,7 @@ from typing import ClassVar
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE, ElementState, Exit
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE, ElementState, Exit, Link
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["Friction"]
@@ -46,6 +46,7 @@ class Friction:
     gap: ClassVar[float] = 0.0
     damping: ClassVar[float] = 0.0
     held: ClassVar[bool] = True
+    further: ClassVar[tuple[Link, ...]] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -74,6 +75,11 @@ class Friction:
         return self.limit if self.static_limit is None else self.static_limit
 
     @property
+    def drop(self) -> float:
+        """Part of the spring's energy that is lost where it begins to slip."""
+        return 1 - (self.limit / self.most) ** 2
+
+    @property
     def rigid(self) -> bool:
         """True without a spring in series."""
         return math.isinf(self.stiffness)
@@ -82,7 +88,7 @@ class Friction:
     def states(self) -> tuple[ElementState, ...]:
         """Stick, slip+ and slip- (element.py)."""
         exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")
-        return ElementState("stick", "stick", exits, holds=True), self._slip("+"), self._slip("-")
+        return ElementState("stick", "stick", exits, holds=(0,)), self._slip("+"), self._slip("-")
 
     def _slip(self, sign: str) -> ElementState:
         s = float(f"{sign}1")
@@ -90,7 +96,7 @@ class Friction:
         stretch = 0.0 if self.rigid else s * self.limit / self.stiffness
         return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
 
-    def first_state(self, q: float, rate: float) -> str:
+    def first_state(self, q: float, rate: float, *rates: float) -> str:
         """Stick, with a spring or at rest on its counter-surface; else slip, in the direction of its speed [m/s]."""
         if not self.rigid or rate == 0:
             return "stick"

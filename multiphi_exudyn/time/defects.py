@@ -182,7 +182,7 @@ def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ..
 
 def _held(level: LoadedLevel) -> set[int]:
     """The closed rigid contacts."""
-    return {i for i in level.level.indices if level.level.base.contacts[i].rigid}
+    return {i for i in level.level.indices if level.level.base.links[i].rigid}
 
 
 def _allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:

@@ -77,7 +77,7 @@ def stops_moved(state: State) -> np.ndarray:
 
 def _check_stops(level: LoadedLevel, moved: np.ndarray, before: np.ndarray) -> None:
     """Refuse loads under which the stop of a rigid contact jumps."""
-    for contact, new, old in zip(level.level.base.contacts, moved.tolist(), before.tolist(), strict=True):
+    for contact, new, old in zip(level.level.base.links, moved.tolist(), before.tolist(), strict=True):
         if contact.rigid and abs(new - old) > CONTINUOUS * (abs(new) + abs(old)):
             raise MultiPhiValueError(
                 f"loads: the stop of the rigid contact {contact.name!r} jumps by {new - old:g} m where the run goes "

@@ -92,6 +92,7 @@ def keep_events(ints: Ints, numbers: Numbers) -> None:
         given = ints[EVENT_NUMBERS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH_NUMBERS
         entered = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1]
         ints[row] = ints[ints[CHANGES] + k * CHANGE_WIDTH]
+        ints[row + 2] = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
         ints[row + 1] = entered
         numbers[given] = numbers[TIME]
         for part in range(LOSSES):

@@ -46,7 +46,23 @@ def works(
         damping += float(weights @ _dissipation(level, xi_t))
         varying += float(weights @ _power(level, xi, xi_t, xi_tt))
         friction -= float(weights @ (level.pushes @ level.level.gap_rows @ xi_t))
+        friction += sum(float(weights @ (tension * speed)) for tension, speed, _ in _rubbing(level, xi, xi_t))
+    follows = level.follows
+    for sign, time in ((1, start), (-1, end)):
+        stretched = follows[:, :-1] @ modal(np.array([time]), 0)[:, 0] + follows[:, -1]
+        friction += sign * 0.5 * float(stretched @ stretched)
     return damping, varying, friction
+
+
+def _rubbing(
+    level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """T (k,) of friction that goes with other forces, the speed (k,) on which it works, and s (q,) of its surface."""
+    own, base = level.level, level.level.base
+    for i in level.rubbing_elements:
+        held = next(k for k in base.link_places[i] if base.links[k].held)
+        place, rate, constant = level.rubbing(i)
+        yield place @ xi + rate @ xi_t + constant, own.gap_rows[held] @ xi_t, level.excitation.stops[held]
 
 
 def _dissipation(level: LoadedLevel, xi_t: np.ndarray) -> np.ndarray:
@@ -78,11 +94,13 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
     springs = stiffness[:, None] * gaps + _dampers(level, xi_t)
     power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
     power += level.pushes @ level.excitation.stops @ w_t
+    for tension, _, moves in _rubbing(level, xi, xi_t):
+        power -= tension * (moves @ w_t)
     if np.any(carried):
         y, moved, accelerated = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
-        load = (level.excitation.static + base.preload + base.directions @ level.pushes)[:, None] + varying
+        load = (level.excitation.static + base.preload + base.pushes @ level.pushes)[:, None] + varying
         residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
-        residual += base.directions[:, index] @ springs
+        residual += base.pushes[:, index] @ springs
         power += np.sum((carried @ w_t) * residual, axis=0)
     return np.asarray(power)
 

@@ -14,6 +14,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase
 from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mechanics.element import event_kind
 from multiphi_exudyn.mechanics.force_law import Contact
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
@@ -122,13 +123,13 @@ class Record:
     stand (-1: all armed).
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
     coordinates: xi, xi' of every start.
-    phases: of the starts at which some are not armed. kinds (m, 2): contact, state entered, or SHARED.
+    phases: of the starts at which some are not armed. kinds (m, 3): contact, state entered, or SHARED, state left.
     amounts (m, 8): time [s], six losses [J], impulse [N s]. arrays: those of the loop.
     """
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
         self._names, self.arrays = [contact.name for contact in contacts], arrays
-        self._events = [[state.event for state in contact.states] for contact in contacts]
+        self._states = [contact.states for contact in contacts]
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         empty, whole = np.empty(0), np.empty(0, np.int64)
@@ -245,11 +246,24 @@ class Record:
             scratch = self._scratch()
             while self._supply(works_of(*self._given(offsets), len(works), scratch, works.ravel())):
                 scratch = self._scratch()
-        return np.asarray(works.sum(axis=0))
+        total: np.ndarray = works.sum(axis=0)
+        total[2] -= self._followed()
+        return total
+
+    def _followed(self) -> float:
+        """What springs have taken up [J] in all segments in which their stretch goes with the force of a link."""
+        given, total = [level.potential_form.follows for level in self.levels], 0.0
+        for number in (k for k, rows in enumerate(given) if len(rows)):
+            own, n = np.flatnonzero(self.rows[:, 0] == number), given[number].shape[1] - 1
+            for sign, after in ((-1, np.zeros(len(own))), (1, self.spans[own, 1] - self.spans[own, 0])):
+                x = self.states(own, after)[0][:, :n]
+                total += sign * 0.5 * float(np.sum((x @ given[number][:, :-1].T + given[number][:, -1]) ** 2))
+        return total
 
     def _scratch(self) -> np.ndarray:
         """Memory for the work of a segment."""
-        return np.empty(work_waves(*self.arrays.most, int(self.arrays.ints[a.CHANNELS])), complex)
+        pairs = sum(any(state.rubs for state in states) for states in self._states)
+        return np.empty(work_waves(*self.arrays.most, int(self.arrays.ints[a.CHANNELS]), pairs), complex)
 
     def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
         """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""
@@ -306,6 +320,7 @@ class Record:
         place = int(self.places[i])
         before = int(self.places[i - 1]) + 1 if i else 0
         time, *lost, impulse = self.amounts[place].tolist()
-        contact, entered = self.kinds[place].tolist()
+        contact, entered, left = self.kinds[place].tolist()
         shared = tuple((self._names[self.kinds[k, 0]], float(self.amounts[k, -1])) for k in range(before, place))
-        return Event(time, self._names[contact], self._events[contact][entered], Loss(*lost), impulse, shared)
+        kind = event_kind(self._states[contact], left, entered)
+        return Event(time, self._names[contact], kind, Loss(*lost), impulse, shared)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.arrays import CLOSE, OPEN
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -154,45 +155,36 @@ def _start(run: Run, excitation: Excitation) -> Start:
     """The start as the contacts see it."""
     model, base = run.model, run.model.base
     y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
-    still = np.zeros(len(model.contacts))
+    still = np.zeros(len(model.links))
     moved, speeds = map(excitation.moved, excitation.drive(0.0).values[:2]) if excitation.prescribed else (still, still)
     gaps = (y @ base.directions + base.gaps - moved).tolist()
     directions, initial = base.magnitudes
     ways = initial + excitation.stop_ways
     unseen = UNSEEN * _lengths(model, y, v, excitation.largest_load, ways, run.t_end)
     scales = (TOUCHING * (ways + np.abs(y) @ directions) + unseen).tolist()
-    penetrating, touching = list[int](), list[int]()
-    for i, (contact, gap, scale) in enumerate(zip(model.contacts, gaps, scales, strict=True)):
-        if contact.held:
-            continue
-        if contact.rigid and gap < -scale:
+    rates, terms = v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds)
+    rates = drop_round_off(rates, terms)
+    states = np.zeros(len(model.contacts), int)
+    for i, contact in enumerate(model.contacts):
+        if contact.rigid and not contact.held and gaps[i] < -scales[i]:
             raise MultiPhiValueError(
-                f"displacement: lies {-gap:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
+                f"displacement: lies {-gaps[i]:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
                 "(static_equilibrium gives an admissible start)"
             )
-        if contact.rigid and gap <= scale:
-            touching.append(i)
-        elif gap < -scale and contact.first_state(gap, float(v @ base.directions[:, i])) == "closed":
-            penetrating.append(i)
-    states = np.zeros(len(model.contacts), int)
-    if model.held:
-        states = _first_states(model, v @ base.directions - speeds, np.abs(v) @ directions + np.abs(speeds))
-    states[penetrating + touching] = 1
+        depth = gaps[i] if gaps[i] < -scales[i] and not contact.held else 0.0
+        named = contact.first_state(depth, *rates[list(model.link_places[i])].tolist())
+        states[i] = [state.name for state in contact.states].index(named)
+        if contact.rigid and not contact.held and gaps[i] <= scales[i]:
+            states[i] = CLOSE
+    closed = [i for i, contact in enumerate(model.contacts) if states[i] != OPEN and not contact.held]
+    touching = tuple(i for i in closed if model.contacts[i].rigid)
     stretches = run.stretches or {}
-    held = np.array([gaps[i] - stretches.get(model.contacts[i].name, 0.0) for i in model.held])
+    held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
     left = base.gaps - moved
     left[list(model.held)] -= held
-    sprung = tuple(sorted([*penetrating, *(i for i in model.held if states[i] == 0)]))
-    return Start(y, v, sprung, tuple(touching), left, tuple(states.tolist()), held)
-
-
-def _first_states(model: MultiPhiModel, rates: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Numbers (c,) of the states in which elements start, contacts open; rates (c,) of gaps, and of their terms."""
-    states = np.zeros(len(model.contacts), int)
-    for i in model.held:
-        element, rate = model.contacts[i], drop_round_off(rates[[i]], sizes[[i]])[0]
-        states[i] = [state.name for state in element.states].index(element.first_state(0.0, float(rate)))
-    return states
+    stuck = [i for i, contact in enumerate(model.contacts) if contact.held and states[i] == 0]
+    sprung = tuple(sorted([*(i for i in closed if i not in touching), *stuck]))
+    return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
 
 
 def started(run: Run) -> Run:

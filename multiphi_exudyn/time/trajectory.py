@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.friction_rows import force_row, patch_row
+from multiphi_exudyn.time.friction_rows import force_row, patch_row, pressing_row
 from multiphi_exudyn.time.segment import Segment, Segments, listed
 
 __all__ = ["Ledger", "Start", "Statistics", "Trajectory"]
@@ -155,15 +156,7 @@ class Trajectory:
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
         i = self._contact("contact_force", contact)
-
-        def function(level: LoadedLevel) -> np.ndarray:
-            own = level.level
-            if i not in own.indices:
-                return np.zeros(2 * own.modes + 1)
-            k = own.indices.index(i)
-            return np.concatenate([own.force_rows[k], own.force_rate_rows[k], [level.asymptotic.forces[k]]])
-
-        return self._values(t, side, function)
+        return self._values(t, side, lambda level: pressing_row(level, i))
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
         """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
@@ -171,10 +164,12 @@ class Trajectory:
         first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
         if first > last:
             raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
+        links = self.model.pressing_links(i)
         pushed = sum(
-            segment.force_integral(i, max(first, segment.start), min(last, segment.end))
+            segment.force_integral(link, max(first, segment.start), min(last, segment.end))
             for segment in self.segments
-            if i in segment.level.level.indices and segment.start < last and segment.end > first
+            for link in links
+            if link in segment.level.level.indices and segment.start < last and segment.end > first
         )
         within = [event for event in self.events if first <= event.time <= last]
         struck = sum(event.impulse for event in within if event.contact == contact)
@@ -183,7 +178,7 @@ class Trajectory:
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
         """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
-        return self._intervals(self._contact("contact_intervals", contact))
+        return self._intervals(self.model.pressing_links(self._contact("contact_intervals", contact)))
 
     def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """T [N] of a friction, whose force on the structure is -h T: a float, or (k,)."""
@@ -204,7 +199,8 @@ class Trajectory:
 
         Instants are left out: a block without a spring that turns sticks at one and slips on.
         """
-        return np.array(self._intervals(self._friction("stick_intervals", name))).reshape(-1, 2)
+        places = self.model.link_places[self._friction("stick_intervals", name)]
+        return np.array(self._intervals([k for k in places if self.model.links[k].held])).reshape(-1, 2)
 
     def _contact(self, what: str, name: str) -> int:
         """Position of what is no friction."""
@@ -218,15 +214,15 @@ class Trajectory:
     def _friction(self, what: str, name: str) -> int:
         """Position of a friction."""
         i = self.model.index(name)
-        if not isinstance(self.model.contacts[i], Friction):
-            raise MultiPhiValueError(f"{what}: got {name!r}, which has no friction, need the name of a Friction")
+        if not any(self.model.links[k].held for k in self.model.link_places[i]):
+            raise MultiPhiValueError(f"{what}: got {name!r}, which has no friction, need the name of one that has")
         return i
 
-    def _intervals(self, i: int) -> list[tuple[float, float]]:
-        """When the link of an element holds [s], instants left out."""
+    def _intervals(self, links: Sequence[int]) -> list[tuple[float, float]]:
+        """When one of these links holds [s], instants left out."""
         intervals: list[tuple[float, float]] = []
         own = self._segments
-        closed = np.array([i in level.level.indices for level in own.levels], bool)
+        closed = np.array([not set(links).isdisjoint(level.level.indices) for level in own.levels], bool)
         places = np.flatnonzero(closed[own.numbers] & (own.ends > own.starts)) if len(own) else np.zeros(0, np.int64)
         for start, end in zip(own.starts[places].tolist(), own.ends[places].tolist(), strict=True):
             if intervals and intervals[-1][1] == start:
@@ -278,7 +274,9 @@ class Trajectory:
         i = self._contact("deepest_gap", contact)
         depth = 0.0
         for segment in self.segments:
-            if segment.phases[i] is not Phase.ARMED and i not in segment.level.level.indices:
+            exits = [k for k, (element, _) in enumerate(exits_of(segment.level)) if element == i]
+            waits = any(segment.phases[k] is not Phase.ARMED for k in exits)
+            if waits and set(self.model.pressing_links(i)).isdisjoint(segment.level.level.indices):
                 depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))
         return depth
 

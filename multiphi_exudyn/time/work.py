@@ -2,7 +2,7 @@
 
     damping   integral of xi'.D xi'
     varying   integral of sum_k  w_k a_k.xi' + w_k' (b_k.xi + c_k.xi' + d_k.xi'' + e_k)
-    friction  integral of f.xi': limits times ways slipped
+    friction  integral of f.xi' + sum_e T_e (s_e.xi'): limits times ways slipped, and forces that go with others
 
 f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so that f g is one of their products,
 
@@ -34,6 +34,7 @@ from multiphi_exudyn.events.arrays import (
     PRESCRIBED,
     RESPONSE,
     RUBBING,
+    RUBBINGS,
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
     WORK_WAVES,
@@ -49,9 +50,9 @@ UPWARDS_ABOVE = 0.5  # |s t| - d from which I_d follows from I_d-1: below, that 
 SERIES_ROUND_OFF = 1e-18  # of the first term of a power series: terms below it are left out
 
 
-def work_waves(n: int, p: int, q: int) -> int:
+def work_waves(n: int, p: int, q: int, s: int) -> int:
     """Waves that the work of a segment takes, of n coordinates, p exponentials and q channels."""
-    return 4 * n * p + 2 * q * p + 10 * p
+    return 4 * n * p + 2 * q * p + 2 * s * p + 14 * p
 
 
 @compiled
@@ -76,11 +77,11 @@ def integrate_works(
             return NEED
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
-        place, sums = 0, 4 * n * p + 2 * q * p
+        place, sums = 0, 4 * n * p + 2 * q * p + 2 * ints[level + RUBBINGS] * p
         list_terms(ints, numbers, waves, scratch)
         weigh_terms(ints, numbers, scratch)
         exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
-        raised = sums + 8 * p  # powers of t / T at the end
+        raised = sums + 12 * p  # powers of t / T at the end
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
@@ -136,7 +137,7 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> No
 
 @compiled
 def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves) -> None:
-    """Coefficients of D xi' (p, n), and of what w_k and w_k' are multiplied by (p, 2 q), without e_k."""
+    """Coefficients of D xi' (p, n), of what w_k and w_k' are multiplied by (p, 2 q), without e_k; T_e, s_e.xi' (p, 2 s)."""
     level, p, q = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS]
     n = ints[level + MODES] + q
     for j in range(p):
@@ -153,16 +154,25 @@ def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves) -> None:
                 moved += numbers[row + n + i] * x + numbers[row + 2 * n + i] * v + numbers[row + 3 * n + i] * a
             scratch[4 * p * n + 2 * q * j + k] = held
             scratch[4 * p * n + 2 * q * j + q + k] = moved
+        for e in range(ints[level + RUBBINGS]):
+            row, tension, speed = ints[level + RUBBING] + n + e * (4 * n + 1), 0j, 0j
+            for i in range(n):
+                v = scratch[(p + j) * n + i]
+                tension += numbers[row + i] * scratch[j * n + i] + numbers[row + n + i] * v
+                speed += numbers[row + 2 * n + i] * v
+            at = 4 * p * n + 2 * q * p + 2 * (e * p + j)
+            scratch[at] = tension
+            scratch[at + 1] = speed
 
 
 @compiled
 def multiply(ints: Ints, scratch: Waves, n: int, a: int, length: int, b: int, further: int, sums: int) -> int:
     """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree; whether there are any.
 
-    In the scratch memory from ``sums`` on, (4, 2 p): of damping and of what varies, then both with conj(G_k).
+    In the scratch memory from ``sums`` on, (6, 2 p): of damping, what varies and friction, then all with conj(G_k).
     """
     p, q, some, reached = ints[FLOW_COUNT], ints[CHANNELS], 0, ints[ints[ints[AFTER + LEVEL] + RESPONSE] + REACHED]
-    for m in range(4):
+    for m in range(6):
         for d in range(length + further - 1):
             scratch[sums + m * 2 * p + d] = 0j
     for j in range(a, a + length):
@@ -186,12 +196,22 @@ def multiply(ints: Ints, scratch: Waves, n: int, a: int, length: int, b: int, fu
                     f, g = scratch[part + k * n], scratch[4 * p * n + 2 * q * j + i]
                     varying += f * g
                     mirrored += f.conjugate() * g
-            if same != 0 or crossed != 0 or varying != 0 or mirrored != 0:
+            rubbed, opposed = 0j, 0j
+            for e in range(ints[ints[AFTER + LEVEL] + RUBBINGS]):
+                one, other = 4 * p * n + 2 * q * p + 2 * (e * p + j), 4 * p * n + 2 * q * p + 2 * (e * p + k)
+                rubbed += scratch[one] * scratch[other + 1]
+                opposed += scratch[one] * scratch[other + 1].conjugate()
+                if j != k:
+                    rubbed += scratch[other] * scratch[one + 1]
+                    opposed += scratch[other].conjugate() * scratch[one + 1]
+            if same != 0 or crossed != 0 or varying != 0 or mirrored != 0 or rubbed != 0 or opposed != 0:
                 some, at = 1, sums + j - a + k - b
                 scratch[at] += same
                 scratch[at + 2 * p] += varying
-                scratch[at + 4 * p] += crossed
-                scratch[at + 6 * p] += mirrored
+                scratch[at + 4 * p] += rubbed
+                scratch[at + 6 * p] += crossed
+                scratch[at + 8 * p] += mirrored
+                scratch[at + 10 * p] += opposed
     return some
 
 
@@ -220,16 +240,16 @@ def integrate(
     rate, end, unit = waves[ints[basis + RATES] + b], waves[phi + b], numbers[ints[basis + SCALES]]
     if mirrored == 1:
         rate, end = complex(rate.real, -rate.imag), complex(end.real, -end.imag)
-    s, end, first = waves[ints[basis + RATES] + a] + rate, waves[phi + a] * end, sums + 4 * p * mirrored
-    x, size, raised = s * duration, math.sqrt(s.real * s.real + s.imag * s.imag), sums + 8 * p
+    s, end, first = waves[ints[basis + RATES] + a] + rate, waves[phi + a] * end, sums + 6 * p * mirrored
+    x, size, raised = s * duration, math.sqrt(s.real * s.real + s.imag * s.imag), sums + 12 * p
     upwards = min(max(math.floor(size * duration - UPWARDS_ABOVE) + 1, 0), count)
     integral, inverse = end - 1.0, complex(s.real / size / size, -s.imag / size / size) if upwards > 0 else 0j
     for d in range(upwards):
         if d > 0:
             integral = scratch[raised + d] * end - d / unit * integral
         integral *= inverse
-        works[result] += 0.5 * (scratch[first + d] * integral).real
-        works[result + 1] += 0.5 * (scratch[first + 2 * p + d] * integral).real
+        for part in range(3):
+            works[result + part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
     if upwards == count:
         return
     term, integral, n = duration / count * scratch[raised + count - 1] * end, 0j, count
@@ -239,8 +259,8 @@ def integrate(
         n += 1
         term *= x * (-1.0 / n)
     for d in range(count - 1, upwards - 1, -1):
-        works[result] += 0.5 * (scratch[first + d] * integral).real
-        works[result + 1] += 0.5 * (scratch[first + 2 * p + d] * integral).real
+        for part in range(3):
+            works[result + part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
         if d > 0:
             integral = (scratch[raised + d] * end - s * integral) * (unit / d)
 
@@ -262,12 +282,20 @@ def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, wo
 
 @compiled
 def add_friction(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers, result: int) -> None:
-    """Adds the limits times the ways slipped: f times what xi has changed by."""
+    """Adds the limits times the ways slipped, f times what xi has changed by, and what is constant of T_e likewise."""
     level, row = ints[AFTER + LEVEL], ints[ints[AFTER + LEVEL] + RUBBING]
     n = ints[level + MODES] + ints[CHANNELS]
     for j in range(ints[FLOW_COUNT]):
         pushed = 0j
         for i in range(n):
             pushed += numbers[row + i] * scratch[j * n + i]
+        for e in range(ints[level + RUBBINGS]):
+            pair = row + n + e * (4 * n + 1)
+            constant, moved = numbers[pair + 4 * n], 0j
+            for held in range(n - ints[CHANNELS] + ints[PRESCRIBED], n):
+                constant += numbers[pair + held] * numbers[ints[AFTER + PLACE] + held]
+            for i in range(n):
+                moved += numbers[pair + 3 * n + i] * scratch[j * n + i]
+            pushed += constant * moved
         began = 1.0 if ints[ints[ints[FLOW_BASIS] + POWERS] + j] == 0 else 0.0
         works[result] += (pushed * (waves[ints[WORK_WAVES] + j] - began)).real

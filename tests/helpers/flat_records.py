@@ -74,12 +74,14 @@ class Buffers:
         """``modal_response(squares, damping)``."""
         r, p = response.shapes.shape
         maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-        alone = (squares == 0) & ~np.any(damping, axis=1) | response.diagonal
-        poles = np.any(response.from_velocity, axis=1) & ~np.any(response.shapes[alone], axis=0)
         basis, reached = self.put_basis(response.basis), self.put_ints(np.zeros(2 * p))
         places = [self.put_waves(values) for values in maps]
         places += [self.put_numbers(squares), self.put_numbers(np.diagonal(damping) / 2)]
-        places += [self.put_ints(alone), self.put_ints(poles)]
+        chains = [len(response.chains)]
+        for chain in response.chains:
+            parts = chain.mixing, chain.shapes.T, chain.pushes
+            chains += [len(chain.mixing), *(self.put_waves(part) for part in parts)]
+        places += [self.put_ints(response.alone), self.put_ints(response.poles), self.put_ints(chains)]
         record = self.put_ints([r, basis, reached, *places])
         response_arrays.reached_modes(self.ints, self.waves, record)
         return record

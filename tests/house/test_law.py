@@ -12,10 +12,10 @@ from multiphi_exudyn import events, levels
 from multiphi_exudyn.events import decision
 
 NAME = re.compile(r"\b([a-z_]+)\.([A-Za-z_.]*[A-Za-z_])\b")
-ROW = re.compile(r"^    (\(38\.\d\)|\d) (.*)$", re.MULTILINE)
-SENTENCE = re.compile(r"^(\d)\. .*?^   -> (.*?)(?=^\S)", re.MULTILINE | re.DOTALL)
-NUMBERS = re.compile(r"(\d(?:, \d)*)\. ")
-SENTENCES = list("123456789")
+ROW = re.compile(r"^    (\(38\.\d\)|\d+) (.*)$", re.MULTILINE)
+SENTENCE = re.compile(r"^(\d+)\. .*?^   -> (.*?)(?=^\S)", re.MULTILINE | re.DOTALL)
+NUMBERS = re.compile(r"(\d+(?:, \d+)*)\. ")
+SENTENCES = [str(number) for number in range(1, 11)]
 
 
 def doc(thing: object) -> str:

@@ -7,8 +7,8 @@ from flat_records import Buffers, fast
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.mathematics import compiled, response_arrays
+from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.forced_response import particular
-from multiphi_exudyn.mathematics.free_response import modal_response
 
 SQUARES = np.array([0.0, 1.0, 1.0001, 25.0, -4.0, 9e4])
 DIAGONAL = np.diag([0.0, 0.0, 0.02, 10.0, 1.0, 3.0])

@@ -230,7 +230,7 @@ class TestOtherQuestions:
 
     @pytest.mark.parametrize("asked", ["friction_force", "slip"])
     def test_a_contact_has_no_friction(self, asked):
-        message = f"{asked}: got 'stop', which has no friction, need the name of a Friction"
+        message = f"{asked}: got 'stop', which has no friction, need the name of one that has"
         with pytest.raises(mp.MultiPhiValueError, match=message):
             getattr(self.run(), asked)("stop", 0.5)
 

@@ -202,7 +202,7 @@ CASES = (
     ),
     Case(
         "damping-coupled-and-critical-alike",
-        "Two coupled modes critically damped alike have no exponential form: the run must say so.",
+        "Two coupled modes critically damped alike: a double rate with one mode, t exp(-omega t) that is nobody's own.",
         lambda quick: _defective(),
     ),
     *_equal_frequencies(),

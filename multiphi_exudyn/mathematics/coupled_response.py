@@ -1,0 +1,175 @@
+"""Free response of modal equations that damping or friction couple (free_response.py).
+
+    eta'' + D eta' + S eta = p,   S = diag(omega^2) + what couples places (friction), D and S no symmetric matrices
+
+The motions are those of z' = A z, z = (|omega| eta_e, eta') with the elastic modes e, every entry of it a velocity,
+whatever the units (motion_parts.py). Zero-frequency modes follow. On those that are damped nothing acts but damping:
+eta_f' is part of z, and eta_f its integral. Those that are not, a, are moved by the others and move none,
+
+    eta_a'' = R y + p_a,   eta_a = R T^-2 y + a + b t + p_a t^2 / 2
+
+p is constant on zero-frequency modes, and zero on the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.mathematics.free_response import Chain, ModalResponse, uncoupled
+from multiphi_exudyn.mathematics.motion_parts import Parts, parts_of
+
+__all__ = ["modal_response"]
+
+DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
+
+
+def modal_response(squares: np.ndarray, damping: np.ndarray, coupling: np.ndarray | None = None) -> ModalResponse:
+    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, damping D [1/s] and S - diag(omega^2) (r, r).
+
+    Raises NumericalFailure where the rates are not told apart by more than round-off.
+    """
+    diagonal = np.diagonal(damping)
+    scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
+    off_diagonal = damping - np.diag(diagonal)
+    apart = np.all(np.abs(off_diagonal) <= DIAGONAL * np.maximum(scale, np.max(scale, initial=0.0) * DIAGONAL))
+    if apart and (coupling is None or not np.any(coupling)):
+        return uncoupled(squares, diagonal)
+    return _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
+
+
+def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> ModalResponse:
+    own = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
+    elastic = own[squares[own] != 0]
+    scale = np.sqrt(np.abs(squares[elastic]))
+    upper = scale[:, None] * (elastic[:, None] == own)
+    lower = -stiffness[np.ix_(own, elastic)] / scale
+    system = np.block([[np.zeros((len(elastic),) * 2), upper], [lower, -damping[np.ix_(own, own)]]])
+    parts, r, e = parts_of(system), len(squares), len(elastic)
+    shapes, speeds = np.zeros((2, r, len(parts.rates)), complex)
+    maps = np.zeros((2, len(parts.rates), r), complex)
+    shapes[elastic], speeds[own] = parts.vectors[:e] / scale[:, None], parts.vectors[e:]
+    maps[0][:, elastic], maps[1][:, own] = parts.inverse[:, :e] * scale, parts.inverse[:, e:]
+    free, alone = own[squares[own] == 0], np.setdiff1d(np.arange(r), own)
+    if len(free):
+        shapes[free] = _integrated(speeds[free], parts)
+    driven = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
+    if np.any(driven):
+        shapes[alone] = _integrated(_integrated(driven, parts), parts)
+    response = _joined(_moving(parts, shapes, maps), _following(parts, shapes, maps, free, alone))
+    return _with_drift(response, stiffness, damping, free, alone) if len(free) else response
+
+
+def _integrated(rows: np.ndarray, parts: Parts) -> np.ndarray:
+    """X (n, k), X y' = rows y."""
+    if np.any(np.diagonal(parts.mixing) == 0):
+        raise NumericalFailure("modes: friction cancels the stiffness of a mode beside a zero-frequency mode")
+    return np.asarray(scipy.linalg.solve_triangular(parts.mixing, rows.T, trans="T").T)
+
+
+def _moving(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse:
+    """What moves by the parts: their exponentials, each with the powers of its part."""
+    r, rates, powers, columns, rows = len(shapes), list[complex](), list[int](), list[int](), []
+    poles, chains = list[bool](), list[Chain]()
+    for first, end in parts.groups:
+        raised, own = parts.powers(first, end), slice(first, end)
+        for i in range(end - first):
+            rates += [complex(parts.rates[first])] * len(raised)
+            powers += range(len(raised))
+            columns += [first + i] * len(raised)
+            rows.append(np.einsum("dj,mjr->mdr", raised[:, i], maps[:, own]))
+        poles += [end - first == 1] * (len(raised) * (end - first))
+        if end - first > 1:
+            chains.append(Chain(parts.mixing[own, own], shapes[:, own], maps[1][own]))
+    found = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, r), complex)
+    basis = Exponentials(np.array(rates, complex), np.array(powers, int))
+    nothing = np.zeros_like(found[0])
+    return ModalResponse(
+        basis=basis,
+        shapes=shapes[:, columns],
+        from_displacement=found[0],
+        from_velocity=found[1],
+        from_force=nothing,
+        diagonal=False,
+        alone=np.zeros(r, bool),
+        poles=np.array(poles, bool),
+        chains=tuple(chains),
+    )
+
+
+def _following(
+    parts: Parts, shapes: np.ndarray, maps: np.ndarray, free: np.ndarray, alone: np.ndarray
+) -> ModalResponse:
+    """What the zero-frequency modes, damped or alone, have beside that: a, and a + b t + p t^2 / 2."""
+    r, f, a = len(shapes), len(free), len(alone)
+    rate_shapes = shapes @ parts.mixing
+    here, unit = np.concatenate([free, np.repeat(alone, 3)]), np.eye(r)
+    found = np.zeros((3, f + 3 * a, r), complex)
+    found[0][:f] = unit[free] - (shapes[free] @ maps[0]).real
+    found[1][:f] = -(shapes[free] @ maps[1]).real
+    starts = f + 3 * np.arange(a)
+    found[0][starts], found[1][starts] = unit[alone] - (shapes[alone] @ maps[0]).real, -(shapes[alone] @ maps[1]).real
+    found[0][starts + 1] = -(rate_shapes[alone] @ maps[0]).real
+    found[1][starts + 1] = unit[alone] - (rate_shapes[alone] @ maps[1]).real
+    found[2][starts + 2] = 0.5 * unit[alone]
+    powers = np.concatenate([np.zeros(f, int), np.tile([0, 1, 2], a)])
+    basis = Exponentials(np.zeros(len(powers), complex), powers)
+    poles, itself = np.arange(len(powers)) < f, np.zeros(r, bool)
+    chains = list[Chain]()
+    for mode, start in zip(alone.tolist(), starts.tolist(), strict=True):
+        if np.any(shapes[mode]):
+            along = np.column_stack([unit[mode], np.zeros(r)]).astype(complex)
+            chains.append(Chain(np.eye(2, k=1, dtype=complex), along, found[1][start : start + 2]))
+        else:
+            itself[mode] = True
+    beside = unit[:, here].astype(complex)
+    return ModalResponse(basis, beside, found[0], found[1], found[2], False, itself, poles, tuple(chains))
+
+
+def _joined(one: ModalResponse, other: ModalResponse) -> ModalResponse:
+    """The sum of two motions of the same modes."""
+    basis = Exponentials(
+        np.concatenate([one.basis.rates, other.basis.rates]), np.concatenate([one.basis.powers, other.basis.powers])
+    )
+    return ModalResponse(
+        basis,
+        np.hstack([one.shapes, other.shapes]),
+        np.vstack([one.from_displacement, other.from_displacement]),
+        np.vstack([one.from_velocity, other.from_velocity]),
+        np.vstack([one.from_force, other.from_force]),
+        False,
+        one.alone | other.alone,
+        np.concatenate([one.poles, other.poles]),
+        one.chains + other.chains,
+    )
+
+
+def _with_drift(
+    response: ModalResponse, stiffness: np.ndarray, damping: np.ndarray, free: np.ndarray, alone: np.ndarray
+) -> ModalResponse:
+    """Adds the motion u + w t of damped zero-frequency modes under a constant force: S u + D w = p."""
+    r, count = len(stiffness), len(free)
+    moving = np.setdiff1d(np.arange(r), alone)
+    unknowns, given = stiffness.copy(), np.eye(r)[:, free]
+    unknowns[:, free] = damping[:, free]
+    solution = np.zeros((r, count))
+    solution[moving] = np.linalg.solve(unknowns[np.ix_(moving, moving)], given[moving])
+    drift = np.zeros_like(solution)
+    drift[free] = solution[free]
+    offset = solution - drift
+    powers = np.tile([0, 0, 1], count)  # u, then w t with its derivative w
+    basis = Exponentials(np.zeros(3 * count, complex), powers)
+    added = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count).astype(complex)
+    maps = np.zeros((3, 3 * count, r), complex)
+    maps[2][::3, free] = maps[2][2::3, free] = np.eye(count)
+    forced = response.from_force.copy()
+    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ drift
+    carried = -(stiffness[alone] @ offset + damping[alone] @ drift)  # what that does to the modes that others move
+    forced[:, free] += response.from_force[:, alone] @ carried
+    still = np.zeros(r, bool), np.zeros(3 * count, bool)
+    own = ModalResponse(basis, added, maps[0], maps[1], maps[2], False, *still)
+    return _joined(replace(response, from_force=forced), own)
