@@ -44,7 +44,8 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> signals.row_sign, signals.rate_sign, phases.becomes
 10. A contact with friction that closes sticks where it hits; without a spring it slides in the direction in which it
    moves, and sticks where it does not. Whether it goes on sticking, or sliding, does not keep it from closing: what
-   is always taken is decided after it, at the same instant.
+   is always taken is decided after it, at the same instant. With a spring it sticks while its force, beyond the limit
+   by truncation, comes back to it. Where its pressure falls to zero it opens, and keeps no friction.
    -> changes.turn_wishes, phases.is_denied
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
@@ -110,7 +111,7 @@ from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state
 from multiphi_exudyn.events.striking import close_without_impact, impact
 from multiphi_exudyn.events.switching import switch
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_ONCE
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN_ONCE
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
@@ -230,8 +231,8 @@ def find_refused(ints: Ints) -> int:
             if ints[heard + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
                 unheard = 1
-            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element) == 0
-            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or once:
+            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element, ints[exit_ + ASKED]) == 0
+            if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or ints[exit_ + FIRMNESS] == TAKEN_FALLING or once:
                 ints[pulling + element] = ints[exit_ + ASKED]
                 pulled = 1
     if refused == 0:
@@ -242,13 +243,14 @@ def find_refused(ints: Ints) -> int:
 
 
 @compiled
-def is_latest(ints: Ints, element: int) -> int:
-    """1 where an element was the last to change at this instant, or has changed again and again."""
-    last, count = NOBODY, 0
+def is_latest(ints: Ints, element: int, asked: int) -> int:
+    """1 where an element was the last to change at this instant, from the state asked for, or has changed often."""
+    last, left, count = NOBODY, NOBODY, 0
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
         last = ints[ints[CHANGES] + k * CHANGE_WIDTH]
+        left = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
         count += 1 if last == element else 0
-    return 1 if last == element or count > MOST_RETURNS else 0
+    return 1 if (last == element and left == asked) or count > MOST_RETURNS else 0
 
 
 @compiled

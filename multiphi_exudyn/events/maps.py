@@ -101,30 +101,30 @@ def move_part(
 ) -> None:
     """xi (rates 0) or xi' (rates 1) of a level with n coordinates in level ``target``.
 
-    sizes: of their terms, where the map knows them, else zero.
+    sizes: of their terms; a map that sets places knows the terms of which its numbers are sums.
     """
     matrix, offset = ints[way + MATRIX], ints[way + OFFSET]
     if rates == 1:
         matrix, offset = ints[way + RATE_MATRIX], ints[way + RATE_OFFSET]
     for i in range(ints[target + MODES] + ints[CHANNELS]):
         total = numbers[offset + i] if offset >= 0 else 0.0
-        row, terms = matrix + i * n, ints[way + MAP_TERMS] + i * (n + 1)
+        row, terms, size = matrix + i * n, ints[way + MAP_TERMS] + i * (n + 1), abs(total)
+        if ints[way + MAP_TERMS] >= 0:
+            size = numbers[terms + n]
+        else:
+            terms = row
         for j in range(n):
             total += numbers[row + j] * numbers[given + j]
+            size += abs(numbers[terms + j] * numbers[given + j])
         numbers[result + i] = total
-        numbers[sizes + i] = 0.0
-        if ints[way + MAP_TERMS] >= 0:
-            numbers[sizes + i] = numbers[terms + n]
-            for j in range(n):
-                numbers[sizes + i] += numbers[terms + j] * abs(numbers[given + j])
+        numbers[sizes + i] = size
 
 
 @compiled
 def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, result: int) -> int:
     """xi of the state ``places`` and xi' of ``speeds``, of the same instant, as a state of a level; OK or NEED.
 
-    Where the map sets places, the sizes of its terms belong to the scales: a mode that then hardly moves has the
-    round-off of those that do.
+    The sizes of the map's terms belong to the scales: a mode that then hardly moves has the round-off of those that do.
     """
     here, there = ints[places + LEVEL], ints[speeds + LEVEL]
     way = find_map(ints, here, level)

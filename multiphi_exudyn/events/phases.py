@@ -80,7 +80,7 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
         rate = becomes(ints, numbers, waves, state, signal, 2)
     if value == 0 and rate >= 0:
         return ARMED
-    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] == TAKEN_ONCE
+    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] >= TAKEN_ONCE
     return RECOVERING if rate > 0 and recovers else REFUSED
 
 

@@ -222,26 +222,29 @@ def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level:
     way, there = find_map(ints, ints[places + LEVEL], level), find_map(ints, ints[speeds + LEVEL], level)
     if way < 0 or there < 0:
         return min(way, there)
-    value = numbers[row + 2 * n]
+    value, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
     for i in range(n):
-        value += numbers[row + i] * numbers[ints[way + OFFSET] + i]
-    size, width = abs(value), ints[ints[places + LEVEL] + MODES] + ints[CHANNELS]
+        term = numbers[row + i] * numbers[ints[way + OFFSET] + i]
+        value += term
+        size += abs(term)
+    width = ints[ints[places + LEVEL] + MODES] + ints[CHANNELS]
     for j in range(width):
-        factor = 0.0
+        factor, terms = 0.0, 0.0
         for i in range(n):
-            factor += numbers[row + i] * numbers[ints[way + MATRIX] + i * width + j]
-        factor *= numbers[ints[places + PLACE] + j]
-        value += factor
-        size += abs(factor)
+            term = numbers[row + i] * numbers[ints[way + MATRIX] + i * width + j]
+            factor += term
+            terms += abs(term)
+        value += factor * numbers[ints[places + PLACE] + j]
+        size += terms * abs(numbers[ints[places + PLACE] + j])
     width = ints[ints[speeds + LEVEL] + MODES] + ints[CHANNELS]
     for j in range(width):
         damped, reached = 0.0, 0.0
         for i in range(n):
             damped += numbers[row + n + i] * numbers[ints[there + RATE_MATRIX] + i * width + j]
-            reached += numbers[row + i] * numbers[ints[there + MATRIX] + i * width + j]
+            reached += abs(numbers[row + i] * numbers[ints[there + MATRIX] + i * width + j])
         damped *= numbers[ints[speeds + SPEED] + j]
         value += damped
-        size += abs(damped) + abs(reached) * numbers[ints[speeds + REACH] + j]
+        size += abs(damped) + reached * numbers[ints[speeds + REACH] + j]
     return sign_of(value, size)
 
 

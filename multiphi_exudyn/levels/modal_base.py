@@ -134,8 +134,8 @@ class ModalBase:
         return {i: link.law for i, link in given if isinstance(link, LawSpring)}
 
     def label(self, contact: int) -> str:
-        """What a link is called: its name, for a spring of a force law the law's."""
-        given = self.links[contact]
+        """What a link is called: its name, for a spring of a force law the law's, with friction that of its contact."""
+        given = self.links[self.oblique.get(contact, contact)]
         return given.law.name if isinstance(given, LawSpring) else given.name
 
     @functools.cached_property

@@ -12,8 +12,9 @@ in the level l that every compliant contact makes alone, for a force law in that
     1 - (sum over r modes of (p.phi / Omega)^2) / (p.K^-1 p) <= POINT_SHARE
 
 in the open level for every named point, rigid-body modes left out. A closed rigid contact does not move, so nothing is
-said of it by a static response: with one r is at least RIGID. Where the base does not hold all modes it is that of
-FIRST modes; contacts, not points, may ask for a larger one.
+said of it by a static response: with one r is at least RIGID. Friction on a spring is a compliant contact that sticks,
+and with RIGID modes it has enough as well: its force keeps below its limit. Where the base does not hold all modes it
+is that of FIRST modes; contacts, not points, may ask for a larger one.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "Tolerance", "UpTo", "chosen_modes", "is_count"]
@@ -92,9 +93,8 @@ def chosen_modes(
     count = max(count, of_points if base.complete else min(of_points, SERVED))
     most = min(MOST, base.modes.count)
     for closed in _alone(base, chains):
-        if count >= most:
-            break
-        count = _of_contact(level, closed, count, most)
+        bound = most if not base.contacts[closed[0]].held else min(most, max(count, RIGID))
+        count = count if count >= bound else _of_contact(level, closed, count, bound)
     return min(count, most)
 
 
@@ -109,7 +109,7 @@ def _of_points(base: ModalBase, rows: np.ndarray) -> int:
 
 def _alone(base: ModalBase, chains: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
     """Positions of closed contacts: every compliant one alone, every side of a force law where it is stiffest."""
-    single = [(i,) for i, c in enumerate(base.contacts) if isinstance(c, UnilateralContact) and not c.rigid]
+    single = [(i,) for i, c in enumerate(base.contacts) if not isinstance(c, LawSpring) and not c.rigid]
     stiffest = [
         tuple(sorted(chain[: 1 + int(np.argmax(np.cumsum(base.stiffnesses[list(chain)])))])) for chain in chains
     ]

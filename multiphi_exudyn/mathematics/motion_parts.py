@@ -20,13 +20,13 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.round_off import DEFECTIVE
+from multiphi_exudyn.mathematics.round_off import DEFECTIVE, WORST_CONDITION
 
 __all__ = ["Parts", "parts_of"]
 
 STEP = 1e-3  # of an eigenvector: a larger step of its refinement is none of round-off
-CLUSTERS = 10.0 ** np.arange(-12.0, -1.0)  # of the rates: distances up to which they make a cluster, tried in turn
-BEYOND = 4  # powers that a cluster has beyond its size: its rates do not coincide to the last digit
+CLUSTERS = 10.0 ** np.arange(-12.0, -3.0)  # of the rates: distances up to which they make a cluster, tried in turn
+BEYOND = 8  # powers that a cluster has beyond its size: its rates do not coincide to the last digit
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,16 @@ class Parts:
 def parts_of(system: np.ndarray) -> Parts:
     """The parts of z' = A z, A (s, s) real. Raises NumericalFailure where round-off does not tell them apart."""
     rates, vectors = (found.astype(complex) for found in np.linalg.eig(system))  # eig gives real ones where all decay
-    if np.linalg.cond(vectors) < DEFECTIVE:
+    condition = float(np.linalg.cond(vectors))
+    if condition < DEFECTIVE:
         return _single(system, *_refined(system, rates, vectors))
-    turned = scipy.linalg.schur(system, output="complex")[0]
-    rates = np.diagonal(turned)
-    largest = float(np.max(np.abs(rates)))
-    for share in CLUSTERS:
-        found = _clustered(system, rates, _clusters(rates, share * largest), share * largest)
+    turned = np.diagonal(scipy.linalg.schur(system, output="complex")[0])
+    for distance in CLUSTERS * float(np.max(np.abs(turned))):
+        found = _clustered(system, turned, _clusters(turned, distance), distance)
         if found is not None:
             return found
+    if condition < WORST_CONDITION:
+        return _single(system, *_refined(system, rates, vectors))
     raise NumericalFailure("modes: the rates of a level's coupled modes are not told apart by more than round-off")
 
 

@@ -22,7 +22,8 @@ the direction in which it moves; one that opens has T = 0.
     normal            friction without a spring    with a spring k_t
     compliant         works                        works
     viscous           works                        refused: slip ends by N', which has an acceleration
-    rigid             works, but for its impacts   refused: so has N' of a reaction
+    rigid             levels alone: a run is       refused: so has N' of a reaction
+                      refused, as it strikes
     force law         has none: a law is no contact, and has no N
 
 A stop 1.35 mm below a beam that bends along +z has h = +e_c and gap = 1.35e-3; a stop above it has
@@ -40,6 +41,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.element import (
     ALWAYS_TAKEN,
+    TAKEN_FALLING,
     TAKEN_ONCE,
     ElementState,
     Exit,
@@ -166,8 +168,9 @@ class UnilateralContact:
         if not self.further:
             return plain
         (closing,), (opening,) = (state.exits for state in plain)
+        firmness = ALWAYS_TAKEN if math.isinf(self.tangential_stiffness) else TAKEN_FALLING
         stick = tuple(
-            Exit(f"slip{sign}", force=self.most, firmness=ALWAYS_TAKEN, further=(Share(1, force=s),))
+            Exit(f"slip{sign}", force=self.most, firmness=firmness, further=(Share(1, force=s),))
             for sign, s in (("+", 1.0), ("-", -1.0))
         )
         turn = Turn(1, "slip+", "slip-") if math.isinf(self.tangential_stiffness) else None

@@ -21,6 +21,7 @@ have changed (or a change in truncated modes), the exit says by its firmness wha
     NEVER_RECOVERS   it does not wait for that
     ALWAYS_TAKEN     nor for whether the state it leads to admits it: it changes at once
     TAKEN_ONCE       it waits while it rises; else it changes at once, but stays where it has just come from there
+    TAKEN_FALLING    it waits while it rises; else it changes at once
 
     contact          open: q;  closed: -q where compliant, lambda where rigid (always taken) or viscous (never recovers)
     friction |T| <= F, T = -lambda, rigid or by a spring in series
@@ -41,6 +42,7 @@ __all__ = [
     "ALWAYS_TAKEN",
     "MAY_RECOVER",
     "NEVER_RECOVERS",
+    "TAKEN_FALLING",
     "TAKEN_ONCE",
     "AnyLink",
     "Element",
@@ -57,7 +59,7 @@ __all__ = [
     "links_of",
 ]
 
-MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE = 0, 1, 2, 3
+MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE, TAKEN_FALLING = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
 
     "truncated contact: ..."  static flexibility that a closed compliant level's modes leave out (level.py): peak
                               contact forces are off; known before any run
+    "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
     "lost energy: ..."        what truncation took of the largest energy of the run
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
     "undamped modes: ..."     modes for which a list of modal ratios has none
@@ -39,6 +40,7 @@ RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator 
 PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
+STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
 MANY_PIECES = 2**16  # of loads in a run: half a minute of computing and 200 MB
 PIECE_SECONDS = 5e-4  # that a piece of a load takes in a small model
 PIECE_BYTES = 3000  # that it takes there
@@ -86,7 +88,13 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
 
 def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
     """Of the contact of which the modes of these levels leave out most of the static flexibility."""
-    shares = [(share, name, level.modes) for level in levels for name, share in level.static_shares.items()]
+    yield from _sticking(levels)
+    shares = [
+        (share, name, level.modes)
+        for level in levels
+        for name, share in level.static_shares.items()
+        if name not in {link.name for link in level.base.links if link.held}
+    ]
     share, name, modes = max(shares, default=(0.0, "", 0))
     if share >= CONTACT_SHARE:
         others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
@@ -94,6 +102,21 @@ def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
         yield (
             f"truncated contact: at {name!r}{also} {modes} modes leave out {_per_cent(share)} of the static "
             f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
+        )
+
+
+def _sticking(levels: Sequence[Level]) -> Iterator[str]:
+    """Of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
+    found: dict[str, int] = {}
+    for level in levels:
+        for link in (level.base.links[i] for i in level.indices if level.modes < STICKING):
+            if link.held and (link.rigid or level.static_shares.get(link.name, 0.0) >= CONTACT_SHARE):
+                found[link.name] = min(level.modes, found.get(link.name, STICKING))
+    if found:
+        names = ", ".join(repr(name) for name in found)
+        yield (
+            f"truncated friction: {min(found.values())} modes hold what sticks at {names}, so its force may be off by "
+            f"5 % and more until it slips; {REMEDY}"
         )
 
 

@@ -69,6 +69,7 @@ def simulate(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
+    _check_impacts(model)
     run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
@@ -195,6 +196,15 @@ def started(run: Run) -> Run:
     if isinstance(start, Equilibrium):
         return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
     return run
+
+
+def _check_impacts(model: MultiPhiModel) -> None:
+    """Refuse friction at rigid contacts: their levels are known, their impacts are not."""
+    rigid = [contact.name for contact in model.contacts if contact.rigid and contact.further]
+    if rigid:
+        raise MultiPhiValueError(
+            f"simulate: got friction at the rigid contacts {', '.join(rigid)}, which strike, need a finite stiffness"
+        )
 
 
 def _check_start(run: Run) -> None:

@@ -137,7 +137,7 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> No
 
 @compiled
 def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves) -> None:
-    """Coefficients of D xi' (p, n), of what w_k and w_k' are multiplied by (p, 2 q), without e_k; T_e, s_e.xi' (p, 2 s)."""
+    """Coefficients of D xi' (p, n), of what w_k, w_k' are multiplied by (p, 2 q), but e_k, and of T_e, s_e.xi'."""
     level, p, q = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS]
     n = ints[level + MODES] + q
     for j in range(p):

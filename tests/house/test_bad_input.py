@@ -96,6 +96,10 @@ ARRAYS = {
 NUMBERS = {
     "gap": lambda x: mp.UnilateralContact("c", "tip", x),
     "stiffness": lambda x: mp.UnilateralContact("c", "tip", 0.1, x),
+    "limit": lambda x: mp.Friction("f", "tip", x),
+    "static limit": lambda x: mp.Friction("f", "tip", 0.1, x),
+    "friction's spring": lambda x: mp.Friction("f", "tip", 0.1, stiffness=x),
+    "surface speed": lambda x: mp.Friction("f", "tip", 0.1, velocity=x),
     "coefficient": lambda x: model(contacts=[mp.UnilateralContact("c", {"tip": x}, 0.1)]),
     "modes": lambda x: model(modes=x),
     "end": lambda x: run(t_end=x),
@@ -126,6 +130,8 @@ NUMBERS = {
 }
 ALLOWED = {
     ("stiffness", "infinite"),  # rigid
+    ("friction's spring", "infinite"),  # none
+    ("static limit", "none"),  # the limit
     ("modes", "none"),  # chosen
     ("beyond", "none"),  # undamped, with a warning
     ("time of a gap", "array"),
@@ -133,7 +139,20 @@ ALLOWED = {
     ("time of a gap", "truth"),
 }
 NO_NUMBER = NO_NUMBERS | {"negative": -1.0}
-POSITIVE = ("stiffness", "modes", "end", "frequency", "sweep start", "sweep duration", "tolerance", "alpha", "cut-off")
+POSITIVE = (
+    "stiffness",
+    "limit",
+    "static limit",
+    "friction's spring",
+    "modes",
+    "end",
+    "frequency",
+    "sweep start",
+    "sweep duration",
+    "tolerance",
+    "alpha",
+    "cut-off",
+)
 
 
 def refusal(build, given):

@@ -102,10 +102,7 @@ class TestFewModesOfALevel:
 
 
 class TestStopsStruckAtOnce:
-    @pytest.mark.parametrize(
-        "stiffness",
-        [1e4, pytest.param(math.inf, marks=pytest.mark.xfail(reason="chatter at the instant on Haswell's kernels"))],
-    )
+    @pytest.mark.parametrize("stiffness", [1e4, math.inf])
     @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (3, 0, 4, 2, 1)])
     def test_in_a_mirror_symmetric_scene_close_together_and_keep_it_symmetric(self, stiffness, order):
         n, places = 21, [2, 6, 10, 14, 18]
@@ -118,6 +115,8 @@ class TestStopsStruckAtOnce:
         first = [event.time for event in run.events if event.kind == "close"][:5]
         assert len(first) == 5
         assert_allclose(first, 0.1, rtol=1e-12)
+        if math.isinf(stiffness):  # the beam bends over its stops and presses on them: no event beside these
+            assert len(run.events) == 5
         x = run.displacement(np.linspace(0, 0.13, 200))
         assert np.abs(x - x[::-1]).max() < SYMMETRIC * np.abs(x).max()
 

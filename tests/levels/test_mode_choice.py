@@ -31,6 +31,13 @@ def point_residual(model, name, modes):
     return 1 - kept / (row @ np.linalg.solve(structure.stiffness, row))
 
 
+@pytest.mark.parametrize(("stiffness", "modes"), [(math.inf, 12), (1e8, 12), (1e6, 10), (1e3, 7)])
+def test_friction_takes_no_more_modes_than_a_rigid_contact(stiffness, modes):
+    structure = mp.planar_beam(rig_beam(), elements=57, damping=rig_damping())
+    model = mp.MultiPhiModel(structure, [mp.Friction("ring", "node2", 0.6, stiffness=stiffness)])
+    assert model.most_modes == modes
+
+
 class TestDefault:
     @pytest.mark.parametrize("n", [4, 30])
     def test_all_modes_of_a_small_structure(self, n):

@@ -1,6 +1,7 @@
 """Rest under slowly applied forces with friction, and runs that start there."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_structure
 
 import multiphi_exudyn as mp
+from reference_models.rig import rig_beam, rig_damping
 
 
 def block(*elements):
@@ -49,6 +51,19 @@ class TestRuns:
         assert_allclose(
             run.friction_force("ring", 2.0), min(force * (25 / 29 if stiffness < 1e9 else 1), 2.0), rtol=1e-12
         )
+
+    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
+    @pytest.mark.parametrize("force", [0.3, 2.0])
+    def test_under_the_same_force_stay_at_rest_with_four_modes(self, stiffness, force):
+        """What modes leave out is in the level's state of rest: static residuals of load, friction and held place."""
+        beam = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
+        model = mp.MultiPhiModel(beam, [mp.Friction("ring", "node2", 0.6, stiffness=stiffness)], modes=4)
+        start = model.equilibrium({"node3": force})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = mp.simulate(model, 1.0, start=start, loads=[mp.ConstantLoad("node3", force)])
+        assert not run.events
+        assert_allclose(run.displacement(np.array([0.3, 1.0])).T, [start.displacement] * 2, rtol=1e-11, atol=1e-16)
 
     def test_let_go_have_the_energy_of_the_stretched_spring(self):
         """It unloads on both springs first, k + k_t = 29, from the force that is gone: until T = -2."""

@@ -269,15 +269,15 @@ class TestSmoothLoadsHoldTheirToleranceInTheResponse:
 
     @pytest.mark.parametrize("load", [mp.FunctionLoad("m", np.sin), mp.SweepLoad("m", 1.0, 1.0, 5.0, 1.0)])
     def test_a_run_that_fails_at_its_start_tells_why_and_has_no_ledger(self, load):
-        """A frequency that is no number."""
-        structure = mp.LinearStructure(np.eye(2), np.eye(2), points={"m": 0})
-        given = {(): mp.LevelOverride([math.nan])}
-        run = mp.simulate(mp.MultiPhiModel(structure, [], modes="all", overrides=given), 1.0, loads=[load])
+        """A spring of negative stiffness cancels that of a mode beside a rigid contact that is pressed on."""
+        structure = mp.LinearStructure(np.eye(2), np.eye(2), points={"m": 0, "n": 1})
+        contacts = [mp.ForceLaw("m", ([-1.0, 0.0, 1.0], [1.0, 0.0, -1.0])), mp.UnilateralContact("stop", "n", 0.0)]
+        given = [load, mp.ConstantLoad("n", -1.0)]
+        run = mp.simulate(mp.MultiPhiModel(structure, contacts, modes="all"), 1.0, displacement=[0.1, 0.0], loads=given)
         assert run.status == "failed"
-        assert run.message.startswith("at t = 0 s: ")
-        assert "finite" in run.message
+        assert run.message.startswith("at t = 0 s: level law+1, stop: negative stiffness cancels that of a mode")
         assert (run.t_end, len(run.segments), run.final) == (0.0, 0, None)
-        with pytest.raises(mp.NumericalFailure, match=r"ledger: got a run without motion .*finite"):
+        with pytest.raises(mp.NumericalFailure, match=r"ledger: got a run without motion .*cancels"):
             _ = run.ledger
 
 

@@ -181,7 +181,7 @@ class TestLedger:
     """Closes to round-off, whatever moves and however many modes are kept."""
 
     @pytest.mark.parametrize("modes", ["all", 3])
-    @pytest.mark.parametrize("seed", range(8))
+    @pytest.mark.parametrize("seed", range(5))
     def test_of_random_chains_with_everything(self, seed, modes):
         n, mass, springs, dampings, random = random_structure(seed)
         damping = list(dampings.values())[seed % 4]
@@ -200,10 +200,10 @@ class TestLedger:
             mp.SampledLoad(places[2], [0.0, 2.0, 2.5, 9.0], [0.0, 1.0, -1.0, 0.5]),
         ]
         model = mp.MultiPhiModel(structure, elements, modes=modes)
-        run = quietly(model, 10.0, velocity=random.normal(size=n), loads=loads)
+        run = quietly(model, 4.0, velocity=random.normal(size=n), loads=loads)
         assert len(run.events) > 1
         assert_balanced(run, 1e-11)
-        half = quietly(model, 10.0, loads=loads, start=quietly(model, 4.0, velocity=random.normal(size=n), loads=loads))
+        half = quietly(model, 4.0, loads=loads, start=quietly(model, 2.0, velocity=random.normal(size=n), loads=loads))
         assert_balanced(half, 1e-11)
 
     def test_friction_is_the_limit_times_the_way_slipped(self):

@@ -152,7 +152,7 @@ class TestTwoBodies:
 
 
 class TestMirrored:
-    @settings(derandomize=True, max_examples=25, deadline=None)
+    @settings(derandomize=True, max_examples=12, deadline=None)
     @given(st.integers(0, 10**6), st.sampled_from(["all", 3]))
     def test_chains_move_mirrored(self, seed, modes):
         n, mass, springs, _, random = random_structure(seed)
@@ -182,14 +182,14 @@ class TestMirrored:
 
 class TestMany:
     def test_springs_of_a_long_chain(self):
-        """Forty of them, 3^40 levels: those visited are built, forces keep their limits and the ledger closes."""
-        n = 40
+        """Twenty of them, 3^20 levels: those visited are built, forces keep their limits and the ledger closes."""
+        n = 20
         elements = [mp.Friction(f"f{i}", f"m{i}", 0.02 * (1 + i % 3), stiffness=5.0) for i in range(n)]
         model = mp.MultiPhiModel(chain(n, stiffness=9.0), elements, modes="all")
-        run = mp.simulate(model, 6.0, loads=[mp.HarmonicLoad(f"m{n - 1}", 1.3, 0.31)])
+        run = mp.simulate(model, 4.0, loads=[mp.HarmonicLoad(f"m{n - 1}", 1.3, 0.31)])
         assert len({event.contact for event in run.events}) > 5
         assert_balanced(run, 1e-11)
-        t = np.linspace(0, 6, 61)
+        t = np.linspace(0, 4, 41)
         for element in elements[::5]:
             assert np.all(np.abs(run.friction_force(element.name, t)) <= element.limit * (1 + 1e-9))
 

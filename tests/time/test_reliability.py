@@ -99,6 +99,38 @@ class TestTruncatedContact:
         assert run.warnings == ()
 
 
+class TestTruncatedFriction:
+    """5 % and more of the force, where few modes hold what sticks; stiff springs and none are alike."""
+
+    def run(self, modes, stiffness):
+        beam = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
+        model = mp.MultiPhiModel(beam, [mp.Friction("ring", "node2", 0.6, stiffness=stiffness)], modes=modes)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return mp.simulate(model, 0.5, loads=[mp.HarmonicLoad("node3", 1.0, 10.0, -math.pi / 2)])
+
+    @pytest.mark.parametrize(
+        ("modes", "stiffness", "told"),
+        [
+            (4, math.inf, True),
+            (4, 1e8, True),
+            (3, 1e5, True),
+            (8, math.inf, False),
+            (8, 1e8, False),
+            (6, 1e5, False),
+            (4, 1e3, False),
+            (None, math.inf, False),
+            (None, 1e8, False),
+        ],
+    )
+    def test_is_told_where_the_force_is_off(self, modes, stiffness, told):
+        run, whole, t = self.run(modes, stiffness), self.run("all", stiffness), np.linspace(0, 0.5, 501)
+        true = whole.friction_force("ring", t)
+        error = np.linalg.norm(run.friction_force("ring", t) - true) / np.linalg.norm(true)
+        assert ("truncated friction" in kinds(run)) == told == (error > 0.03)
+        assert "truncated contact" not in kinds(run)
+
+
 class TestTruncation:
     def test_energy_that_truncation_took_is_said_from_one_per_cent(self):
         model, start = rig(1e6)

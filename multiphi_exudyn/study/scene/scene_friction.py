@@ -1,0 +1,61 @@
+"""The tables ``[[friction]]`` of a scene file as friction of multiphi_exudyn.mechanics.friction, and in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.study.scene.fields import place_in_words
+from multiphi_exudyn.study.scene.scene_file import (
+    CraigBamptonModel,
+    FrictionSpec,
+    FullModel,
+    GlobalBasisModel,
+    StepwiseModel,
+)
+from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+
+__all__ = ["check_friction", "described_friction", "friction_of"]
+
+
+def friction_of(spec: FrictionSpec) -> Friction:
+    """The friction of a table; raises the errors of Friction."""
+    return Friction(**spec.model_dump())
+
+
+def described_friction(scene: Scene) -> tuple[str, ...]:
+    """Every friction in words, as parts of a sentence."""
+    return tuple(
+        f"the friction {spec.name} at {place_in_words(spec.direction)} (at most {spec.limit:g} N, {_spring(spec)})"
+        for spec in scene.file.friction
+    )
+
+
+def check_friction(scene: Scene, taken: Sequence[str], frictions: Sequence[Friction]) -> None:
+    """Names of their own beside those ``taken``, and models that can take them; or the field's error."""
+    names = list(taken)
+    for i, friction in enumerate(frictions):
+        if friction.name in names:
+            needed = "a name of its own for every contact, force law and friction"
+            refuse(scene, f"friction[{i}].name", friction.name, needed)
+        names.append(friction.name)
+        for k, model in enumerate(scene.file.models):
+            _check_model(scene, f"models[{k}].kind", model, i, friction)
+
+
+def _check_model(scene: Scene, field: str, model: ModelSpec, i: int, friction: Friction) -> None:
+    if isinstance(model, (CraigBamptonModel, StepwiseModel, GlobalBasisModel)):
+        refuse(scene, field, model.kind, f"another kind: this one has no friction, and there is {friction.name}")
+    if isinstance(model, FullModel):
+        if friction.rigid:
+            needed = f"a finite one: {model.name} has friction with a spring in series"
+            refuse(scene, f"friction[{i}].stiffness", "inf", needed)
+        factors = list(friction.direction.values()) if isinstance(friction.direction, Mapping) else [1.0]
+        if len(factors) > 2 or (len(factors) == 2 and sum(factors) != 0):
+            needed = f"another kind: its friction acts on a point, or between two, {friction.name} on {len(factors)}"
+            refuse(scene, field, model.kind, needed)
+
+
+def _spring(spec: FrictionSpec) -> str:
+    return "without a spring" if math.isinf(spec.stiffness) else f"a spring of {spec.stiffness:g} N/m in series"
