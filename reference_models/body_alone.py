@@ -12,6 +12,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.loads import Load
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.solver_settings import fixed_steps
@@ -21,7 +22,7 @@ __all__ = ["solve_body_alone"]
 
 def solve_body_alone(
     model: MultiPhiModel,
-    start: np.ndarray | None,
+    start: np.ndarray | Equilibrium | None,
     t_end: float,
     steps: int,
     points: Sequence[str],
@@ -31,16 +32,18 @@ def solve_body_alone(
     matched: bool = True,
     cpu_limit_s: float | None = None,
 ) -> tuple[BodyHistories, float]:
-    """Histories of the body released from ``start``, x (n,), with ``velocity``, x' (n,), and the solver's time [s].
+    """Histories of the body released from ``start``, with ``velocity``, x' (n,), and the solver's time [s].
 
-    steps: equal trapezoidal steps from 0 to t_end [s]; the body's modes are ``matched`` to them or left as they are.
+    start: x (n,), or an equilibrium. steps: equal trapezoidal steps from 0 to t_end [s]; the body's modes are
+    ``matched`` to them or left as they are.
     points: names recorded. Raises NumericalFailure where the CPU limit stops the solver.
     """
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     step = t_end / steps if matched else None
     with quiet(), cpu_limit(cpu_limit_s):
-        items = CreateMultiPhiBody(mbs, model, "body", start, velocity, loads, matchedStepSize=step)
+        still, x = (start, None) if isinstance(start, Equilibrium) else (None, start)
+        items = CreateMultiPhiBody(mbs, model, "body", x, velocity, loads, matchedStepSize=step, start=still)
         mbs.Assemble()
         settings = _simulation_settings(t_end, steps)
         started = time.perf_counter()

@@ -144,7 +144,7 @@ def compare(
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
-    """The content of summary.json; numbers that do not exist are None."""
+    """The content of summary.json; numbers that do not exist are None. With friction it has ``stick_intervals``."""
     outputs = comparison.bench.scene.file.outputs
     errors = {name: _errors(comparison, run) for name, run in comparison.measured.items()}
     coarser = comparison.coarser
@@ -166,18 +166,26 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         },
         "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
     }
+    if comparison.bench.mechanics.frictions:
+        content["stick_intervals"] = {
+            name: {friction: given.tolist() for friction, given in run.stick_intervals.items()}
+            for name, run in comparison.runs.items()
+        }
     return _without_nan(content)
 
 
 def histories(comparison: Comparison) -> dict[str, np.ndarray]:
     """The content of histories.npz: "time" [s], "MODEL/point/NAME" [m], "MODEL/gap/CONTACT" [m],
-    "MODEL/force/CONTACT" [N], "MODEL/energy_time" [s], "MODEL/energy" [J]."""
+    "MODEL/force/CONTACT" [N], "MODEL/friction/NAME" [N], "MODEL/slip/NAME" [m], "MODEL/energy_time" [s],
+    "MODEL/energy" [J]."""
     arrays = {"time": comparison.bench.time}
     for name, run in comparison.runs.items():
         if run.ok:
             arrays |= {f"{name}/point/{point}": values for point, values in run.points.items()}
             arrays |= {f"{name}/gap/{contact}": values for contact, values in run.gaps.items()}
             arrays |= {f"{name}/force/{contact}": values for contact, values in run.contact_force.items()}
+            arrays |= {f"{name}/friction/{friction}": values for friction, values in run.friction_force.items()}
+            arrays |= {f"{name}/slip/{friction}": values for friction, values in run.slip.items()}
             arrays |= {f"{name}/energy_time": run.energy_time, f"{name}/energy": run.energy}
     return arrays
 
@@ -201,6 +209,10 @@ def _scene(comparison: Comparison) -> dict[str, Any]:
             for contact in comparison.bench.mechanics.contacts
         },
         "force_laws": [law.model_dump(exclude_none=True) for law in scene.file.force_laws],
+        "friction": [
+            friction.model_dump(exclude_none=True) | ({"stiffness": "rigid"} if math.isinf(friction.stiffness) else {})
+            for friction in scene.file.friction
+        ],
         "assumptions": list(comparison.bench.mechanics.assumptions),
     }
 

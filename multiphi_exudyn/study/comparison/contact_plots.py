@@ -1,13 +1,13 @@
-"""Pictures of contact: of one contact in all models, and of many contacts in two models."""
+"""Pictures of contact and friction: of one in all models, and of many contacts in two models."""
 
 from __future__ import annotations
 
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.plots import first_contact_span, panels, pictured, styles
+from multiphi_exudyn.study.comparison.plots import CONTACT, first_contact_span, panels, pictured, styles
 
-__all__ = ["contact_figure", "many_contacts_figure"]
+__all__ = ["contact_figure", "friction_figure", "many_contacts_figure"]
 
 
 def contact_figure(comparison: Comparison, contact: str) -> Figure:
@@ -27,6 +27,25 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
     both[0].set_xlim(0, comparison.bench.t_end)
     both[0].set_title(f"Contact {contact}: the whole run, and its first contact phase", fontsize=10)
     both[1].set_xlim(*first_contact_span(comparison, [contact]))
+    return figure
+
+
+def friction_figure(comparison: Comparison, friction: str) -> Figure:
+    """Force and way of a friction over time; grey: it sticks in the reference."""
+    figure, (force, way) = panels(6.4, 2, heights=(1, 1))
+    style = styles(comparison)
+    for run in [comparison.reference, *pictured(comparison)]:
+        drawn = style[run.name]
+        for axes, values in ((force, run.friction_force[friction]), (way, 1e3 * run.slip[friction])):
+            axes.plot(run.time, values, drawn.line, color=drawn.colour, lw=drawn.width, label=run.label)
+    for axes, label in ((force, "friction force [N]"), (way, "way of the patch [mm]")):
+        for start, end in comparison.reference.stick_intervals[friction]:
+            axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
+        axes.set_xlim(0, comparison.bench.t_end)
+        axes.set_ylabel(label)
+    force.set_title(f"Friction {friction}; grey: it sticks in the reference", fontsize=10)
+    force.legend(frameon=False, fontsize=8)
+    way.set_xlabel("time [s]")
     return figure
 
 

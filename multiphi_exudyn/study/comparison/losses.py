@@ -40,11 +40,12 @@ class LossTable:
 def loss_tables(bench: Workbench) -> tuple[LossTable, ...]:
     """One table per kind of level, of a scene with one contact; none where there is nothing to count.
 
-    Nor under loads or with force laws: the tables are of a start that is scaled.
+    Nor under loads, with force laws or friction: the tables are of a start that is scaled.
     """
     if (
         bench.scene.file.loads
         or bench.mechanics.force_laws
+        or bench.mechanics.frictions
         or not (len(bench.mechanics.contacts) == 1 and np.isfinite(bench.longest_period))
         or _starts_closed(bench)
     ):

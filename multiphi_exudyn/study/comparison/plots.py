@@ -28,6 +28,7 @@ from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = [
+    "CONTACT",
     "energy_figure",
     "error_time_figure",
     "first_contact_span",
@@ -51,6 +52,7 @@ LOSSES = {
     "final": ("still in motion", "#0072B2"),
     "damping": ("damping", "#56B4E9"),
     "impact": ("plastic impact", "#D55E00"),
+    "friction": ("friction", "#009E73"),
     "truncation_kinetic": ("truncation, kinetic", "#E69F00"),
     "truncation_strain": ("truncation, strain", "#CC79A7"),
 }

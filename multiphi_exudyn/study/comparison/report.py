@@ -29,6 +29,7 @@ HISTORY = (
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
 )
 MANY = "A bar is a time span in contact; the contacts are numbered as the scene has them."
+FRICTION = "The force against the motion, and how far the patch has slipped on its counter-surface."
 MODES = "Square: point mass. Triangle: closed contact, {}. The largest value of each mode is drawn alike."
 RIGID, COMPLIANT = "rigid, as in the published tables", "of the scene's own stiffness, so it may move"
 
@@ -84,6 +85,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
             "Colours are the same in all pictures.",
         )
         yield from _contact_pictures(comparison)
+        yield from _friction_pictures(comparison)
         yield _picture(
             "energy",
             plots.energy_figure(comparison),
@@ -102,6 +104,12 @@ def _contact_pictures(comparison: Comparison) -> Iterable[Picture]:
         return
     for contact in contacts:
         yield _picture("contact", contact_plots.contact_figure(comparison, contact), "A bar is a time span in contact.")
+
+
+def _friction_pictures(comparison: Comparison) -> Iterable[Picture]:
+    """One for each friction."""
+    for name in comparison.reference.friction_force:
+        yield _picture("friction", contact_plots.friction_figure(comparison, name), FRICTION)
 
 
 def _picture(section: str, figure: Figure, caption: str) -> Picture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +11,11 @@ from scipy.interpolate import CubicHermiteSpline
 
 from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.study.running.runs import ModelRun, interval_array, way
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.scene_file import UserObjectModel
-from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from reference_models.body_alone import solve_body_alone
 
 __all__ = ["run_user_object"]
@@ -21,10 +23,10 @@ __all__ = ["run_user_object"]
 
 @dataclass(frozen=True)
 class _Task:
-    """What one run needs: model, start x (n,), number of steps."""
+    """What one run needs: model, start, number of steps."""
 
     model: MultiPhiModel
-    start: np.ndarray
+    start: Equilibrium
     steps: int
 
 
@@ -54,7 +56,7 @@ def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> Mode
 def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
     model = bench.model(spec)
     steps = int(np.ceil(bench.t_end / spec.step * (1 - 1e-9)))
-    return _Task(model, start_configuration(bench, model), steps)
+    return _Task(model, start_of(bench, model), steps)
 
 
 def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
@@ -73,11 +75,24 @@ def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
         },
         "contact_intervals": {name: interval_array(recorded.contact_intervals[name]) for name in contacts},
         "impulse": {name: _impulse(recorded, name) for name in contacts},
-        "ledger": {
-            row: float(sum(getattr(event.loss, row) for event in recorded.events))
-            for row in ("impact", "truncation_kinetic", "truncation_strain")
-        },
+        "friction_force": _interpolated(bench, recorded, recorded.friction_force),
+        "slip": _interpolated(bench, recorded, recorded.slip),
+        "stick_intervals": dict(recorded.stick_intervals),
+        "ledger": _ledger(bench, recorded),
     }
+
+
+def _interpolated(bench: Workbench, recorded: BodyHistories, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: np.interp(bench.time, recorded.time, values) for name, values in given.items()}
+
+
+def _ledger(bench: Workbench, recorded: BodyHistories) -> dict[str, float]:
+    """What left at events, and what friction has taken on its ways, which turn between the samples at the earliest."""
+    rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if recorded.slip else [])]
+    lost = {row: float(sum(getattr(event.loss, row) for event in recorded.events)) for row in rows}
+    for friction in bench.mechanics.frictions:
+        lost["friction"] += friction.limit * way(recorded.slip[friction.name])
+    return lost
 
 
 def _impulse(recorded: BodyHistories, contact: str) -> float:

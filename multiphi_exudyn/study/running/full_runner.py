@@ -20,6 +20,8 @@ from reference_models.gentler import Attempt, attempts
 
 __all__ = ["run_full"]
 
+STILL = 1e-6  # of the range of its way: a patch that moves less from sample to sample sticks
+
 
 def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool, retry: bool = False) -> ModelRun:
     """Run a full beam with the scene's damping on its own mesh; histories come on the common grid.
@@ -83,17 +85,28 @@ def _of_full(bench: Workbench, result: FullRun) -> dict[str, Any]:
         "contact_force": result.contact_force,
         "contact_intervals": {name: interval_array(given) for name, given in result.contact_intervals.items()},
         "impulse": {name: float(np.trapezoid(force, result.time)) for name, force in result.contact_force.items()},
+        "friction_force": result.friction_force,
+        "slip": result.slip,
+        "stick_intervals": {name: _sticking(result.time, slip) for name, slip in result.slip.items()},
         "energy_time": result.energy_time,
         "energy": result.energy,
         "ledger": {
             "initial": balance.initial,
             "work_of_loads": balance.work,
             "damping": balance.dissipated,
+            **({"friction": balance.friction} if result.slip else {}),
             "final": balance.final,
-            "residual": balance.initial + balance.work - balance.dissipated - balance.final,
+            "residual": balance.initial + balance.work - balance.dissipated - balance.friction - balance.final,
             "worst_gain": balance.worst_gain * balance.scale,
         },
     }
+
+
+def _sticking(time: np.ndarray, slip: np.ndarray) -> np.ndarray:
+    """When (m, 2) [s] a patch, whose way (k,) is known on a grid, stays where it is."""
+    still = np.abs(np.diff(slip)) <= STILL * np.ptp(slip)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    return np.asarray(time[edges].reshape(-1, 2))
 
 
 def _start(bench: Workbench) -> dict[str, Any]:

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.study.running.runs import ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.scene_file import GlobalBasisModel, ReducedModel
-from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
@@ -43,14 +44,14 @@ def _run(
     spec: ReducedModel | GlobalBasisModel,
     label: str,
     model: MultiPhiModel,
-    start: np.ndarray,
+    start: Equilibrium,
     building: float,
     horizon: bool,
 ) -> ModelRun:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
 
     def run_once() -> Trajectory:
-        return simulate(model, bench.t_end, displacement=start, loads=bench.loads)
+        return simulate(model, bench.t_end, start=start, loads=bench.loads)
 
     trajectory, first, repeats = repeated(lambda: timed(run_once), bench.repeats)
     run = ModelRun(
@@ -77,22 +78,23 @@ def _indicators(bench: Workbench, trajectory: Trajectory) -> dict[str, float]:
     return {f"{until:g}": truncation_indicator(trajectory, until) for until in bench.windows}
 
 
-def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, np.ndarray]:
+def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel, Equilibrium]:
     model = bench.model(spec)
-    return model, start_configuration(bench, model)
+    return model, start_of(bench, model)
 
 
-def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiModel, np.ndarray]:
+def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiModel, Equilibrium]:
     contacts = bench.contacts(spec.contact == "rigid")
     assert spec.modes is not None, "filled in where the scene lists its models"
     projected = global_basis(bench.structure, contacts, spec.modes)
     model = MultiPhiModel(projected, bench.nonlinearities(spec.contact == "rigid"), modes="all")
-    return model, start_configuration(replace(bench, structure=projected), model)
+    return model, start_of(replace(bench, structure=projected), model)
 
 
 def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:
     """The fields of a ModelRun that a trajectory gives."""
     contacts = [contact.name for contact in bench.mechanics.contacts]
+    frictions = [friction.name for friction in bench.mechanics.frictions]
 
     def histories() -> dict[str, Any]:
         points = {name: trajectory.at(name, bench.time) for name in bench.points}
@@ -106,6 +108,9 @@ def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:
         "contact_force": {name: trajectory.contact_force(name, bench.time) for name in contacts},
         "contact_intervals": {name: interval_array(trajectory.contact_intervals(name)) for name in contacts},
         "impulse": {name: trajectory.contact_impulse(name, 0.0, bench.t_end) for name in contacts},
+        "friction_force": {name: trajectory.friction_force(name, bench.time) for name in frictions},
+        "slip": {name: trajectory.slip(name, bench.time) for name in frictions},
+        "stick_intervals": {name: trajectory.stick_intervals(name) for name in frictions},
         "energy_time": energy_time,
         "energy": trajectory.energy(energy_time),
         "ledger": asdict(ledger) | {"residual": ledger.residual},

@@ -88,6 +88,6 @@ def label_of(bench: Workbench, spec: ModelSpec) -> str:
 
 def _levels(bench: Workbench, rigid: bool) -> str:
     contacts = bench.contacts(rigid)
-    if bench.mechanics.force_laws and not contacts:
-        return "levels of force laws"
+    if not contacts:
+        return "levels of force laws" if bench.mechanics.force_laws else "levels of friction"
     return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays"]
+__all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays", "way"]
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class ModelRun:
     kind: as in a scene's file. label: for tables and figures. dofs: coordinates integrated.
     time: (k,) s, the same for every run of a comparison. points [m], gaps [m], contact_force [N]: (k,) each.
     contact_intervals: contact -> (m, 2) s. impulse: contact -> N s to the end of the run.
+    friction_force [N], slip [m]: (k,) each, of every friction; stick_intervals: friction -> (m, 2) s.
     energy_time (j,) s, energy (j,) J: kinetic + strain, compliant contacts included. ledger: J, row by row.
     steps: time steps, or events where a model has no steps.
     offline_s: building, linearising, static start. first_s: the solver alone, from the start to the end, the
@@ -40,6 +41,9 @@ class ModelRun:
     contact_force: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_intervals: Mapping[str, np.ndarray] = field(default_factory=dict)
     impulse: Mapping[str, float] = field(default_factory=dict)
+    friction_force: Mapping[str, np.ndarray] = field(default_factory=dict)
+    slip: Mapping[str, np.ndarray] = field(default_factory=dict)
+    stick_intervals: Mapping[str, np.ndarray] = field(default_factory=dict)
     energy_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     energy: np.ndarray = field(default_factory=lambda: np.zeros(0))
     ledger: Mapping[str, float] = field(default_factory=dict)
@@ -61,6 +65,15 @@ class ModelRun:
     def online_s(self) -> float:
         """Median of the repeats [s]; the first run where it was not repeated."""
         return statistics.median(self.repeats_s) if self.repeats_s else self.first_s
+
+    def slipped(self, friction: str) -> float:
+        """Length [m] of the way, to and fro, of a friction's patch."""
+        return way(self.slip[friction])
+
+
+def way(places: np.ndarray) -> float:
+    """Length [m] of the way, to and fro, through places (k,) [m]."""
+    return float(np.sum(np.abs(np.diff(places))))
 
 
 def interval_array(given: Sequence[tuple[float, float]]) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""What a scene file describes, as mechanics: beams or matrices, contacts, force laws, damping, and what is assumed.
+"""What a scene file describes, as mechanics: beams or matrices, contacts, force laws, friction, damping, and what is
+assumed.
 
 Errors of the mechanical objects get the file and the field they came from.
 """
@@ -21,6 +22,7 @@ from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import BaseMotion, Gravity, StopMotion
 from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.mechanics.section import Section
@@ -38,6 +40,7 @@ from multiphi_exudyn.study.scene.scene_file import (
     StepwiseModel,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.scene_friction import check_friction, described_friction, friction_of
 from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
@@ -63,7 +66,7 @@ Damping = Matrix | ModalDamping | RayleighDamping | None
 
 @dataclass(frozen=True)
 class Mechanics:
-    """A scene's structure, given as beams or as matrices, with its contacts, its force laws and its damping.
+    """A scene's structure, given as beams or as matrices, with its contacts, force laws, friction and damping.
 
     parameter_set: of the paper's rig, None for any other structure.
     assumptions: what the scene rests on beyond what is known, one sentence each.
@@ -76,6 +79,7 @@ class Mechanics:
     parameter_set: str | None = None
     assumptions: tuple[str, ...] = field(default=())
     force_laws: tuple[ForceLaw, ...] = ()
+    frictions: tuple[Friction, ...] = ()
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -90,8 +94,8 @@ class Mechanics:
 
     @property
     def directions(self) -> int:
-        """How many modes a level has less than the structure has DoFs: one for each contact and each force law."""
-        return len(self.contacts) + len(self.force_laws)
+        """How many modes a level has less than the structure has DoFs: one for each contact, force law and friction."""
+        return len(self.contacts) + len(self.force_laws) + len(self.frictions)
 
 
 def mechanics_of(scene: Scene) -> Mechanics:
@@ -103,12 +107,15 @@ def mechanics_of(scene: Scene) -> Mechanics:
         for spec in row.row
     )
     laws = tuple(_at(scene, f"force_laws[{i}]", partial(law_of, spec)) for i, spec in enumerate(scene.file.force_laws))
-    mechanics = replace(mechanics, contacts=mechanics.contacts + own, force_laws=laws)
+    rubbing = tuple(_at(scene, f"friction[{i}]", partial(friction_of, s)) for i, s in enumerate(scene.file.friction))
+    mechanics = replace(mechanics, contacts=mechanics.contacts + own, force_laws=laws, frictions=rubbing)
     if scene.file.damping is not None:
         mechanics = replace(mechanics, damping=_damping(scene.file.damping))
     _check_points(scene, mechanics)
     _check_contacts(scene, mechanics)
     check_laws(scene, mechanics.contacts, mechanics.force_laws)
+    taken = [*(contact.name for contact in mechanics.contacts), *(law.name for law in mechanics.force_laws)]
+    check_friction(scene, taken, mechanics.frictions)
     _check_loads(scene, mechanics)
     return mechanics
 
@@ -141,6 +148,8 @@ def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
         yield _assumed_start(f"{start.force:+g} N", start.load_at)
     for law in described_laws(scene):
         yield f"force law of this scene: {law} (assumed: the paper's rig has none)"
+    for friction in described_friction(scene):
+        yield f"friction of this scene: {friction} (assumed: the paper's rig has none)"
     for load in described_loads(scene):
         yield f"load of this scene: {load} (assumed: the paper's rig is only released)"
     if math.isfinite(spec.support_stiffness):
@@ -223,6 +232,9 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
     places = [(i, spec.direction) for i, row in enumerate(file.contacts) for spec in row.row]
     for i, at in places:
         named |= {f"contacts[{i}].direction": name for name in ([at] if isinstance(at, str) else at)}
+    for i, friction in enumerate(file.friction):
+        at = friction.direction
+        named |= {f"friction[{i}].direction": name for name in ([at] if isinstance(at, str) else at)}
     for i, law in enumerate(file.force_laws):
         named |= {f"force_laws[{i}].at": name for name in ([law.at] if isinstance(law.at, str) else law.at)}
     for i, load in enumerate(file.loads):
@@ -304,6 +316,8 @@ def _check_published(scene: Scene, mechanics: Mechanics) -> None:
         return
     if mechanics.force_laws:
         refuse(scene, "force_laws[0].name", mechanics.force_laws[0].name, "none: the printed frequencies have no law")
+    if mechanics.frictions:
+        refuse(scene, "friction[0].name", mechanics.frictions[0].name, "none: the printed frequencies have no friction")
     for name in ("translation", "rotation"):
         given = getattr(scene.file.structure, f"clamp_{name}")
         if math.isfinite(given):

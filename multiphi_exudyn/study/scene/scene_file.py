@@ -1,4 +1,4 @@
-"""The format of a scene file: structure, contacts, force laws, start, loads, damping, outputs, and the models to run.
+"""The format of a scene file: structure, contacts, force laws, friction, start, loads, damping, outputs, and models.
 
 SI units, angles in radians. Every field is typed and none may be unknown; what the names in a file
 refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene.scenes`).
@@ -6,6 +6,7 @@ refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, Tag, model_validator
@@ -33,6 +34,7 @@ __all__ = [
     "ContactSpec",
     "CraigBamptonModel",
     "DisplacedStart",
+    "FrictionSpec",
     "FullModel",
     "GlobalBasisModel",
     "LoadedStart",
@@ -63,6 +65,17 @@ class ContactSpec(Table):
         own, at = numbered(self.name, i), self.direction
         place = numbered(at, i) if isinstance(at, str) else {numbered(name, i): c for name, c in at.items()}
         return self.model_copy(update={"name": own, "direction": place, "count": 1})
+
+
+class FrictionSpec(Table):
+    """Dry friction along a direction: |T| <= limit, T = stiffness times the stretch of a spring in series."""
+
+    name: Name
+    direction: Place
+    limit: Positive  # N, while it slips
+    static_limit: Positive | None = None  # N, at which it begins to; none given: the same
+    stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
+    velocity: Finite = 0.0  # m/s, of the counter-surface along the direction
 
 
 class DisplacedStart(Table):
@@ -208,6 +221,7 @@ class SceneFile(Table):
     structure: StructureSpec
     contacts: tuple[ContactSpec, ...] = ()
     force_laws: tuple[LawSpec, ...] = ()
+    friction: tuple[FrictionSpec, ...] = ()
     start: StartSpec | None = None  # none, with loads: at rest, undeformed
     loads: tuple[LoadSpec, ...] = ()
     damping: DampingSpec | None = None

@@ -1,4 +1,4 @@
-"""What all models of a scene share: one (M, C, K), the contacts and force laws, the start and the time grid.
+"""What all models of a scene share: one (M, C, K), the contacts, force laws and friction, the start and the time grid.
 
 The structure is the linearisation of the reference's full beams, so a reduced model and its reference
 differ in nothing but the reduction, the geometric nonlinearity and the time integration.
@@ -18,9 +18,11 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.level import LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.beam import beam_nodes
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
@@ -40,7 +42,7 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration"]
+__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_of"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
 REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
@@ -92,9 +94,9 @@ class Workbench:
         given = self.mechanics.contacts
         return tuple(replace(contact, stiffness=math.inf, damping=0.0) for contact in given) if rigid else given
 
-    def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw, ...]:
-        """The contacts, as given or all of them rigid, and the scene's force laws."""
-        return (*self.contacts(rigid), *self.mechanics.force_laws)
+    def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw | Friction, ...]:
+        """The contacts, as given or all of them rigid, and the scene's force laws and friction."""
+        return (*self.contacts(rigid), *self.mechanics.force_laws, *self.mechanics.frictions)
 
     @property
     def overrides(self) -> dict[tuple[str, ...], LevelOverride]:
@@ -151,11 +153,17 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
 
 def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
     """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed; zero without one."""
+    return start_of(bench, model).displacement
+
+
+def start_of(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
+    """The same, with the stretches of friction's springs under a load that has been applied slowly."""
     start = bench.scene.file.start
     if start is None:
-        return np.zeros(bench.structure.n)
+        still = {contact.name: 0.0 for contact in model.contacts if contact.held}
+        return Equilibrium(np.zeros(bench.structure.n), still)
     if not isinstance(start, DisplacedStart):
-        return model.static_equilibrium({start.load_at: start.force})
+        return model.equilibrium({start.load_at: start.force})
     row = bench.structure.row(start.measured_at)
     free = MultiPhiModel(bench.structure, modes=1).static_equilibrium({start.load_at: 1.0})
     needed = start.displacement / float(row @ free)
@@ -170,7 +178,7 @@ def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
         raise NumericalFailure(
             f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
         )
-    return model.static_equilibrium({start.load_at: root.root * needed})
+    return model.equilibrium({start.load_at: root.root * needed})
 
 
 def mesh_nodes(scene: Scene, mechanics: Mechanics) -> dict[str, np.ndarray]:
@@ -208,7 +216,7 @@ def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
         newton_tolerance=spec.newton_tolerance,
         output_step=scene.file.outputs.interval,
     )
-    return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws)
+    return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws, mechanics.frictions)
 
 
 def _interface(structure: LinearStructure, mechanics: Mechanics, outputs: Sequence[str]) -> tuple[str, ...]:

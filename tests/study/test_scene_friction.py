@@ -1,0 +1,113 @@
+"""Friction in scene files: the reduced sides and the full beam answer alike, the page shows it, errors name fields."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from small_scene import BEAM, changed, write
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.cli.main import main
+from multiphi_exudyn.study.comparison.compare import compare, histories, summary
+from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.workbench import prepare
+
+RING = {"name": "ring", "direction": "middle", "limit": 0.8, "stiffness": 2e4}
+MODELS = [
+    {"kind": "full", "name": "beam", "elements": 8, "step": 1e-4},
+    {"kind": "reduced", "name": "all", "modes": "all"},
+    {"kind": "user-object", "name": "body", "step": 1e-4, "modes": 6},
+    {"kind": "reduced", "name": "r6", "modes": 6},
+]
+SHAKEN = {"kind": "harmonic", "at": "tip", "amplitude": 2.0, "frequency_hz": 20.0}
+SCENE = BEAM | {
+    "contacts": [],
+    "friction": [RING],
+    "start": {"load_at": "tip", "measured_at": "tip", "displacement": 1e-3},
+    "models": MODELS,
+    "comparison": {"reference": "beam"},
+}
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    scene = load_scene(write(tmp_path_factory.mktemp("scene") / "ring.toml", SCENE))
+    return prepare(scene, mechanics_of(scene))
+
+
+@pytest.fixture(scope="module")
+def compared(bench):
+    return compare(bench, {}, progress=False)
+
+
+def test_full_beam_reduced_model_and_body_answer_alike(compared):
+    assert [run.message for run in compared.runs.values() if not run.ok] == []
+    beam, every, body, few = compared.runs.values()
+    assert compared.worst_error(every, 0.1) < 0.01
+    assert compared.worst_error(few, 0.1) < 0.02
+    assert len(every.stick_intervals["ring"]) > 1
+    assert np.max(np.abs(beam.friction_force["ring"] - every.friction_force["ring"])) < 0.03
+    assert np.max(np.abs(body.friction_force["ring"] - few.friction_force["ring"])) < 1e-3
+    assert body.stick_intervals["ring"] == pytest.approx(few.stick_intervals["ring"], abs=1e-9)
+    assert np.max(np.abs(beam.slip["ring"] - every.slip["ring"])) < 2e-5
+    for run, allowed in ((beam, 0.03), (few, 0.02), (body, 0.02)):
+        assert run.ledger["friction"] == pytest.approx(every.ledger["friction"], rel=allowed)
+    assert abs(every.ledger["residual"]) < 1e-12
+
+
+def test_the_page_and_the_files_tell_of_it(compared):
+    page, content, arrays = render(compared, [], []), summary(compared), histories(compared)
+    assert "<th>friction ring</th>" in page
+    assert "how far the patch has slipped" in page
+    assert content["scene"]["friction"] == [RING | {"velocity": 0.0}]
+    assert content["ledger"]["r6"]["friction"] > 0
+    assert content["stick_intervals"]["r6"]["ring"][0][0] == 0.0
+    assert np.max(np.abs(arrays["r6/friction/ring"])) <= 0.8 * (1 + 1e-12)
+    assert json.dumps(content)
+
+
+def test_a_start_leaves_springs_stretched_for_every_model(compared):
+    """At the start the ring carries what a slow pull leaves in it."""
+    first = [run.friction_force["ring"][0] for run in compared.runs.values()]
+    assert first[1] > 0.1
+    assert np.ptp(first) < 0.03 * first[1]
+
+
+def test_friction_without_a_spring_runs_where_nothing_is_full(tmp_path):
+    scene = SCENE | {"friction": [RING | {"stiffness": "rigid", "static_limit": 1.0}], "models": MODELS[1:3]}
+    scene |= {"comparison": {"reference": "all"}, "loads": [SHAKEN]}
+    del scene["start"]
+    given = load_scene(write(tmp_path / "rigid.toml", scene))
+    (friction,) = mechanics_of(given).frictions
+    assert (friction.stiffness, friction.static_limit) == (math.inf, 1.0)
+    assert main(["compare", str(tmp_path / "rigid.toml"), "--out", str(tmp_path / "out")]) == 0
+    content = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    assert content["scene"]["friction"][0]["stiffness"] == "rigid"
+    assert content["ledger"]["body"]["friction"] > 0
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("friction", 0, "limit"), -1.0, "friction[0].limit: got -1.0"),
+        (("friction", 0, "limit"), None, "friction[0].limit: got nothing"),
+        (("friction", 0, "static_limit"), 0.5, "static_limit: got 0.5, need a finite force >= the limit 0.8"),
+        (("friction", 0, "direction"), "nowhere", "friction[0].direction: got 'nowhere', need one of the points"),
+        (("friction", 0, "stifness"), 1.0, "friction[0].stifness: got 1.0"),
+        (("friction",), [RING, RING], "friction[1].name: got 'ring', need a name of its own"),
+        (("friction", 0, "stiffness"), "rigid", "friction[0].stiffness: got 'inf', need a finite one: beam"),
+        (
+            ("models", 2),
+            {"kind": "solve-ivp", "name": "s", "modes": 4, "method": "RK45", "rtol": 1e-6},
+            "models[2].kind: got 'solve-ivp', need another kind: this one has no friction, and there is ring",
+        ),
+    ],
+)
+def test_errors_name_file_and_field(tmp_path, path, value, said):
+    with pytest.raises(mp.MultiPhiValueError) as error:
+        mechanics_of(load_scene(write(tmp_path / "scene.toml", changed(path, value, SCENE))))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
