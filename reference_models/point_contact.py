@@ -125,6 +125,7 @@ def _point_contact(beams: Beams, contact: UnilateralContact) -> PointContact:
 
 
 def _tangent(beams: Beams, contact: UnilateralContact) -> Tangent:
+    assert contact.tangential is not None, "needed where there is friction"
     if math.isinf(contact.tangential_stiffness):
         received = f"contact {contact.name!r} tangential_stiffness: got inf"
         raise MultiPhiValueError(f"{received}, need a finite one (a bristle)")

@@ -2,10 +2,10 @@
 
     N = k_n max(0, -g),   trial = k_t (y - s),   T = trial while |trial| <= mu_s N (sticks), mu N (slips), else +-mu N
 
-y = c u - v_t t is the tangential way of the contact's point on its counter-surface, s the bristle's foot, y - T / k_t at the end of every step; where the
-contact closes, y at that instant, which is taken from a straight line through the step. A step's own force is that of
-its end, so that T and N of one step belong together. No connector of Exudyn has a friction force that goes with
-another coordinate.
+y = c u - v_t t is the tangential way of the contact's point on its counter-surface, s the bristle's foot, y - T / k_t
+at the end of every step; where the contact closes, y at that instant, which is taken from a straight line through the
+step. A step's own force is that of its end, so that T and N of one step belong together. No connector of Exudyn has a
+friction force that goes with another coordinate.
 """
 
 from __future__ import annotations
