@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg
 from coulomb import Coulomb
 from numpy.testing import assert_allclose
-from small_structures import chain
+from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 
@@ -234,6 +234,31 @@ def random_case(seed):
 def test_random_systems_move_as_an_integrator_says(seed):
     model, (x, v), loads, force = random_case(seed)
     against_the_law(model, 4.0, x, v, np.linspace(0, 4, 101), loads, force)
+
+
+@pytest.mark.parametrize(("static", "spring"), [(None, math.inf), (0.6, 40.0)])
+def test_forces_balance_beside_a_rigid_stop(static, spring):
+    """M x'' + K x = f + h N - h_t T + h_1 lambda, x'' from differences of x'."""
+    structure = chain(5, stiffness=9.0)
+    floor = mp.UnilateralContact(
+        "floor", "m4", -0.05, 60.0, friction=0.5, static_friction=static, tangential="m2", tangential_stiffness=spring
+    )
+    model = mp.MultiPhiModel(structure, [floor, stop("m1", 0.0)], modes="all")
+    loads = [mp.HarmonicLoad("m3", 3.0, 0.45), mp.ConstantLoad("m1", -1.5), mp.ConstantLoad("m4", -1.0)]
+    run = mp.simulate(model, 6.0, velocity=[0.0, 0.0, 0.6, 0.0, 0.0], loads=loads)
+    assert {(e.contact, e.kind) for e in run.events} >= {("stop", "close"), ("stop", "open"), ("floor", "open")}
+    assert {e.kind for e in run.events if e.contact == "floor"} == {"close", "open", "stick", "slip"}
+    instants, d = np.array([event.time for event in run.events]), 1e-4
+    t = np.array([time for time in np.linspace(0.05, 5.9, 200) if np.min(np.abs(instants - time)) > 2 * d])
+    force = np.outer(np.eye(5)[3], 3 * np.cos(0.9 * math.pi * t)) - np.outer([0, 1.5, 0, 0, 1.0], np.ones(len(t)))
+    force += np.outer(np.eye(5)[4], run.contact_force("floor", t)) - np.outer(
+        np.eye(5)[2], run.friction_force("floor", t)
+    )
+    force += np.outer(np.eye(5)[1], run.contact_force("stop", t))
+    acceleration = (run.velocity(t + d) - run.velocity(t - d)) / (2 * d)
+    left = acceleration + np.asarray(structure.stiffness) @ run.displacement(t) - force
+    assert_allclose(left, 0.0, atol=1e-5)
+    assert abs(run.ledger.residual) < 1e-13 * run.ledger.friction + 1e-13
 
 
 class TestTruncated:
