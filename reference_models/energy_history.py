@@ -55,8 +55,10 @@ def work_of(
         total += _summed(value, way)
     for name, way in actions.ways.items():
         total += _summed(steps.forces[name], way.at(steps.time))
-    for friction in frictions:
-        total -= _summed(steps.tensions[friction.name], friction.velocity * steps.time)
+    speeds = {friction.name: friction.velocity for friction in frictions}
+    speeds |= {contact.name: contact.tangent.velocity for contact in steps.contacts if contact.tangent}
+    for name, speed in speeds.items():
+        total -= _summed(steps.tensions[name], speed * steps.time)
     return total[np.searchsorted(steps.time, time)]
 
 

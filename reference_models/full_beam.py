@@ -218,7 +218,9 @@ class FullBeam:
         grid = steps.at(_grid(steps.time[-1], self.settings))
         energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
         lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
-        moved = not actions.none or any(friction.velocity for friction in self.frictions)
+        tangents = [contact.tangent for contact in self.contacts if contact.tangent]
+        speeds = [each.velocity for each in self.frictions] + [each.velocity for each in tangents]
+        moved = not actions.none or any(speeds)
         work = work_of(actions, recorder, self.frictions, steps, energy_time) if moved else None
         rubbed = friction_losses(steps, energy_time)
         balance = EnergyBalance.of(energy_time, energy, lost, work, rubbed)

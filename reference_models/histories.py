@@ -115,7 +115,7 @@ def _rubbed(
     tangents = {contact.name: contact.tangent for contact in contacts if contact.tangent is not None}
     forces = np.array(recorder.rubbed[:count]).reshape(count, len(tangents))
     for (name, tangent), force in zip(tangents.items(), forces.T, strict=True):
-        found[name] = force, tangent.travel(points), tangent.stiffness
+        found[name] = force, tangent.travel(points, time), tangent.stiffness
     return found
 
 

@@ -9,6 +9,7 @@ With damping d, lambda = max(0, -k g - d g') where g < 0: it never pulls. A stop
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -24,19 +25,21 @@ __all__ = ["PointContact", "Tangent", "point_and_coefficient", "point_and_other"
 
 @dataclass(frozen=True)
 class Tangent:
-    """Where and how a contact rubs: y = c u of a point, less that of another, mu, mu_s >= mu, stiffness k_t [N/m]."""
+    """How a contact rubs: y = c u - v_t t, u of a point, less that of another, mu, mu_s >= mu, k_t [N/m], v_t [m/s]."""
 
     point: str
     coefficient: float
     friction: float
     static_friction: float
     stiffness: float
+    velocity: float = 0.0
     other: str | None = None
 
-    def travel(self, of_points: Mapping[str, np.ndarray]) -> np.ndarray:
-        """y (s,) [m] of deflections of points by name, (s,) each."""
+    def travel(self, of_points: Mapping[str, np.ndarray], time: np.ndarray) -> np.ndarray:
+        """y (s,) [m] of deflections of points by name at times, (s,) each."""
         own = of_points[self.point]
-        return self.coefficient * (own if self.other is None else own - of_points[self.other])
+        between = own if self.other is None else own - of_points[self.other]
+        return self.coefficient * between - self.velocity * time
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,22 @@ def _point_contact(beams: Beams, contact: UnilateralContact) -> PointContact:
     point, coefficient, other = point_and_other(what, contact.direction)
     for name in (point,) if other is None else (point, other):
         beams.check_point(what, name)
-    return PointContact(contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping, other)
+    given = contact.name, point, coefficient, contact.gap, contact.stiffness, contact.damping, other
+    return PointContact(*given, _tangent(beams, contact) if contact.friction else None)
+
+
+def _tangent(beams: Beams, contact: UnilateralContact) -> Tangent:
+    assert contact.tangential is not None, "needed where there is friction"
+    if math.isinf(contact.tangential_stiffness):
+        received = f"contact {contact.name!r} tangential_stiffness: got inf"
+        raise MultiPhiValueError(f"{received}, need a finite one (a bristle)")
+    what = f"contact {contact.name!r} tangential"
+    point, coefficient, other = point_and_other(what, contact.tangential)
+    for name in (point,) if other is None else (point, other):
+        beams.check_point(what, name)
+    most = contact.friction if contact.static_friction is None else contact.static_friction
+    law = contact.friction, most, contact.tangential_stiffness, contact.tangential_velocity
+    return Tangent(point, coefficient, *law, other)
 
 
 def point_and_other(what: str, direction: At) -> tuple[str, float, str | None]:

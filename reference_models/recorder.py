@@ -86,7 +86,7 @@ class Recorder:
         if len(self._data_indices):
             self.data.append(self._data[self._data_indices])
         if self._rubs:
-            self.rubbed.append([rub.end_step(self._q) for rub in self._rubs])
+            self.rubbed.append([rub.end_step(self._q, t) for rub in self._rubs])
         due = t >= self._next_output
         if due or self._was_due:
             self.velocity_steps.append(len(self.times) - 1)

@@ -2,10 +2,10 @@
 
     N = k_n max(0, -g),   trial = k_t (y - s),   T = trial while |trial| <= mu_s N (sticks), mu N (slips), else +-mu N
 
-y is the tangential way of the contact's point, s the bristle's foot, y - T / k_t at the end of every step; where the
-contact closes, y at that instant, which is taken from a straight line through the step. A step's own force is that of
-its end, so that T and N of one step belong together. No connector of Exudyn has a friction force that goes with
-another coordinate.
+y = c u - v_t t is the tangential way of the contact's point on its counter-surface, s the bristle's foot, y - T / k_t
+at the end of every step; where the contact closes, y at that instant, which is taken from a straight line through the
+step. A step's own force is that of its end, so that T and N of one step belong together. No connector of Exudyn has a
+friction force that goes with another coordinate.
 """
 
 from __future__ import annotations
@@ -42,17 +42,18 @@ class Rub:
         """User function of a spring on the tangential deflection u [m]."""
         if not self._runs:
             return 0.0
-        way = self.tangent.coefficient * u
+        way = self.tangent.coefficient * u - self.tangent.velocity * t
         gap = self._gap_of(mbs.systemData.GetODE2Coordinates(copy=False))
         return self.tangent.coefficient * self._bristle(gap, way)[0]
 
-    def end_step(self, coordinates: Any) -> float:
-        """T [N] at the end of a step, from which the next one goes on."""
-        gap, way = self._gap_of(coordinates), self.tangent.coefficient * _difference(coordinates, self._tangential)
+    def end_step(self, coordinates: Any, t: float) -> float:
+        """T [N] at the end of a step, t [s], from which the next one goes on."""
+        tangent, gap = self.tangent, self._gap_of(coordinates)
+        way = tangent.coefficient * _difference(coordinates, self._tangential) - tangent.velocity * t
         if not self._runs:
             self._gap, self._way, self._place, self._runs = gap, way, way, True
         force, self._slips = self._bristle(gap, way)
-        self._gap, self._way, self._place = gap, way, way - force / self.tangent.stiffness
+        self._gap, self._way, self._place = gap, way, way - force / tangent.stiffness
         return force
 
     def _gap_of(self, coordinates: Any) -> float:

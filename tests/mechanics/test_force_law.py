@@ -309,7 +309,7 @@ class TestMotion:
 
     def test_looks_at_the_ends_of_its_chains_only(self):
         run = mp.simulate(model(law(hardening, segments=200)), 5.0, displacement=START)
-        loaded = run.model.loaded.items()[0][1]
+        loaded = next(levels for _, levels in run.model.loaded.items())
         for segment in run.segments:
             assert len(loaded.ends(segment.level.states)) <= 3
         few = mp.simulate(model(law(hardening, segments=20)), 5.0, displacement=START)

@@ -69,7 +69,11 @@ def test_the_measures_are_these_and_nothing_else(bench, reference):
 
 def test_every_measure_is_defined(bench, reference):
     assert set(KEYS) - {"label", "kind"} <= set(metrics.METRICS)
-    assert set(metrics.METRICS) - set(KEYS) == {"pointwise_until", "stiff_nrmse", "repetition_rate"}  # of two runs, of a study
+    assert set(metrics.METRICS) - set(KEYS) == {
+        "pointwise_until",
+        "stiff_nrmse",
+        "repetition_rate",
+    }  # of two runs, of a study
 
 
 def test_differences_to_the_reference_by_window_and_point(bench, reference):

@@ -7,8 +7,13 @@ from multiphi_exudyn import cli
 from multiphi_exudyn.study.running.needs import needs_of
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 
-LEVELS = {"beam-chain": 8, "bed-of-stops": 189, "two-sided-stop": 3}  # built by the run of a scene; two for all others
-POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4, "friction-ring": 3}
+LEVELS = {
+    "rubbing-stop": 4,
+    "beam-chain": 8,
+    "bed-of-stops": 189,
+    "two-sided-stop": 3,
+}  # two for all others
+POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4, "friction-ring": 3, "rubbing-stop": 4}
 MEMORY = {"beam-chain": 10e6, "bed-of-stops": 70e6}  # bytes at most; 8 MB for all others, of the loop's code and record
 PACKAGES = ("llvmlite", "numpy", "scipy", "threadpoolctl")  # llvmlite loads the loop; no exudyn, no matplotlib
 MOST_MODULES = 120  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line

@@ -94,7 +94,7 @@ def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiMod
 def _sampled(bench: Workbench, trajectory: Trajectory) -> dict[str, Any]:
     """The fields of a ModelRun that a trajectory gives."""
     contacts = [contact.name for contact in bench.mechanics.contacts]
-    frictions = [friction.name for friction in bench.mechanics.frictions]
+    frictions = bench.mechanics.rubbing
 
     def histories() -> dict[str, Any]:
         points = {name: trajectory.at(name, bench.time) for name in bench.points}

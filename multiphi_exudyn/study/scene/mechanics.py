@@ -82,6 +82,12 @@ class Mechanics:
     frictions: tuple[Friction, ...] = ()
 
     @property
+    def rubbing(self) -> tuple[str, ...]:
+        """Names of what has a friction force: frictions, and contacts with friction."""
+        contacts = [contact.name for contact in self.contacts if contact.friction]
+        return (*(friction.name for friction in self.frictions), *contacts)
+
+    @property
     def points(self) -> tuple[str, ...]:
         """Names of the structure's points."""
         given: Mapping[str, object] = _known(self.matrices).points if self.beams is None else self.beams.points
@@ -232,6 +238,8 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
     places = [(i, spec.direction) for i, row in enumerate(file.contacts) for spec in row.row]
     for i, at in places:
         named |= {f"contacts[{i}].direction": name for name in ([at] if isinstance(at, str) else at)}
+    for i, at in ((i, spec.tangential) for i, row in enumerate(file.contacts) for spec in row.row if spec.tangential):
+        named |= {f"contacts[{i}].tangential": name for name in ([at] if isinstance(at, str) else at)}
     for i, friction in enumerate(file.friction):
         at = friction.direction
         named |= {f"friction[{i}].direction": name for name in ([at] if isinstance(at, str) else at)}
@@ -290,6 +298,12 @@ def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: 
     """Penalty models need a finite stiffness, penalty elements on one coordinate a single point."""
     if contact.rigid and isinstance(model, (FullModel, CraigBamptonModel, StepwiseModel)):
         refuse(scene, f"stiffness of contact {contact.name}", "inf", f"a finite one: {model.name} is a penalty model")
+    if contact.friction:
+        if isinstance(model, (CraigBamptonModel, StepwiseModel, GlobalBasisModel)):
+            refuse(scene, field_name, model.kind, f"another kind: its contacts have no friction, {contact.name} has")
+        if isinstance(model, FullModel) and math.isinf(contact.tangential_stiffness):
+            needed = f"a finite one: {model.name} has friction with a spring in series"
+            refuse(scene, f"tangential_stiffness of contact {contact.name}", "inf", needed)
     if contact.damping:
         if isinstance(model, (CraigBamptonModel, StepwiseModel)):
             refuse(scene, field_name, model.kind, f"another kind: its contacts have no damping, {contact.name} has")

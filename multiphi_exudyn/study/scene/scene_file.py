@@ -55,6 +55,11 @@ class ContactSpec(Table):
     stiffness: Stiffness
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
     restitution: NotNegative = 0.0  # of a rigid contact, up to 1
+    friction: NotNegative = 0.0  # mu, along ``tangential``, where it slides
+    tangential: Place | None = None
+    static_friction: Positive | None = None  # up to which it sticks; none given: the same
+    tangential_stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
+    tangential_velocity: Finite = 0.0  # m/s, of the counter-surface along it
     count: Annotated[int, Field(ge=1)] = 1
 
     @property
@@ -63,9 +68,12 @@ class ContactSpec(Table):
         return tuple(self._numbered(i) for i in range(1, self.count + 1))
 
     def _numbered(self, i: int) -> ContactSpec:
-        own, at = numbered(self.name, i), self.direction
-        place = numbered(at, i) if isinstance(at, str) else {numbered(name, i): c for name, c in at.items()}
-        return self.model_copy(update={"name": own, "direction": place, "count": 1})
+        places = {part: _numbered(at, i) for part in ("direction", "tangential") if (at := getattr(self, part))}
+        return self.model_copy(update={"name": numbered(self.name, i), "count": 1} | places)
+
+
+def _numbered(at: Place, i: int) -> Place:
+    return numbered(at, i) if isinstance(at, str) else {numbered(name, i): c for name, c in at.items()}
 
 
 class FrictionSpec(Table):
