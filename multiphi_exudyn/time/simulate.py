@@ -231,6 +231,15 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
     return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
 
 
+def _check_impacts(model: MultiPhiModel) -> None:
+    """Refuse friction at rigid contacts: their levels are known, their impacts are not."""
+    rigid = [contact.name for contact in model.contacts if contact.rigid and contact.further]
+    if rigid:
+        raise MultiPhiValueError(
+            f"simulate: got friction at the rigid contacts {', '.join(rigid)}, which strike, need a finite stiffness"
+        )
+
+
 def started(run: Run) -> Run:
     """The run with its start looked into: an equilibrium is its displacement and its stretches."""
     start = run.start
