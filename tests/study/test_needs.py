@@ -14,7 +14,11 @@ LEVELS = {
     "two-sided-stop": 3,
 }  # two for all others
 POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4, "friction-ring": 3, "rubbing-stop": 4}
-MEMORY = {"beam-chain": 10e6, "bed-of-stops": 70e6}  # bytes at most; 8 MB for all others, of the loop's code and record
+MEMORY = {
+    "beam-chain": 10e6,
+    "bed-of-stops": 70e6,
+    "rubbing-stop": 12e6,
+}  # bytes at most; 8 MB for all others, of the loop's code and record
 PACKAGES = ("llvmlite", "numpy", "scipy", "threadpoolctl")  # llvmlite loads the loop; no exudyn, no matplotlib
 MOST_MODULES = 120  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
 
