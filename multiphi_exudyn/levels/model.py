@@ -124,6 +124,14 @@ class MultiPhiModel:
         """Whether there are elements with other states than open and closed."""
         return any(not _opens_and_closes(contact) for contact in self.contacts)
 
+    def need_smooth_contacts(self, what: str) -> None:
+        """Refuse friction at contacts where it is not provided for."""
+        rubbing = [contact.name for contact in self.contacts if contact.further]
+        if rubbing:
+            raise MultiPhiValueError(
+                f"{what}: got friction at the contacts {', '.join(rubbing)}, need contacts without"
+            )
+
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
         """Positions of the links that have a held place, one channel each."""
@@ -325,11 +333,7 @@ class MultiPhiModel:
             raise MultiPhiValueError(
                 f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
             )
-        rubbing = [contact.name for contact in self.contacts if contact.further]
-        if rubbing:
-            raise MultiPhiValueError(
-                f"static equilibrium: got friction at the contacts {', '.join(rubbing)}, need contacts without"
-            )
+        self.need_smooth_contacts("static equilibrium")
         load = self.base_load(forces)
         if self.force_laws or self.general:
             return equilibrium(base, load)

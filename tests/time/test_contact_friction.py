@@ -3,6 +3,7 @@
 import math
 import warnings
 
+import exudyn
 import numpy as np
 import pytest
 import scipy.linalg
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
 
 
 def flutter_structure():
@@ -371,7 +373,11 @@ class TestArguments:
         assert plain.states == zero.states
         assert not zero.further
 
-    def test_static_equilibrium_is_refused(self):
+    def test_what_does_not_know_them_refuses_them(self):
         model = mp.MultiPhiModel(flutter_structure(), flutter_model(0.3).contacts)
         with pytest.raises(mp.MultiPhiValueError, match="static equilibrium: got friction at the contacts belt"):
             model.static_equilibrium({"x": 1.0})
+        with pytest.raises(mp.MultiPhiValueError, match="steady state: got friction at the contacts belt"):
+            mp.steady_state(model, mp.HarmonicLoad("x", 1.0, 1.0))
+        with pytest.raises(mp.MultiPhiValueError, match="model: got friction at the contacts belt"):
+            CreateMultiPhiBody(exudyn.SystemContainer().AddSystem(), model)

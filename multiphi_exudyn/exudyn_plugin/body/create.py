@@ -77,6 +77,7 @@ def CreateMultiPhiBody(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
+    model.need_smooth_contacts("model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
