@@ -53,9 +53,11 @@ bases of two levels need not agree, so the law says what happens then; each sent
    it lands e is zero.
    -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
 12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together: their forces within
-   their limits, static ones until they slip, are complementary to their accelerations. What that leaves to the next
-   derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others push with
-   their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an impulse.
+   their limits, static ones until they slip, are complementary to their accelerations. Of those that then fall from
+   their static limits the ones that turn fall first: others may bear less after it, and stick on. What that leaves to
+   the next derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others
+   push with their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an
+   impulse.
    -> sticking.stick_together, sticking.choose, independence.thin_out, striking.slide_on
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,

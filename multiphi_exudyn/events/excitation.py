@@ -85,6 +85,7 @@ class Excitation:
 
     static: constant loads (m,) in base coordinates. patterns: b (m, q). stops: s (c, q). histories: w (q,).
     rate_of: for every channel the channel that is its derivative, -1 where none is needed. end: of the run [s].
+    steady: the channel that is always one, -1 for none.
     """
 
     static: np.ndarray
@@ -93,6 +94,7 @@ class Excitation:
     histories: tuple[PiecewiseExponential, ...]
     rate_of: tuple[int, ...]
     end: float
+    steady: int = -1
 
     @classmethod
     def of(cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0) -> Excitation:
@@ -111,7 +113,7 @@ class Excitation:
             patterns = np.hstack([patterns, np.zeros((base.modes.count, len(model.held)))])
             stops = np.hstack([stops, np.eye(len(model.links))[:, list(model.held)]])
         rate_of = *channels.rate_of, *(-1 for _ in model.held)
-        found = cls(channels.static, patterns, stops, tuple(channels.histories), rate_of, end)
+        found = cls(channels.static, patterns, stops, tuple(channels.histories), rate_of, end, channels.steady)
         if found.effort(end) > MOST_EFFORT:
             raise MultiPhiValueError(
                 f"loads: got {found.pieces(end)} pieces in {end:g} s, need at most {MOST_EFFORT}, or of sweeps "
@@ -128,7 +130,7 @@ class Excitation:
     @functools.cached_property
     def shape(self) -> tuple[bytes | tuple[int, ...], ...]:
         """What a level makes of the channels depends on nothing else."""
-        return self.static.tobytes(), self.patterns.tobytes(), self.stops.tobytes(), self.rate_of
+        return self.static.tobytes(), self.patterns.tobytes(), self.stops.tobytes(), (*self.rate_of, self.steady)
 
     @property
     def channels(self) -> int:
@@ -198,6 +200,7 @@ class _Channels:
         self.histories: list[PiecewiseExponential] = []
         self.rate_of: list[int] = []
         self.called = ""  # the load that is added
+        self.steady = -1  # the channel that is always one
 
     def add(self, load: Load) -> None:
         """One load's channels; static loads have none."""
@@ -224,14 +227,15 @@ class _Channels:
             self._move(speeds, PiecewiseExponential.line(1.0))
 
     def add_static(self, load: np.ndarray) -> None:
-        """Constant loads (m,); those that pull at damped rigid-body motion are a channel too.
+        """Constant loads (m,); those that pull at damped rigid-body motion are a channel too, and what friction pushes.
 
         Its free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for little damping d;
         the response to a channel does not.
         """
         base, self.static = self._model.base, load
         rigid = base.modes.rigid
-        if np.any(base.damping[:rigid]) and np.any(load[:rigid]):
+        if np.any(base.damping[:rigid]) and (np.any(load[:rigid]) or self._model.held):
+            self.steady = len(self.histories)
             self._append(load, self._no_stop(), PiecewiseExponential.constant(1.0))
             self.static = np.zeros_like(load)
 

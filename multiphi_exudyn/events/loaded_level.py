@@ -106,10 +106,14 @@ class LoadedLevel:
         return replace(kept, excitation=excitation)
 
     def _under(self, excitation: Excitation) -> LoadedLevel:
-        channels = Channels.of(self.level, excitation)
+        channels, rest = Channels.of(self.level, excitation), self.asymptotic
+        if excitation.steady >= 0:
+            force = channels.force.copy()
+            force[:, excitation.steady] += rest.drive
+            channels, rest = replace(channels, force=force), replace(rest, drive=np.zeros_like(rest.drive))
         return LoadedLevel(
             level=channels.extended(self.level, excitation.stops),
-            asymptotic=self.asymptotic,
+            asymptotic=rest,
             gap_constants=self.gap_constants,
             excitation=excitation,
             channels=channels,
@@ -145,7 +149,7 @@ class LoadedLevel:
 
     @functools.cached_property
     def driven(self) -> bool:
-        """Whether a static load drives zero-frequency modes."""
+        """Whether a static load that is no channel drives zero-frequency modes."""
         return bool(np.any(self.asymptotic.drive))
 
     def split(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -204,7 +208,7 @@ class LoadedLevel:
         shapes, columns, pulled = own.vectors[:, r:], rows[:, r:], self.excitation.patterns.T @ own.vectors
         form = (base.modes.omega[:, None] ** 2 * shapes).T @ own.vectors + (columns.T * springs) @ rows - pulled
         form[:, r:] -= pulled[:, r:].T
-        modal = rest.load - self.modal.vectors.T @ static - rest.drive
+        modal = rest.load - self.modal.vectors.T @ static - self.alone.asymptotic.drive
         load = base.modes.omega**2 * y - base.preload - static
         along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
         constant = rest.strain + self.stored - float(static @ y)

@@ -197,21 +197,28 @@ def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
 
 @compiled
 def choose(ints: Ints, numbers: Numbers, count: int) -> int:
-    """12. WISHES: the states of the solution; how many of them begin to slip, and fall from their static limit."""
-    falling = 0
-    for k in range(count):
-        i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
-        limit, most = numbers[ints[LIMITS] + i], numbers[ints[STATIC_LIMITS] + i]
-        slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
-        side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
-        if numbers[low] == numbers[high]:
-            entered = FORWARD if numbers[low] - slipped < 0.0 else BACKWARD
-        elif side != BETWEEN:
-            force = numbers[ints[FURTHER] + k] - slipped
-            entered = BACKWARD if side == ABOVE or force > 0.0 else FORWARD
-            if most > limit and abs(force) > limit:
-                numbers[low] = slipped - limit if entered == FORWARD else slipped + limit
-                numbers[high] = numbers[low]
-                falling += 1
-        ints[ints[WISHES] + i] = entered
+    """12. WISHES: the states of the solution; how many of them begin to slip, and fall from their static limit.
+
+    Those that come from slip fall first: what then does not need more than its static limit goes on sticking.
+    """
+    states, falling = ints[ints[WORKED + LEVEL] + STATES], 0
+    for stuck in range(2):
+        for k in range(count):
+            i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
+            limit, most = numbers[ints[LIMITS] + i], numbers[ints[STATIC_LIMITS] + i]
+            slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
+            side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
+            if numbers[low] == numbers[high]:
+                entered = FORWARD if numbers[low] - slipped < 0.0 else BACKWARD
+            elif side != BETWEEN:
+                force = numbers[ints[FURTHER] + k] - slipped
+                entered = BACKWARD if side == ABOVE or force > 0.0 else FORWARD
+                now = (ints[states + i] == STICK) == (stuck == 1)
+                if now and most > limit and abs(force) > limit:
+                    numbers[low] = slipped - limit if entered == FORWARD else slipped + limit
+                    numbers[high] = numbers[low]
+                    falling += 1
+            ints[ints[WISHES] + i] = entered
+        if falling > 0:
+            break
     return falling

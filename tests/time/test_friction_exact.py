@@ -218,3 +218,16 @@ class TestMany:
         assert errors[0] < 1e-2
         assert errors[1] < 0.2 * errors[0]
         assert_balanced(runs[0], 1e-11)
+
+
+@pytest.mark.parametrize("damping", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("load", [0.0, 3.0])
+def test_a_block_that_hardly_any_dashpot_holds_keeps_its_digits(damping, load):
+    """m x'' + c x' = P - F: x = v t (1 - z/2 + z^2/6 - ...) + (P - F) t^2 (1/2 - z/6 + ...), z = c t."""
+    structure = mp.LinearStructure([[1.0]], [[0.0]], damping=[[damping]], points={"m": 0})
+    model = mp.MultiPhiModel(structure, [mp.Friction("floor", "m", 2.0)], modes="all")
+    run = mp.simulate(model, 0.9, velocity=[2.0], loads=[mp.ConstantLoad("m", load)])
+    t = np.linspace(0, 0.9, 10)
+    first, second = (sum((-damping * t) ** k / math.factorial(k + d) for k in range(9)) for d in (1, 2))
+    assert_allclose(run.at("m", t), 2 * t * first + (load - 2.0) * t**2 * second, rtol=0, atol=3e-15 / damping)
+    assert_balanced(run, 1e-14 / damping)

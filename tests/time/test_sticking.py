@@ -155,3 +155,18 @@ def test_what_sticks_bears_no_impulse(gap, e):
     lost = [0.05, 0.05] if e == 0 else [0.0, 0.1]
     assert_allclose(run.velocity(gap + 1.0), after - lost, rtol=1e-12)
     assert run.ledger.impact == pytest.approx(0.25 * (1 - e**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_one_that_turns_does_not_tear_another_one_loose(sign):
+    """A carrier turns on the floor and falls to its limit there: its load bears (4 + 1) / 2 < 3.2, and stays stuck.
+
+    While the floor bore its static limit it would bear (4 + 3) / 2.
+    """
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"carrier": 0, "load": 1})
+    held = mp.Friction("held", {"load": 1.0, "carrier": -1.0}, 1.0, static_limit=3.2)
+    model = mp.MultiPhiModel(structure, [mp.Friction("floor", "carrier", 1.0, static_limit=3.0), held], modes="all")
+    run = mp.simulate(model, 1.0, velocity=[sign, sign], loads=[mp.ConstantLoad("load", -4.0 * sign)])
+    assert {event.contact for event in run.events} == {"floor"}
+    assert_allclose(run.displacement(0.4), sign * 0.2, rtol=1e-12)
+    assert_allclose(run.displacement(1.0), sign * (0.2 - 0.75 * 0.6**2), rtol=1e-12)

@@ -117,7 +117,8 @@ class OwnLoads:
         """Modal forces (k, s) of w, w' (k, 2, q) in a level."""
         level, forces, q = self.loaded.level(states), np.zeros((len(values), self._size)), values.shape[2]
         force, rate = level.channels.force[:, :q], level.channels.force_rate[:, :q]
-        forces[:, : level.modal.modes] = values[:, 0] @ force.T + values[:, 1] @ rate.T
+        driven = level.asymptotic.drive - level.alone.asymptotic.drive  # what a channel takes of the stepped level's
+        forces[:, : level.modal.modes] = values[:, 0] @ force.T + values[:, 1] @ rate.T + driven
         return forces
 
     def _channels(self, t: float) -> np.ndarray:

@@ -121,7 +121,7 @@ class Surroundings:
             return self
         own, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
         x, v = state.displacement, state.velocity
-        eta_tt = state.level.asymptotic.drive + force[:r] - own.damping @ v[:r] - own.squares * x[:r]
+        eta_tt = state.level.alone.asymptotic.drive + force[:r] - own.damping @ v[:r] - own.squares * x[:r]
         reactions = _reactions_of(self.body, self.hanging, state.level, (x, v, eta_tt), force[s:])
         return replace(self, reactions=reactions)
 
