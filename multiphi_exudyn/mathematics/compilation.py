@@ -46,7 +46,7 @@ KINDS = {
     NoneType: numba.types.void,
 }
 NEVER_CALLED = 1  # numba wants an address for a function that it will not run
-START, EACH_FUNCTION, EACH_LINE = 2.0, 0.025, 0.005  # s, on one core of 2020 that has nothing else to do
+START, EACH_FUNCTION, EACH_LINE = 2.0, 0.04, 0.008  # s, on one core of 2020 that has nothing else to do
 WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
 MOST_PROCESSES = 4  # of some 250 MB each
 ANSWER = "from multiphi_exudyn.mathematics.compilation import answer; answer()"
