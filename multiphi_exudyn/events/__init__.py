@@ -19,7 +19,8 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     10      a contact with friction       changes.turn_wishes, phases.is_denied
     11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
-    12      friction at rest              sticking.stick_together, sticking.choose, independence.thin_out
+    12      friction at rest              sticking.stick_together, sticking.choose
+    12      redundant friction            sticking.thin_out_idle, independence.thin_out
     12      its impacts                   striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.

@@ -58,7 +58,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
    the next derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others
    push with their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an
    impulse.
-   -> sticking.stick_together, sticking.choose, independence.thin_out, striking.slide_on
+   -> sticking.stick_together, sticking.choose, sticking.thin_out_idle, independence.thin_out, striking.slide_on
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing

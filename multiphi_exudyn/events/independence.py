@@ -23,7 +23,7 @@ from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.free_rows import norm
 
-__all__ = ["join", "thin_out"]
+__all__ = ["independent", "join", "thin_out"]
 
 STICK = 0  # state of a friction element
 

@@ -24,6 +24,7 @@ from multiphi_exudyn.events.arrays import (
     FIRST_EXITS,
     FLOW_BASIS,
     FLOW_COUNT,
+    HEARD,
     HELD_BACK,
     KINDS,
     LEVEL,
@@ -186,7 +187,7 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
     """An exit that is always taken is armed where it leads back to where the instant began, and its signal is zero.
 
     The signal that brought the element here was zero too: what either says beyond that is round-off. A rigid contact
-    that is left without reaction opens nevertheless.
+    that is left without reaction opens nevertheless, and so does what others have brought here.
     """
     level, before = ints[WORKED + LEVEL], ints[ints[REACHED + LEVEL] + STATES]
     for k in range(ints[level + EXIT_COUNT]):
@@ -194,6 +195,7 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
         element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
         back = ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
         back = back and ints[phase] == REFUSED and ints[ints[KINDS] + element] != RIGID
+        back = back and ints[ints[HEARD] + element] == 1
         if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0:
             ints[phase] = ARMED
 

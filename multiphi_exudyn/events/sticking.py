@@ -38,20 +38,22 @@ from multiphi_exudyn.events.arrays import (
     STATES,
     STATIC_LIMITS,
     TOGETHER,
+    UNION,
     UNSETTLED,
     VALUE_SIZES,
     VALUES,
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, enter, note, transfer
+from multiphi_exudyn.events.changes import NOBODY, enter, is_held, note, transfer
 from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
+from multiphi_exudyn.events.independence import independent
 from multiphi_exudyn.events.phases import first_exit
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
-from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, product
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, product
 
 __all__ = ["stick_together"]
 
@@ -85,6 +87,7 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
             ints[CAUSE] = UNSETTLED
             return FAILED
         falling = choose(ints, numbers, count)
+    thin_out_idle(ints, numbers, count)
     changed = 0
     for i in range(ints[ELEMENTS]):
         changed += 1 if ints[wishes + i] != ints[states + i] else 0
@@ -210,7 +213,7 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
             side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
             if numbers[low] == numbers[high]:
                 entered = FORWARD if numbers[low] - slipped < 0.0 else BACKWARD
-            elif side != BETWEEN:
+            elif side != BETWEEN and side != WAITING:
                 force = numbers[ints[FURTHER] + k] - slipped
                 entered = BACKWARD if side == ABOVE or force > 0.0 else FORWARD
                 now = (ints[states + i] == STICK) == (stuck == 1)
@@ -222,3 +225,22 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
         if falling > 0:
             break
     return falling
+
+
+@compiled
+def thin_out_idle(ints: Ints, numbers: Numbers, count: int) -> None:
+    """12. Of those at rest with exactly their limit, each sticks that does not follow from those that stick already."""
+    union, wishes, sides = ints[UNION], ints[WISHES], ints[ints[SMALL_PROBLEM] + SIDES]
+    for i in range(ints[ELEMENTS]):
+        sticks = numbers[ints[LIMITS] + i] > 0.0 and ints[wishes + i] == STICK
+        ints[union + i] = 1 if sticks or is_held(ints, WORKED, i) == 1 else 0
+    for k in range(count):
+        if ints[sides + k] == WAITING:
+            ints[union + ints[ints[RESTING_LIST] + k]] = 0
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        if ints[sides + k] == WAITING:
+            ints[union + i] = 1
+            if independent(ints, numbers, union) == 0:
+                ints[union + i] = 0
+                ints[wishes + i] = ints[ints[KEY] + i]

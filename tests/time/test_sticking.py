@@ -170,3 +170,20 @@ def test_one_that_turns_does_not_tear_another_one_loose(sign):
     assert {event.contact for event in run.events} == {"floor"}
     assert_allclose(run.displacement(0.4), sign * 0.2, rtol=1e-12)
     assert_allclose(run.displacement(1.0), sign * (0.2 - 0.75 * 0.6**2), rtol=1e-12)
+
+
+@pytest.mark.parametrize("given", [[(1.0, 2.0), (1.0, 2.0)], [(1.0, 3.0), (1.0, 1.0)], [(1.0, 1.0), (1.0, 3.0)]])
+def test_redundant_ones_let_go_where_none_can_take_over(given):
+    """Under a load that rises: one bears its static limit, the other its limit; both slip with their limits."""
+    structure, load = mp.LinearStructure([[1.0]], [[4.0]], points={"m": 0}), mp.HarmonicLoad("m", 5.0, 0.25, -np.pi / 2)
+    most = sum(limit for limit, _ in given) + max(static - limit for limit, static in given)
+    one = [mp.Friction("one", "m", sum(limit for limit, _ in given), static_limit=most)]
+    several = [mp.Friction(f"f{i}", "m", limit, static_limit=static) for i, (limit, static) in enumerate(given)]
+    runs = [
+        mp.simulate(mp.MultiPhiModel(structure, elements, modes="all"), 1.0, loads=[load])
+        for elements in (one, several)
+    ]
+    t = np.linspace(0, 1, 101)
+    assert [run.status for run in runs] == ["ok"] * 2
+    assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-13)
+    assert runs[1].ledger.residual == pytest.approx(0.0, abs=1e-13)
