@@ -14,7 +14,7 @@ from multiphi_exudyn import (
 )
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.running import timing
+from multiphi_exudyn.study.running import reduced_runner, timing
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.timing import repeated
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -241,3 +241,19 @@ def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once(m
         assert (result, first) == ("answer", duration)
         assert abs(len(repeats) - expected) <= 1
     assert repeated(lambda: ("answer", 0.001), 0)[2] == ()
+
+
+def test_the_loop_is_compiled_before_the_clock_starts(bench, monkeypatch):
+    called = []
+    for name in ("compile_entries", "simulate"):
+        function = getattr(reduced_runner, name)
+
+        def told(*given, name=name, function=function, **options):
+            called.append(name)
+            return function(*given, **options)
+
+        monkeypatch.setattr(reduced_runner, name, told)
+    name = next(name for name, spec in bench.scene.models.items() if spec.kind == "reduced")
+    run_model(bench, name, progress=False)
+    assert called[:2] == ["compile_entries", "simulate"]
+    assert called.count("compile_entries") == 1
