@@ -15,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     LIMITS,
     STATES,
+    STICK,
     UNION,
     WORKED,
 )
@@ -24,8 +25,6 @@ from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.free_rows import norm
 
 __all__ = ["independent", "join", "thin_out"]
-
-STICK = 0  # state of a friction element
 
 
 @compiled

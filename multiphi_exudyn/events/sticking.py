@@ -33,10 +33,13 @@ from multiphi_exudyn.events.arrays import (
     RESTING_LIST,
     ROWS,
     SIGNAL,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
     SMALL_PROBLEM,
     SPEED,
     STATES,
     STATIC_LIMITS,
+    STICK,
     TOGETHER,
     UNION,
     UNSETTLED,
@@ -57,8 +60,6 @@ from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING
 
 __all__ = ["stick_together"]
 
-STICK, FORWARD, BACKWARD = 0, 1, 2  # states of a friction element: stick, slip+, slip-
-
 
 @compiled
 def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
@@ -76,7 +77,7 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
         ints[wishes + i] = ints[states + i]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
-        ints[key + i] = FORWARD if ints[states + i] == STICK else ints[states + i]
+        ints[key + i] = SLIP_FORWARD if ints[states + i] == STICK else ints[states + i]
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
@@ -174,10 +175,10 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
         i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
         limit = numbers[ints[LIMITS] + i]
         most = numbers[ints[STATIC_LIMITS] + i]
-        slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
+        slipped = limit if ints[ints[KEY] + i] == SLIP_FORWARD else -limit
         low, high = slipped - most, slipped + most
         if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
-            low = slipped - limit if ints[asking + i] == FORWARD else slipped + limit
+            low = slipped - limit if ints[asking + i] == SLIP_FORWARD else slipped + limit
             high = low
         numbers[ints[LOWEST] + k] = low
         numbers[ints[HIGHEST] + k] = high
@@ -194,7 +195,7 @@ def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
     level = ints[WORKED + LEVEL]
     if ints[ints[level + STATES] + element] != STICK or asked == NOBODY:
         return 0
-    exit_ = first_exit(ints, level, element) + (asked - FORWARD) * EXIT_INTS
+    exit_ = first_exit(ints, level, element) + (asked - SLIP_FORWARD) * EXIT_INTS
     return 1 if row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0 else 0
 
 
@@ -209,16 +210,16 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
         for k in range(count):
             i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
             limit, most = numbers[ints[LIMITS] + i], numbers[ints[STATIC_LIMITS] + i]
-            slipped = limit if ints[ints[KEY] + i] == FORWARD else -limit
+            slipped = limit if ints[ints[KEY] + i] == SLIP_FORWARD else -limit
             side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
             if numbers[low] == numbers[high]:
-                entered = FORWARD if numbers[low] - slipped < 0.0 else BACKWARD
+                entered = SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
             elif side != BETWEEN and side != WAITING:
                 force = numbers[ints[FURTHER] + k] - slipped
-                entered = BACKWARD if side == ABOVE or force > 0.0 else FORWARD
+                entered = SLIP_BACKWARD if side == ABOVE or force > 0.0 else SLIP_FORWARD
                 now = (ints[states + i] == STICK) == (stuck == 1)
                 if now and most > limit and abs(force) > limit:
-                    numbers[low] = slipped - limit if entered == FORWARD else slipped + limit
+                    numbers[low] = slipped - limit if entered == SLIP_FORWARD else slipped + limit
                     numbers[high] = numbers[low]
                     falling += 1
             ints[ints[WISHES] + i] = entered

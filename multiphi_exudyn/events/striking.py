@@ -32,6 +32,8 @@ from multiphi_exudyn.events.arrays import (
     RELEASED,
     RIGID,
     SHARED,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
     SPEED,
     SPEEDS,
     STATES,
@@ -129,7 +131,8 @@ def slide_on(ints: Ints, numbers: Numbers) -> int:
             row = ints[level + SPEEDS] + i * (n + 1)
             speed = product(numbers, row, ints[AFTER + SPEED], n)
             rests = abs(speed) <= RESTING * speed_size(ints, numbers, AFTER, row)
-            ints[key + i] = ints[before + i] if rests else (1 if speed > 0.0 else 2)
+            slips = SLIP_FORWARD if speed > 0.0 else SLIP_BACKWARD
+            ints[key + i] = ints[before + i] if rests else slips
             turned += 1 if ints[key + i] != ints[ints[level + STATES] + i] else 0
     if turned == 0:
         return OK
