@@ -5,7 +5,7 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 
 Every room imports only from those before it in this order, and so do the files of a room.
 
-Order: errors, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli.
+Order: errors, version, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli, __main__.
 """
 
 from multiphi_exudyn.errors import (
@@ -45,6 +45,7 @@ from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Ledger, Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
+from multiphi_exudyn.version import __version__
 
 __all__ = [
     "Assembly",
@@ -86,6 +87,7 @@ __all__ = [
     "Trajectory",
     "UnilateralContact",
     "UpTo",
+    "__version__",
     "assemble",
     "frequency_response",
     "planar_beam",

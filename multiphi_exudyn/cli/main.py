@@ -5,6 +5,8 @@
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
 Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
+
+A command's own module is loaded when the command is run, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations
@@ -13,68 +15,52 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
-from multiphi_exudyn.cli.animate_command import run_animate
-from multiphi_exudyn.cli.budget_command import run_budget
-from multiphi_exudyn.cli.compare_command import run_compare
-from multiphi_exudyn.cli.compile_command import run_compile
-from multiphi_exudyn.cli.needs_command import run_needs
-from multiphi_exudyn.cli.stability_command import run_stability
-from multiphi_exudyn.cli.study_command import run_study_file
+from threadpoolctl import threadpool_limits
+
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.study.accuracy.cases import shipped_studies
-from multiphi_exudyn.study.scene.scenes import shipped_scenes
+from multiphi_exudyn.version import __version__
 
-__all__ = ["command", "main"]
+__all__ = ["command", "main", "parser"]
 
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+Run: TypeAlias = "Callable[[argparse.Namespace], bool]"
+
+OK, FAILED, BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 141
 
 
 def command() -> NoReturn:
     """Entry of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
 
-    More threads cost the small matrices of a modal model more than they give. numpy reads the number when it is
-    loaded, hence the restart.
+    More threads cost the small matrices of a modal model more than they give. A pipe that its reader has closed, as
+    in ``multiphi-exudyn scenes | head -1``, ends the command quietly.
     """
-    if os.name == "posix" and not any(name in os.environ for name in THREAD_SETTINGS):
-        os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
-        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
-    sys.exit(main())
+    if not any(name in os.environ for name in THREAD_SETTINGS):
+        threadpool_limits(1)
+    try:
+        code = main()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the interpreter flushes once more at its end
+        code = CLOSED_PIPE
+    sys.exit(code)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        return OK if _run(_parser().parse_args(arguments)) else FAILED
+        given = parser().parse_args(arguments)
+        return OK if given.run(given) else FAILED
     except MultiPhiError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
-
-
-def _run(given: argparse.Namespace) -> bool:
-    if given.command == "compare":
-        return run_compare(given.scene, given.t_end, given.modes, given.out)
-    if given.command == "animate":
-        return run_animate(given.scene, given.t_end, given.model, given.reference, given.slow, given.out)
-    if given.command == "budget":
-        return run_budget(given.scene, given.t_end, given.modes, given.out)
-    if given.command == "needs":
-        return run_needs(given.scenes)
-    if given.command == "study":
-        return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
-    if given.command == "stability":
-        return run_stability(given.case, given.quick, given.out)
-    if given.command == "compile":
-        return run_compile()
-    return _listed(shipped_scenes() if given.command == "scenes" else shipped_studies())
 
 
 class _OneLineParser(argparse.ArgumentParser):
@@ -85,31 +71,93 @@ class _OneLineParser(argparse.ArgumentParser):
         raise MultiPhiValueError(f"{self.prog}: {' '.join(message.split())}")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
-    commands = parser.add_subparsers(
+def parser() -> argparse.ArgumentParser:
+    """All commands, their options and what each of them runs."""
+    whole = _OneLineParser(
+        "multiphi-exudyn",
+        description="Structures with contacts: reduced models and the full nonlinear one, side by side.",
+        epilog="multiphi-exudyn COMMAND --help says more of a command, with an example.",
+    )
+    whole.add_argument("--version", action="version", version=f"multiphi-exudyn {__version__}")
+    commands = whole.add_subparsers(
         dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,compile,scenes,studies}"
     )
-    compare = commands.add_parser("compare", help="run all models of a scene and write a report")
-    _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
-    _animate_options(commands.add_parser("animate", help="show a reduced model and the reference side by side, moving"))
-    budget = commands.add_parser("budget", help="tell where the difference of a scene's reduced and full model is from")
-    _scene_options(budget, "the truncated models instead of the scene's")
-    needs = commands.add_parser("needs", help="tell what reduced runs take: levels, coordinates, packages, memory")
-    needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")
-    _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
-    _stability_options(commands.add_parser("stability", help="run every model through a catalogue of extreme cases"))
-    commands.add_parser(
-        "compile", help="compile the loop ahead: a container, the workers of a cluster (NUMBA_CPU_NAME)"
+
+    def add(
+        name: str, run: Callable[[argparse.Namespace], bool], summary: str, text: str, example: str
+    ) -> argparse.ArgumentParser:
+        one = commands.add_parser(
+            name,
+            help=summary,
+            description=f"{summary[0].upper()}{summary[1:]}. {text}".strip(),
+            epilog=f"Example: multiphi-exudyn {example}",
+        )
+        one.set_defaults(run=run)
+        return one
+
+    compare = add(
+        "compare",
+        _compare,
+        "run all models of a scene and write a report",
+        "Writes report.html, summary.json and histories.npz.",
+        "compare paper-rig --t-end 0.5 --modes 12 --out rig",
     )
-    commands.add_parser("scenes", help="list the shipped scenes")
-    commands.add_parser("studies", help="list the shipped studies")
-    return parser
+    _scene_options(compare, "of the reduced models that take the scene's number")
+    animate = add(
+        "animate",
+        _animate,
+        "show a reduced model and the reference moving side by side, as a GIF",
+        "",
+        "animate paper-rig --t-end 0.3 --slow 40",
+    )
+    _animate_options(animate)
+    budget = add(
+        "budget",
+        _budget,
+        "show where the difference between a scene's reduced and full model comes from",
+        "Writes budget.json and budget.png.",
+        "budget paper-rig --t-end 0.3",
+    )
+    _scene_options(budget, "of the truncated models")
+    needs = add(
+        "needs",
+        _needs,
+        "list what reduced runs need: levels, coordinates, packages, memory",
+        "",
+        "needs paper-rig bed-of-stops",
+    )
+    needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")
+    study = add(
+        "study",
+        _study,
+        "run a study, or continue an interrupted one, and write its report",
+        "Writes report.html and runs.csv; runs.sqlite keeps every run: a second call does only what is missing.",
+        "study pareto --quick",
+    )
+    _study_options(study)
+    stability = add(
+        "stability",
+        _stability,
+        "run every model through a catalogue of extreme cases",
+        "",
+        "stability --quick",
+    )
+    _stability_options(stability)
+    add(
+        "compile",
+        _compile,
+        "compile the event loop now, so that the first run does not have to",
+        "For a container, or the workers of a cluster (NUMBA_CPU_NAME names their processor).",
+        "compile",
+    )
+    add("scenes", _scenes, "list the shipped scenes", "", "scenes")
+    add("studies", _studies, "list the shipped studies", "", "studies")
+    return whole
 
 
 def _scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
     _scene_option(parser)
-    parser.add_argument("--modes", type=_count, metavar="R", help=f"number of modes of {whose}")
+    parser.add_argument("--modes", type=_count, metavar="R", help=f"number of modes {whose} (default: the scene's)")
     _folder_option(parser, "SCENE")
 
 
@@ -117,7 +165,9 @@ def _animate_options(parser: argparse.ArgumentParser) -> None:
     _scene_option(parser)
     parser.add_argument("--model", metavar="NAME", help="the reduced model (default: the scene's first)")
     parser.add_argument("--reference", metavar="NAME", help="what it is shown beside (default: the scene's reference)")
-    parser.add_argument("--slow", type=_factor, metavar="FACTOR", help="how many times slower than it happens")
+    parser.add_argument(
+        "--slow", type=_factor, metavar="FACTOR", help="slow motion factor (default: chosen from the duration)"
+    )
     parser.add_argument(
         "--out", type=Path, metavar="FILE.gif", help="the animation (default: multiphi-SCENE/animation.gif)"
     )
@@ -125,7 +175,7 @@ def _animate_options(parser: argparse.ArgumentParser) -> None:
 
 def _scene_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a shipped scene (see: scenes) or a TOML file")
-    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] instead of the scene's")
+    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] (default: the scene's)")
 
 
 def _study_options(parser: argparse.ArgumentParser) -> None:
@@ -135,14 +185,14 @@ def _study_options(parser: argparse.ArgumentParser) -> None:
         "--on",
         metavar="WHERE",
         default="processes",
-        help="where the error pass runs: processes (default), serial, or a Dask scheduler's address tcp://host:port",
+        help="where runs are made: processes (default), serial, or a Dask scheduler's address tcp://host:port",
     )
     parser.add_argument("--workers", type=_count, metavar="N", help="number of processes (default: one per core)")
     _folder_option(parser, "STUDY")
 
 
 def _stability_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--case", metavar="NAME", help="this case alone")
+    parser.add_argument("--case", metavar="NAME", help="this case alone (default: all)")
     parser.add_argument("--quick", action="store_true", help="fewer cases, shorter ones")
     _folder_option(parser, "stability")
 
@@ -173,6 +223,60 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"got {text!r}, need a whole number >= 1")
     return int(text)
+
+
+def _compare(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.compare_command import run_compare
+
+    return run_compare(given.scene, given.t_end, given.modes, given.out)
+
+
+def _animate(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.animate_command import run_animate
+
+    return run_animate(given.scene, given.t_end, given.model, given.reference, given.slow, given.out)
+
+
+def _budget(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.budget_command import run_budget
+
+    return run_budget(given.scene, given.t_end, given.modes, given.out)
+
+
+def _needs(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.needs_command import run_needs
+
+    return run_needs(given.scenes)
+
+
+def _study(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.study_command import run_study_file
+
+    return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
+
+
+def _stability(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.stability_command import run_stability
+
+    return run_stability(given.case, given.quick, given.out)
+
+
+def _compile(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.compile_command import run_compile
+
+    return run_compile()
+
+
+def _scenes(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.study.scene.scenes import shipped_scenes
+
+    return _listed(shipped_scenes())
+
+
+def _studies(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.study.accuracy.cases import shipped_studies
+
+    return _listed(shipped_studies())
 
 
 def _listed(titles: Mapping[str, str]) -> bool:

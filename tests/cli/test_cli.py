@@ -1,13 +1,17 @@
 """The command line: exit codes, one line for bad input, files that are whole or not there."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from small_scene import BEAM, changed, write
 
+import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.cli import compare_command
+from multiphi_exudyn.cli.main import parser
 from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.running.files import write_whole
 from multiphi_exudyn.study.scene.scenes import shipped_scenes
@@ -180,3 +184,44 @@ def test_the_budget_of_a_scene(scene, tmp_path, capsys):
 def test_the_studies_are_listed(capsys):
     assert cli.main(["studies"]) == 0
     assert "pareto" in capsys.readouterr().out
+
+
+def installed(*arguments, **options):
+    """The command line as a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "multiphi_exudyn", *arguments], capture_output=True, text=True, check=False, **options
+    )
+
+
+def test_help_loads_no_study_no_pictures_and_not_exudyn():
+    code = (
+        "import sys; from multiphi_exudyn.cli import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'matplotlib', 'exudyn', 'pydantic', 'jinja2', 'tqdm', 'pandas'} & set(sys.modules)))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert told.splitlines()[-1] == "[]"
+
+
+def test_version_and_module_entry():
+    told = installed("--version")
+    assert (told.returncode, told.stdout) == (0, f"multiphi-exudyn {mp.__version__}\n")
+
+
+@pytest.mark.parametrize("name", ["compare", "animate", "budget", "needs", "study", "stability", "compile"])
+def test_the_help_of_a_command_has_a_description_and_an_example_that_is_understood(name, capsys):
+    with pytest.raises(SystemExit):
+        cli.main([name, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    example = text.partition("Example: multiphi-exudyn ")[2]
+    assert example.split()[0] == name
+    assert vars(parser().parse_args(example.split()))["command"] == name
+
+
+def test_a_pipe_that_its_reader_closes_ends_the_command_quietly():
+    command = [sys.executable, "-m", "multiphi_exudyn", "scenes"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141

@@ -11,11 +11,12 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_info
+
 __all__ = ["environment", "machine"]
 
 PACKAGES = ("multiphi-exudyn", "exudyn", "numpy", "scipy")
 IMPORTED = ("multiphi_exudyn", "exudyn")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 IMPORT_LIMIT_S = 60  # s; an import that takes longer is not reported
 
 
@@ -29,13 +30,13 @@ def environment() -> dict[str, Any]:
 
 
 def machine() -> dict[str, Any]:
-    """Versions, machine and thread settings."""
+    """Versions, machine and the number of threads of its linear algebra."""
     return {
         "python": platform.python_version(),
         "system": platform.platform(),
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "threads": {name: os.environ.get(name, "not set") for name in THREADS},
+        "threads": {"BLAS threads": max((pool["num_threads"] for pool in threadpool_info()), default=1)},
         "versions": {name: _version(name) for name in PACKAGES},
     }
 
