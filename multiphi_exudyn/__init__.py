@@ -5,7 +5,8 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 
 Every room imports only from those before it in this order, and so do the files of a room.
 
-Order: errors, version, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli, __main__.
+Order: errors, version, display, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli,
+__main__.
 """
 
 from multiphi_exudyn.errors import (

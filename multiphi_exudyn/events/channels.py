@@ -27,7 +27,7 @@ from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 __all__ = ["Channels", "ExtendedLevel"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ExtendedLevel(Level):
     """A level in the coordinates xi = (eta, w) (r + q): its rows and vectors have q more columns.
 

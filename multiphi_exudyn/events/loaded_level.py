@@ -8,12 +8,13 @@ In xi rows, maps between levels, events and energies are those of a level under 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.channels import Channels
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.levels.level import Asymptotic, Level
@@ -65,8 +66,8 @@ class PotentialForm:
         return self.constant + float(own + mixed)
 
 
-@dataclass(frozen=True)
-class LoadedLevel:
+@dataclass(frozen=True, repr=False)
+class LoadedLevel(Shown):
     """A level under static and varying loads, in the coordinates xi = (eta, w) (r + q,).
 
     level: in xi, without channels as it is. asymptotic: where its motion is centred while w = 0. gap_constants: gaps
@@ -86,6 +87,11 @@ class LoadedLevel:
     own_states: tuple[int, ...] | None = None
     stored: float = 0.0
     entries: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "states", str(self.states)
+        yield "modes", str(self.modal.modes)
+        yield "channels", str(self.level.modes - self.modal.modes)
 
     @classmethod
     def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
@@ -121,6 +127,11 @@ class LoadedLevel:
             own_states=self.states,
             stored=_stored(self.level.base, self.states),
         )
+
+    @property
+    def width(self) -> int:
+        """Number r + q of coordinates xi."""
+        return self.level.modes
 
     @property
     def alone(self) -> LoadedLevel:

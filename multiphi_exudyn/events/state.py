@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.round_off import sign_of
 
@@ -25,14 +26,18 @@ class Phase(Enum):
     LANDING = "landing"
 
 
-@dataclass(frozen=True)
-class State:
+@dataclass(frozen=True, repr=False)
+class State(Shown):
     """level, displacement xi and velocity xi' (r + q,), phase of every exit."""
 
     level: LoadedLevel
     displacement: np.ndarray
     velocity: np.ndarray
     phases: tuple[Phase, ...]
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "states", str(self.states)
+        yield "coordinates", str(len(self.displacement))
 
     @property
     def states(self) -> tuple[int, ...]:

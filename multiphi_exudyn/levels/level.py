@@ -13,20 +13,26 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.mode_figure import mode_figure
 from multiphi_exudyn.levels.static_response import static_response
 from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.modes import NEAR
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.arguments import real_array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Asymptotic", "Level", "LevelOverride"]
 
@@ -69,8 +75,8 @@ class Asymptotic:
     potential: float
 
 
-@dataclass(frozen=True)
-class Level:
+@dataclass(frozen=True, repr=False)
+class Level(Shown):
     """One level; see the module's docstring. Built by ``MultiPhiModel.level``.
 
     closed: names of its closed contacts. indices: the same as positions in the base. base: its coordinates.
@@ -95,6 +101,12 @@ class Level:
     neutral: np.ndarray
     computed: np.ndarray
     kept_beyond: int
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "closed", names(self.closed)
+        yield "modes", str(self.modes)
+        if self.modes:
+            yield "frequencies", f"{self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz"
 
     @property
     def modes(self) -> int:
@@ -215,6 +227,24 @@ class Level:
             doubled = 2 * np.sqrt(np.abs(squares[: len(ratios)]))
             damping[np.arange(len(ratios)), np.arange(len(ratios))] = ratios * doubled
         return replace(self, squares=squares, damping=damping)
+
+    def plot_modes(self, count: int = 6, rows: np.ndarray | None = None, positions: np.ndarray | None = None) -> Figure:
+        """A matplotlib figure of the lowest ``count`` mode shapes, each scaled to 1.
+
+        rows: (k, n), what is drawn of a shape, such as the deflections along a beam; None: every degree of freedom.
+        positions: (k,) [m] where; None: their numbers.
+
+        Raises MultiPhiValueError for arrays of another shape.
+        """
+        n = self.base.modes.shapes.shape[0]
+        shown = np.eye(n) if rows is None else real_array("rows", rows, f"a (k, {n}) array of real numbers")
+        if shown.ndim != 2 or shown.shape[1] != n or not len(shown):
+            raise MultiPhiValueError(f"rows: got shape {shown.shape}, need (k, {n})")
+        places = np.arange(len(shown)) if positions is None else real_array("positions", positions, "a (k,) array")
+        if places.shape != (len(shown),):
+            raise MultiPhiValueError(f"positions: got shape {places.shape}, need ({len(shown)},)")
+        label = ("degree of freedom" if rows is None else "row") if positions is None else "position [m]"
+        return mode_figure(shown @ self.shapes[:, :count], self.frequencies[:count], places, label)
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""

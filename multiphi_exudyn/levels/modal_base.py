@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.modes import Modes, complete_modes, lowest_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
@@ -38,8 +39,8 @@ PARALLEL = 1e-14  # of the largest component: directions that differ by less dif
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
 
 
-@dataclass(frozen=True)
-class ModalBase:
+@dataclass(frozen=True, repr=False)
+class ModalBase(Shown):
     """The structure and its contacts in coordinates y of its own modes, x = Phi y.
 
     modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, l) of
@@ -55,6 +56,10 @@ class ModalBase:
     contacts: tuple[Contact, ...]
     complete: bool
     mass: Matrix
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "coordinates", f"{self.modes.count} of {len(self.modes.shapes)}"
+        yield "contacts", names([contact.name for contact in self.contacts])
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
         """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), zero where it is round-off.

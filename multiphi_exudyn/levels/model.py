@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
@@ -30,8 +31,8 @@ FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between
 LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
-@dataclass(frozen=True)
-class MultiPhiModel:
+@dataclass(frozen=True, repr=False)
+class MultiPhiModel(Shown):
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
     structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws, kept with every law by its
@@ -249,6 +250,12 @@ class MultiPhiModel:
         """What is made of a level goes with it; a trajectory may still hold the level itself."""
         for _, loaded in self.loaded.items():
             loaded.forget(indices)
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "degrees of freedom", str(self.structure.n)
+        yield "contacts", names([contact.name for contact in self.contacts])
+        yield "modes", "to be chosen" if self.modes is None else str(self.modes)
+        yield "levels built", f"{self.levels_built} of {self.levels_possible}"
 
     def index(self, name: str) -> int:
         """Position of a contact."""

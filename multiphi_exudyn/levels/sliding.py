@@ -35,7 +35,7 @@ __all__ = ["SlidingLevel", "sliding"]
 DETERMINATE = 1e-10  # of one: a smaller share of h.M^-1 h, or of a stiffness, that friction leaves is round-off of zero
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SlidingLevel(Level):
     """A level in which contacts slide; see the module's docstring.
 

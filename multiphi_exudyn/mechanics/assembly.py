@@ -29,7 +29,7 @@ DEPENDENT = 1e-10  # of a tie's largest coefficient: what elimination leaves of 
 TIES_HOLD = 1e-9  # of the terms of a tie: above the round-off of displacements computed part by part
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Assembly(LinearStructure):
     """One structure made of parts; see the module's docstring for its matrices. Made by ``assemble``.
 

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import complete_modes
 from multiphi_exudyn.mechanics.arguments import Matrix, is_real, real_array
@@ -29,8 +30,8 @@ At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: 
 ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating point leaves of a zero
 
 
-@dataclass(frozen=True, eq=False)
-class LinearStructure:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearStructure(Shown):
     """A linear structure; see the module's docstring for the equation.
 
     mass, stiffness: (n, n), dense or scipy.sparse, symmetric; kept as given, never modified.
@@ -67,6 +68,12 @@ class LinearStructure:
     def n(self) -> int:
         """Number of degrees of freedom."""
         return int(self.mass.shape[0])
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "degrees of freedom", str(self.n)
+        yield "matrices", "sparse" if scipy.sparse.issparse(self.stiffness) else "dense"
+        yield "damping", "none" if self.damping is None else type(self.damping).__name__
+        yield "points", names(list(self.points))
 
     def row(self, at: At) -> np.ndarray:
         """The row p, (n,), of a point name, of {point: coefficient}, or of a row given as such."""

@@ -7,11 +7,12 @@ different curves. Without contact both are the linear response, amplitude = |p.(
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
@@ -24,12 +25,17 @@ from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 __all__ = ["FrequencyResponse", "frequency_response"]
 
 
-@dataclass(frozen=True)
-class FrequencyResponse:
+@dataclass(frozen=True, repr=False)
+class FrequencyResponse(Shown):
     """Result of ``frequency_response``: frequencies (k,) [Hz] in the order in which they were run, k steady states."""
 
     frequencies: np.ndarray
     states: tuple[SteadyState, ...]
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "frequencies", f"{len(self.frequencies)}, {min(self.frequencies):g} to {max(self.frequencies):g} Hz"
+        yield "periodic", str(sum(state.status == "periodic" for state in self.states))
+        yield "failed", str(sum(state.status == "failed" for state in self.states))
 
     @property
     def orders(self) -> np.ndarray:

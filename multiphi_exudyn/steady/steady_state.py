@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown, kinds
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -50,8 +51,8 @@ ZOOMS = 3  # so often: the extreme is then known to the square of (2 / ZOOM)^ZOO
 PeriodicLoad: TypeAlias = "HarmonicLoad | BaseMotion"
 
 
-@dataclass(frozen=True)
-class SteadyState:
+@dataclass(frozen=True, repr=False)
+class SteadyState(Shown):
     """Result of ``steady_state``.
 
     status: "periodic" | "not settled" | "failed", message: the cause of the latter two. load: of the run.
@@ -77,6 +78,14 @@ class SteadyState:
     displacement: np.ndarray
     velocity: np.ndarray
     warnings: tuple[str, ...] = ()
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "status", f"{self.status}{f', {self.message}' if self.message else ''}"
+        yield "load", str(self.load)
+        yield "order", str(self.order)
+        yield "residual", f"{self.residual:.2g}"
+        yield "largest multiplier", f"{self.multiplier:.4g}"
+        yield "warnings", kinds(self.warnings)
 
     def amplitude(self, point: At) -> float:
         """Half the difference between the largest and the smallest displacement [m] of a point; NaN where failed."""

@@ -10,12 +10,13 @@ from __future__ import annotations
 import functools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.mathematics.exponentials import Exponentials
@@ -27,8 +28,8 @@ __all__ = ["Listed", "Segment", "Segments", "listed", "owners"]
 MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
 
 
-@dataclass(frozen=True)
-class Segment:
+@dataclass(frozen=True, repr=False)
+class Segment(Shown):
     """Motion in one level from ``start`` to ``end`` [s]; flow: its closed form, c (p,) its coefficients.
 
     phases: of every contact at the start; armed_at: when after it [s] the last of them was armed. entry_work: work [J]
@@ -42,6 +43,10 @@ class Segment:
     phases: tuple[Phase, ...]
     armed_at: float
     entry_work: float = 0.0
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "time", f"{self.start:.6g} to {self.end:.6g} s"
+        yield "states", str(self.level.states)
 
     def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """xi or its first or second derivative, (r + q, k) at times (k,)."""
@@ -73,16 +78,15 @@ class Segment:
         moving = own.force_rows[k] @ self.modal(t) + own.force_rate_rows[k] @ self.modal(t, 1)
         return np.asarray(moving + self.level.asymptotic.forces[k])
 
-    def force_integral(self, contact: int, start: float, end: float) -> float:
-        """Integral of the force of a closed contact [N s]; of a sum of free exponentials and a constant, closed."""
-        own, rows, free = self.level.level, self.rows, self.flow.free
-        k = own.indices.index(contact)
-        terms = own.force_rows[k] @ rows + own.force_rate_rows[k] @ self.basis.derivative(rows)
+    def integral(self, row: np.ndarray, start: float, end: float) -> float:
+        """Integral over time of a row (2 (r + q) + 1,) of (xi, xi', 1); of a sum of free exponentials closed."""
+        rows, free, n = self.rows, self.flow.free, len(row) // 2
+        terms = row[:n] @ rows + row[n:-1] @ self.basis.derivative(rows)
         basis = Exponentials(self.basis.rates[:free], self.basis.powers[:free], self.basis.unit)
         integral = float((basis.shifted(terms[:free], start - self.start) @ basis.integrals(end - start)).real)
         for times, weights in panels(self.basis.rates[free:], start, end):
             integral += float(((self.basis.at(times - self.start)[:, free:] @ terms[free:]).real) @ weights)
-        return integral + float(self.level.asymptotic.forces[k]) * (end - start)
+        return integral + float(row[-1]) * (end - start)
 
     def energy(self, t: np.ndarray) -> np.ndarray:
         """Kinetic + strain energy (k,) [J] at times (k,)."""
@@ -166,7 +170,7 @@ class Listed(Segments):
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
-        found = np.zeros((2, len(places), max(level.level.modes for level in self.levels)))
+        found = np.zeros((2, len(places), max(level.width for level in self.levels)))
         for place in np.unique(places).tolist():
             own, segment = np.flatnonzero(places == place), self._segments[place]
             for derivative in range(2):
@@ -180,7 +184,7 @@ class Listed(Segments):
         x, v = self.states(places, times - self.starts[places])
         for number in np.unique(self.numbers[places]).tolist():
             level, own = self.levels[number], self.numbers[places] == number
-            n, function = level.level.modes, row(level)
+            n, function = level.width, row(level)
             found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
         return found
 

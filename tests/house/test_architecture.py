@@ -20,7 +20,14 @@ BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, an
 COMPILERS = ("multiphi_exudyn/mathematics/compilation.py", "multiphi_exudyn/mathematics/machine_code.py")
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
-    "matplotlib": ("multiphi_exudyn/study",),
+    "matplotlib": (
+        "multiphi_exudyn/study",
+        "multiphi_exudyn/levels/mode_figure.py",
+        "multiphi_exudyn/levels/level.py",
+        "multiphi_exudyn/time/history_figure.py",
+        "multiphi_exudyn/time/histories.py",
+    ),
+    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
     "numba": COMPILERS,
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
@@ -165,7 +172,7 @@ def test_nothing_light_is_imported_inside_a_function(module):
 
 
 def test_importing_the_package_loads_neither_exudyn_nor_matplotlib_nor_numba():
-    heavy = "{'exudyn', 'matplotlib', 'numba', 'pydantic', 'tqdm'}"
+    heavy = "{'exudyn', 'matplotlib', 'numba', 'pandas', 'pydantic', 'tqdm'}"
     code = f"import sys, multiphi_exudyn; print(sorted({heavy} & set(sys.modules)))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert found.stdout.strip() == "[]"

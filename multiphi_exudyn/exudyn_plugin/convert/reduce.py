@@ -20,6 +20,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.frictions import frictions_of
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, smooth
@@ -53,8 +54,8 @@ __all__ = ["Item", "Reduction", "reduce"]
 HELD = 1e-9  # of a row's largest entry before projection: a contact that moves less is held by constraints
 
 
-@dataclass(frozen=True)
-class Reduction:
+@dataclass(frozen=True, repr=False)
+class Reduction(Shown):
     """What ``reduce`` made of a system.
 
     model: structure, contacts, modes. velocity: z'(0), (n,); the displacement z(0) is zero. loads: p, none if zero,
@@ -67,6 +68,13 @@ class Reduction:
     loads: tuple[Load, ...]
     taken: tuple[Item, ...]
     left_out: tuple[tuple[Item, str], ...]
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "degrees of freedom", str(self.structure.n)
+        yield "contacts", names([contact.name for contact in self.model.contacts])
+        yield "modes", str(self.model.modes)
+        yield "taken", str(len(self.taken))
+        yield "left out", names([str(item) for item, _ in self.left_out])
 
     @property
     def structure(self) -> LinearizedStructure:

@@ -1,9 +1,10 @@
-"""Friction along a motion: its force and the place of its patch as linear functions of a level's coordinates.
+"""Rows of a level: what is asked of a motion as linear functions of the level's coordinates.
 
+    x of a point    phi.(Phi_l xi + x_inf,l)          gap  g = h.x + gap       lambda  of a closed contact
     T = -lambda of the held link while it sticks; while it slips -push, or s mu N where it goes with the force of a link
     place of the patch on the counter-surface: the held place w while it sticks, w + q - stretch else, q of that link
 
-Rows (2 n + 1,) of (xi, xi', 1), n coordinates.
+Rows (2 n + 1,) of (xi, xi', 1), n coordinates, for a level and a point's row (m,) or an element's position.
 """
 
 from __future__ import annotations
@@ -13,10 +14,22 @@ import numpy as np
 from multiphi_exudyn.events.exits import state_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 
-__all__ = ["force_row", "patch_row", "pressing_row"]
+__all__ = ["force_row", "gap_row", "patch_row", "point_row", "pressing_row"]
 
 
-def force_row(level: LoadedLevel, element: int) -> np.ndarray:
+def point_row(row: np.ndarray, level: LoadedLevel) -> np.ndarray:
+    """Displacement [m] of a point, row (m,) in base coordinates."""
+    place = row @ level.level.vectors
+    return np.concatenate([place, np.zeros(len(place)), [row @ level.asymptotic.configuration]])
+
+
+def gap_row(element: int, level: LoadedLevel) -> np.ndarray:
+    """Gap [m]."""
+    gap = level.level.gap_rows[element]
+    return np.concatenate([gap, np.zeros(len(gap)), [level.gap_constants[element]]])
+
+
+def force_row(element: int, level: LoadedLevel) -> np.ndarray:
     """T [N]."""
     link, push = _held_link(level, element), state_of(level, element).push
     if link in level.level.indices:
@@ -27,7 +40,7 @@ def force_row(level: LoadedLevel, element: int) -> np.ndarray:
     return np.concatenate([place, rate, [constant - push]])
 
 
-def patch_row(level: LoadedLevel, element: int) -> np.ndarray:
+def patch_row(element: int, level: LoadedLevel) -> np.ndarray:
     """The place [m]."""
     own, link = level.level, _held_link(level, element)
     held = [k for k, other in enumerate(own.base.links) if other.held]
@@ -40,7 +53,7 @@ def patch_row(level: LoadedLevel, element: int) -> np.ndarray:
     return row
 
 
-def pressing_row(level: LoadedLevel, element: int) -> np.ndarray:
+def pressing_row(element: int, level: LoadedLevel) -> np.ndarray:
     """lambda [N] of a contact's normal link, with friction or without."""
     own = level.level
     for link in own.base.link_places[element]:
