@@ -5,8 +5,8 @@ own modes and asymptotic configuration; transitions carry the motion from level 
 
 Every room imports only from those before it in this order, and so do the files of a room.
 
-Order: errors, version, display, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study, cli,
-__main__.
+Order: errors, version, display, files, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study,
+cli, __main__.
 """
 
 from multiphi_exudyn.errors import (
@@ -43,8 +43,10 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
+from multiphi_exudyn.time.balance import Ledger
+from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Ledger, Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
 from multiphi_exudyn.version import __version__
 
@@ -78,6 +80,7 @@ __all__ = [
     "RayleighDamping",
     "Sampled",
     "SampledLoad",
+    "SavedTrajectory",
     "Section",
     "Smooth",
     "SteadyState",
@@ -91,6 +94,7 @@ __all__ = [
     "__version__",
     "assemble",
     "frequency_response",
+    "load_trajectory",
     "planar_beam",
     "read_structure",
     "simulate",

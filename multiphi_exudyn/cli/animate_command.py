@@ -8,9 +8,10 @@ from pathlib import Path
 from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.comparison.animation import frame_count, frames, gif
 from multiphi_exudyn.study.comparison.film import film_of, run_stage, stage_of
-from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.time.warning_groups import grouped
 

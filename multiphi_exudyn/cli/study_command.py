@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.analysis import StudyResult, cheapest, points, settings, times_faster, words
 from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
 from multiphi_exudyn.study.accuracy.cases import load_study
@@ -13,7 +14,7 @@ from multiphi_exudyn.study.accuracy.study_csv import csv_text
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
-from multiphi_exudyn.study.running.files import results_folder, write_whole
+from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
 

@@ -22,7 +22,7 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
-__all__ = ["LoadedLevel", "PotentialForm"]
+__all__ = ["LoadedLevel", "PotentialForm", "StrainForm"]
 
 
 @dataclass(frozen=True)
@@ -185,10 +185,15 @@ class LoadedLevel(Shown):
 
     def strain(self, displacement: np.ndarray) -> np.ndarray:
         """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column; given frequencies count."""
+        return self.strain_form(displacement)
+
+    @property
+    def strain_form(self) -> StrainForm:
+        """The same as a form in xi."""
         if "strain" not in self.entries:
             self.entries["strain"] = self._strain_form()
         form: StrainForm = self.entries["strain"]
-        return form(displacement)
+        return form
 
     def _strain_form(self) -> StrainForm:
         own, base = self.level, self.level.base

@@ -57,6 +57,11 @@ class Histories(Shown, ABC):
     def frictions(self) -> tuple[str, ...]:
         """Names of what has friction, and is no contact."""
 
+    @property
+    @abstractmethod
+    def rubbing(self) -> tuple[str, ...]:
+        """Names of contacts that have friction."""
+
     @abstractmethod
     def _row(self, question: str, name: At) -> Callable[[Any], np.ndarray]:
         """A level's row (2 (r + q) + 1,) of (xi, xi', 1) for "at", "gap", "contact_force", "friction_force", "slip"."""
@@ -145,7 +150,7 @@ class Histories(Shown, ABC):
         """Histories as a pandas table: a row for each time [s], which is the index.
 
         Columns: displacement [m] of every point by its name, of every contact "gap NAME" [m] and "force NAME" [N], of
-        every friction "force NAME" [N] and "slip NAME" [m]. points: names, None for all of the structure's.
+        what has friction "friction NAME" [N] and "slip NAME" [m]. points: names, None for all of the structure's.
         times: (k,) [s], None for 1001 that are evenly spaced.
 
         Raises MultiPhiValueError for a name or a time that there is not.
@@ -156,8 +161,8 @@ class Histories(Shown, ABC):
         columns = self._at_points(points, at)
         for name in self.contacts:
             columns |= {f"gap {name}": self.gap(name, at), f"force {name}": self.contact_force(name, at)}
-        for name in self.frictions:
-            columns |= {f"force {name}": self.friction_force(name, at), f"slip {name}": self.slip(name, at)}
+        for name in (*self.frictions, *self.rubbing):
+            columns |= {f"friction {name}": self.friction_force(name, at), f"slip {name}": self.slip(name, at)}
         return DataFrame(columns, index=Index(at, name="time"))
 
     def plot(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> Figure:

@@ -19,11 +19,12 @@ from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
 from multiphi_exudyn.events.state import Loss, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.time.balance import Statistics
 from multiphi_exudyn.time.chatter import allowed, window
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.loop_record import ACCUMULATED
 from multiphi_exudyn.time.record import PHASES, Record
-from multiphi_exudyn.time.trajectory import Again, Start, Statistics, Trajectory
+from multiphi_exudyn.time.trajectory import Again, Start, Trajectory
 
 __all__ = ["NUMBERS", "Motion", "carry", "measured"]
 

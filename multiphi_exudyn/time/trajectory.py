@@ -7,9 +7,12 @@ the difference to kinetic + strain.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -24,11 +27,13 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.time.balance import Ledger, Statistics
 from multiphi_exudyn.time.histories import INSTANTS, Histories
 from multiphi_exudyn.time.level_rows import force_row, gap_row, patch_row, point_row, pressing_row
+from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segment import Segment
 
-__all__ = ["Again", "Ledger", "Start", "Statistics", "Trajectory"]
+__all__ = ["Again", "Start", "Trajectory"]
 
 NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
 ROWS = {  # of a level, for an element's position
@@ -65,53 +70,6 @@ class Start(Shown):
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "time", f"{self.time:g} s"
         yield "states", str(self.states)
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Work of a run; function_evaluations counts samples of event signals.
-
-    record_bytes: what its segments and events take; array_bytes: the levels, maps and loads of the loop, which runs of
-    one model under the same loads share.
-    """
-
-    levels_built: int
-    levels_possible: int
-    transitions: int
-    events: int
-    segments: int
-    function_evaluations: int
-    record_bytes: int = 0
-    array_bytes: int = 0
-
-
-@dataclass(frozen=True, repr=False)
-class Ledger(Shown):
-    """Energies [J]: initial + work_of_loads = final + all that was lost, which are the other rows.
-
-    work_of_loads: that of moving stops and counter-surfaces too. friction: limits times ways slipped on the
-    counter-surfaces, and what springs drop by where a static limit lets go. residual: what is left over of the
-    equation.
-    """
-
-    initial: float
-    work_of_loads: float
-    impact: float
-    truncation_kinetic: float
-    truncation_strain: float
-    damping: float
-    friction: float
-    final: float
-
-    @property
-    def residual(self) -> float:
-        """initial + work - losses - final [J]; round-off if everything is accounted for."""
-        lost = self.impact + self.truncation_kinetic + self.truncation_strain + self.damping + self.friction
-        return self.initial + self.work_of_loads - lost - self.final
-
-    def _facts(self) -> Iterator[tuple[str, str]]:
-        for name in (*(entry.name for entry in fields(self)), "residual"):
-            yield name.replace("_", " "), f"{getattr(self, name):.4g} J"
 
 
 @dataclass(frozen=True, repr=False)
@@ -167,6 +125,16 @@ class Trajectory(Histories):
     def frictions(self) -> tuple[str, ...]:
         """Names of the model's frictions."""
         return tuple(contact.name for contact in self.model.contacts if isinstance(contact, Friction))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.
+
+        What is loaded answers all questions about histories, events and energies; it cannot be continued.
+        The file has n numbers for each mode of each level that was visited, and appears whole or not at all (saved.py).
+        """
+        told = {"status": self.status, "message": self.message, "warnings": self.warnings}
+        ledger = dataclasses.asdict(self.ledger) if self.segments else None
+        save(self, Path(path), **told, ledger=ledger, stats=dataclasses.asdict(self.stats))
 
     @functools.cached_property
     def ledger(self) -> Ledger:
@@ -243,6 +211,14 @@ class Trajectory(Histories):
     def _coordinates(self, times: np.ndarray) -> np.ndarray:
         """y (m, k)."""
         return self.model.base.coordinates(self.displacement(times))
+
+    @property
+    def rubbing(self) -> tuple[str, ...]:
+        """Names of the model's contacts that have friction."""
+        links = self.model.links
+        given = zip(self.model.contacts, self.model.link_places, strict=True)
+        held = [contact.name for contact, places in given if any(links[k].held for k in places)]
+        return tuple(name for name in held if name in self.contacts)
 
     # ------------------------------------------------------------------ rows of a level
 

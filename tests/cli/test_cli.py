@@ -12,8 +12,8 @@ import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.cli import compare_command
 from multiphi_exudyn.cli.main import parser
+from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.running import reduced_runner
-from multiphi_exudyn.study.running.files import write_whole
 from multiphi_exudyn.study.scene.scenes import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}

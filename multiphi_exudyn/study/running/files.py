@@ -1,14 +1,13 @@
-"""Files of results: each appears whole or not at all."""
+"""The folder of results."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from pathlib import Path
 
 from multiphi_exudyn.errors import MultiPhiValueError
 
-__all__ = ["results_folder", "write_whole"]
+__all__ = ["results_folder"]
 
 
 def results_folder(path: Path) -> Path:
@@ -21,16 +20,3 @@ def results_folder(path: Path) -> Path:
         raise MultiPhiValueError(
             f"--out: got {str(path)!r}, need a folder that can be written: {error.strerror}"
         ) from error
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write beside the file and rename."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
