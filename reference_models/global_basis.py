@@ -16,6 +16,7 @@ import numpy as np
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structure import LinearStructure
+from reference_models.projection import projected
 
 __all__ = ["global_basis"]
 
@@ -29,10 +30,4 @@ def global_basis(structure: LinearStructure, contacts: Sequence[UnilateralContac
     both = [model.level(closed).vectors for closed in ((), [contact.name for contact in contacts])]
     directions, sines, _ = np.linalg.svd(np.column_stack(both), full_matrices=False)
     vectors = directions[:, sines > INDEPENDENT]
-    strained = base.modes.omega[:, None] * vectors
-    return LinearStructure(
-        mass=np.eye(vectors.shape[1]),
-        stiffness=strained.T @ strained,
-        damping=vectors.T @ base.damping @ vectors,
-        points={name: vectors.T @ (base.modes.shapes.T @ row) for name, row in structure.points.items()},
-    )
+    return projected(base, structure, vectors)
