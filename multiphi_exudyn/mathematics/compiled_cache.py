@@ -24,16 +24,8 @@ Kept = dict[str, tuple[str, bytes]]  # symbol: (digest, object file)
 
 PACKAGE = Path(__file__).parents[1]
 HASH_SIZE = 32  # bytes
-SETTINGS = (
-    "CPU_NAME",
-    "CPU_FEATURES",
-    "ENABLE_AVX",
-    "OPT",
-    "LOOP_VECTORIZE",
-    "SLP_VECTORIZE",
-    "DEBUGINFO",
-)  # NUMBA_...
-LAYOUT = 1  # of the file, and of how functions call one another: another number for another one
+SETTINGS = ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")  # NUMBA_...
+LAYOUT = 2  # of the file, and of how functions call one another: another number for another one
 
 
 def _hash(content: bytes, size: int = HASH_SIZE) -> bytes:

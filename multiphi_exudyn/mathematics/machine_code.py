@@ -1,9 +1,8 @@
-"""Machine code without its compiler: LLVM's text to the code of an object file, and object files to addresses."""
+"""Machine code without its compiler: LLVM's modules to the code of object files, and object files to addresses."""
 
 from __future__ import annotations
 
 import functools
-import re
 import sys
 from collections.abc import Iterable
 
@@ -11,12 +10,12 @@ import llvmlite.binding as llvm
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["load", "object_code", "this_cpu"]
+__all__ = ["RAISED", "load", "object_code", "refusal", "this_cpu"]
 
-RAISES = re.compile(r"@\.const\.picklebuf|@numba_unpickle")  # what numba keeps of an exception to raise
-IN_NUMBA = re.compile(r"^declare [^\n]*@(?:numba|NRT)_\w+", re.MULTILINE)  # what numba's own library has
-OF_C = re.compile(r"@numba_(ldexp|frexp)\b")  # what numba's own library has of C's, under a name of its own
-ERROR_FUNCTION = re.compile(r"^declare (?P<rest>[^\n]*@(?:numba_gil_|Py)\w+\([^\n]*)$", re.MULTILINE)
+RAISED = "multiphi_exudyn.raised"  # what a function would call that raises an error
+IN_NUMBA = ("numba_", "NRT_", "Py", RAISED)  # beginnings of what is in numba, in Python, or nowhere
+OF_C = {"numba_ldexp": "ldexp", "numba_frexp": "frexp"}  # what numba has of C's, under a name of its own
+LEVEL = 2  # of optimisation: 3 takes longer, and gains nothing
 
 
 @functools.cache
@@ -39,26 +38,31 @@ def _machine(cpu: str, features: str) -> llvm.TargetMachine:
     return _target().create_target_machine(cpu, features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True)
 
 
-def object_code(text: str, wrapper: str, symbol: str, cpu: str, features: str) -> bytes:
-    """The object file of one function that numba has compiled and optimised.
+def object_code(module: llvm.ModuleRef, symbol: str, cpu: str, features: str) -> bytes:
+    """The object file of a module in which ``symbol`` is the function that others call.
 
-    text: in LLVM's language, what numba gives. wrapper: the function in it that C could call, to be named ``symbol``.
-    That function would print an error; as nothing here can raise, what it would print with is left out, and the code
+    That one calls RAISED after an error. As nothing may raise, this has to vanish with all that could, and the code
     needs nothing but the C library and the functions it calls.
     """
-    text = OF_C.sub(r"@\1", ERROR_FUNCTION.sub(r"define internal \g<rest> { unreachable }", text))
-    if RAISES.search(text) or IN_NUMBA.search(text):
-        raise MultiPhiTypeError(
-            f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided "
-            "or to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
-        )
-    module = llvm.parse_assembly(text)
+    machine = _machine(cpu, features)
     for function in module.functions:
-        if not function.is_declaration and function.name != wrapper:
+        if not function.is_declaration and function.name != symbol:
             function.linkage = "internal"
-        elif function.name == wrapper:
-            function.name = symbol
-    return _machine(cpu, features).emit_object(module)
+    passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=LEVEL))
+    passes.getModulePassManager().run(module, passes)
+    for function in module.functions:
+        function.name = OF_C.get(function.name, function.name)
+        if function.is_declaration and function.name.startswith(IN_NUMBA):
+            raise refusal(symbol)
+    return machine.emit_object(module)
+
+
+def refusal(symbol: str) -> MultiPhiTypeError:
+    """What is told of a function that cannot be compiled."""
+    return MultiPhiTypeError(
+        f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided "
+        "or to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
+    )
 
 
 def load(objects: Iterable[bytes], symbol: str) -> tuple[int, llvm.ExecutionEngine]:
