@@ -40,6 +40,7 @@ from multiphi_exudyn.mathematics.free_rows import (
     WAY,
     X,
     bound,
+    free_row,
     norm,
     product,
 )
@@ -128,10 +129,15 @@ def most_lacking(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> in
 
 @compiled
 def choose_sides(ints: Ints, numbers: Numbers, problem: int, leader: int) -> None:
-    """Rows tied to a leader that leaves zero come to the side to which their w calls them."""
+    """Rows tied to a leader that leaves zero come to the side to which their w calls them, to none where it is zero."""
+    reach = norm(numbers, ints[problem + X], ints[problem + UNKNOWNS])
     for k in range(ints[problem + COUNT]):
         if ints[ints[problem + LEADERS] + k] == leader and is_wide(ints, numbers, problem, k) == 0:
-            ints[ints[problem + SIDES] + k] = BELOW if numbers[ints[problem + RESULTS] + k] > 0.0 else ABOVE
+            w, terms = numbers[ints[problem + RESULTS] + k], numbers[ints[problem + TERMS] + k] + reach
+            if abs(w) <= numbers[ints[problem + SLACKS] + k] * terms:
+                free_row(ints, problem, k)
+            else:
+                ints[ints[problem + SIDES] + k] = BELOW if w > 0.0 else ABOVE
 
 
 @compiled

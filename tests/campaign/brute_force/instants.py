@@ -43,18 +43,21 @@ class Instants:
         return best
 
     def _least_violating(self, before, resting, y, t, moment):
-        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not."""
+        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not.
+
+        Of several, as where friction wedges a contact that may open as well, the one in which fewest contacts change.
+        """
         w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
+        every = [held for count in range(len(resting) + 1) for held in itertools.combinations(resting, count)]
         for slides in self.levels.sliding.choices(before, y, w, self.speed):
-            for count in range(len(resting) + 1):
-                for held in itertools.combinations(resting, count):
-                    if worst <= ZERO or not self._independent(held, slides):
-                        continue
-                    state = self._compliant(before, held, slides, y, t)
-                    after = self.levels.sliding.entered(before, state, y, w)
-                    violation = self._violation(state, resting, after, t, moment)
-                    if violation < worst:
-                        best, worst = (state, after), violation
+            for held in sorted(every, key=lambda held: sum((before[i] == "closed") != (i in held) for i in resting)):
+                if worst <= ZERO or not self._independent(held, slides):
+                    continue
+                state = self._compliant(before, held, slides, y, t)
+                after = self.levels.sliding.entered(before, state, y, w)
+                violation = self._violation(state, resting, after, t, moment)
+                if violation < worst:
+                    best, worst = (state, after), violation
         return best, worst
 
     def at_rest(self, y, t):
