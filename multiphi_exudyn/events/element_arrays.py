@@ -44,7 +44,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.CHAINS: put("ints", chains),
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
-        a.DIRECTIONS: put("numbers", units[:, :c].T),
+        a.DIRECTIONS: put("numbers", units.T),
         a.LIMITS: put("numbers", limits[0]),
         a.STATIC_LIMITS: put("numbers", limits[1]),
         a.FRICTIONS: put("numbers", rubs[0]),

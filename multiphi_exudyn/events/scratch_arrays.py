@@ -33,7 +33,7 @@ class ScratchArrays:
         sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
         self._rough = np.count_nonzero(buffers.numbers[ints[a.STATIC_FRICTIONS] :][: self._elements])
         self._struck = max(2 * self._rigid + self._rough, int(sliding), 1)
-        self._together = self._rigid + int(sliding)  # that may be held at once
+        self._together = self._rigid + int(np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0))  # held at once
         self.coordinates = self.exponentials = self.exits = 0
         self.changes = ROUNDS * (3 * self._elements + 1)
         self.powers = ints[a.FORCED_ROOM] = POWERS
