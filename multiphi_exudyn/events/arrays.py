@@ -99,7 +99,9 @@ JUDGED = 211  # whether levels leave modes out, so that defects are added up
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
 LIMITS, STATIC_LIMITS, TOGETHER = 200, 201, 202  # of rigid friction, zero of others; whether it has been decided
-RUN_INTS = 212
+FRICTIONS, STATIC_FRICTIONS = 212, 213  # of rigid contacts, zero of others
+PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; the state in which a contact closes
+RUN_INTS = 216
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -150,7 +152,7 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 8
 
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
 NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM = 1, 2, 3, 4, 5
-NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE, MIXED = range(1, 9)
+NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE, MIXED, GAINING = range(1, 10)
 
 
 class Buffers:

@@ -12,7 +12,6 @@ from multiphi_exudyn.events.arrays import (
     CHANGE_IMPULSES,
     CHANGE_WIDTH,
     CHANGES,
-    CLOSE,
     ELEMENT,
     ELEMENTS,
     EXIT_COUNT,
@@ -25,8 +24,11 @@ from multiphi_exudyn.events.arrays import (
     LOST,
     LOST_NOW,
     OK,
+    OPEN,
     RIGID,
+    SPRINGS,
     STATES,
+    STICKS,
     TRANSITIONS_NOW,
     TURN,
     WORKED,
@@ -38,7 +40,7 @@ from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
-__all__ = ["NOBODY", "clear", "enter", "flag_asking", "is_held", "note", "transfer", "turn_wishes"]
+__all__ = ["NOBODY", "bears_nothing", "clear", "enter", "flag_asking", "is_held", "note", "transfer", "turn_wishes"]
 
 NOBODY = -1  # in place of the state that an element asks for
 
@@ -66,8 +68,15 @@ def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
 @compiled
 def is_held(ints: Ints, state: int, element: int) -> int:
     """1 where a rigid contact is closed."""
-    closed = ints[ints[ints[state + LEVEL] + STATES] + element] == CLOSE
+    closed = ints[ints[ints[state + LEVEL] + STATES] + element] != OPEN
     return 1 if closed and ints[ints[KINDS] + element] == RIGID else 0
+
+
+@compiled
+def bears_nothing(ints: Ints, numbers: Numbers, element: int) -> int:
+    """12. 1 where friction without a spring bears no impulse: its pressure is no reaction."""
+    rigid = ints[ints[STICKS] + element] >= 0 and numbers[ints[SPRINGS] + element] == 0.0
+    return 1 if rigid and ints[ints[KINDS] + element] != RIGID else 0
 
 
 @compiled

@@ -100,7 +100,6 @@ from multiphi_exudyn.events.arrays import (
     KINDS,
     LANDING,
     LEVEL,
-    LIMITS,
     LOST,
     LOST_NOW,
     NOT_ADMISSIBLE,
@@ -116,12 +115,13 @@ from multiphi_exudyn.events.arrays import (
     SHARED,
     SIGNAL,
     STATES,
+    STICKS,
     STRIKING,
     TOGETHER,
     TRANSITIONS_NOW,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, clear, enter, flag_asking, is_held, turn_wishes
+from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, flag_asking, is_held, turn_wishes
 from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
 from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching, keep_landing
 from multiphi_exudyn.events.signals import row_sign
@@ -198,7 +198,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     flag_asking(ints, asking, heard)
     asked = 0
     for i in range(c):
-        ints[freed + i] = ints[heard + i] * is_held(ints, WORKED, i)
+        ints[freed + i] = is_held(ints, WORKED, i) if ints[asking + i] == OPEN else 0
         asked += ints[heard + i]
     if asked > 0:
         status = answer(ints, numbers, waves, asking)
@@ -218,7 +218,8 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
             for i in range(c):
                 if ints[pending + i] != NOBODY:
                     ints[heard + i] = 1
-                    ints[freed + i] = max(ints[freed + i], is_held(ints, WORKED, i))
+                    if ints[pending + i] == OPEN and is_held(ints, WORKED, i) == 1:
+                        ints[freed + i] = 1
             status = answer(ints, numbers, waves, pending)
         elif left == 2:  # heard before: what others did at this instant took its reaction away
             status = switch(ints, numbers, waves, ints[PULLING])
@@ -307,8 +308,9 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
         strikes += 1 if ints[striking + i] == 1 and ints[asking + i] != NOBODY else 0
         asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
-        if numbers[ints[LIMITS] + i] > 0.0:  # which bears no impulse: in slip, one way or the other
-            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
+        sticks = ints[ints[STICKS] + i]
+        if bears_nothing(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:  # slips, either way
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)
     if strikes == 0:
         status = stick_together(ints, numbers, waves, asking)
         left = 0

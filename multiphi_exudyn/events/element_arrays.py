@@ -8,6 +8,7 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.friction import Friction
 
@@ -26,10 +27,12 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     chains = np.full(c, -1)
     for number, chain in enumerate(model.chains):
         chains[list(chain)] = number
-    limits = np.zeros((2, c))
+    limits, rubs = np.zeros((2, c)), np.zeros((2, c))
     for i, element in enumerate(model.contacts):
         if isinstance(element, Friction) and element.rigid:
             limits[:, i] = element.limit, element.most
+        if isinstance(element, UnilateralContact) and element.rigid:
+            rubs[:, i] = element.friction, element.most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
     given = {
@@ -41,9 +44,11 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.CHAINS: put("ints", chains),
         a.CHAIN_COUNT: len(model.chains),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
-        a.DIRECTIONS: put("numbers", units[:, :c].T),
+        a.DIRECTIONS: put("numbers", units.T),
         a.LIMITS: put("numbers", limits[0]),
         a.STATIC_LIMITS: put("numbers", limits[1]),
+        a.FRICTIONS: put("numbers", rubs[0]),
+        a.STATIC_FRICTIONS: put("numbers", rubs[1]),
         a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
         **_frictions(buffers, model),
     }

@@ -20,9 +20,14 @@ from multiphi_exudyn.events.arrays import (
     CAUSED_BY,
     CHANGE,
     CHANNELS,
+    CLOSE,
     ELEMENTS,
+    ENTERS,
     FAILED,
+    FRICTIONS,
+    GAINING,
     GAPS,
+    HELD_LINKS,
     HIGHEST,
     LEADERS,
     LEVEL,
@@ -32,6 +37,7 @@ from multiphi_exudyn.events.arrays import (
     MOVED,
     OK,
     PLACE,
+    PUSHING,
     RATIOS,
     REACH,
     ROWS,
@@ -39,6 +45,7 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SPEEDS,
     SQUEEZED,
+    STATIC_FRICTIONS,
     STOP_WORK,
     UNSETTLED,
     VALUE_SIZES,
@@ -48,10 +55,20 @@ from multiphi_exudyn.events.energies import kinetic
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity import EXCLUDED, UNDECIDED, pose, solve
-from multiphi_exudyn.mathematics.free_rows import EXCLUDED_ROWS, EXCLUDING, norm
+from multiphi_exudyn.mathematics.free_rows import EXCLUDED_ROWS, EXCLUDING, norm, product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "resting_size", "speed_size", "unseen_speed"]
+__all__ = [
+    "IMMOVABLE",
+    "RESTING",
+    "collide",
+    "fill_rows",
+    "nearest",
+    "resting_size",
+    "rub",
+    "speed_size",
+    "unseen_speed",
+]
 
 RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
 IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
@@ -69,38 +86,83 @@ def fill_rows(ints: Ints, numbers: Numbers, level: int, contacts: int, count: in
 
 
 @compiled
+def rub(ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, first: int, released: int) -> int:
+    """10. How many rows there are with those, after ``first`` ones, along which contacts (count,) rub.
+
+    An impulse along such a row is led by that of its contact. released: -1, or the state before an impact, where it is
+    forces at rest that are asked for: who slides after it then has no row, but pushes with its friction as well.
+    """
+    level, rows, pushing, mu = ints[state + LEVEL], first, ints[PUSHING], ints[FRICTIONS]
+    n = ints[level + MODES] + ints[CHANNELS]
+    for i in range(first * n if pushing != ints[ROWS] else 0):
+        numbers[pushing + i] = numbers[ints[ROWS] + i]
+    for k in range(count):
+        contact, slips = ints[contacts + k], 0
+        along = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + contact] * (n + 1)
+        ints[ints[ENTERS] + contact] = CLOSE
+        if numbers[ints[STATIC_FRICTIONS] + contact] == 0.0:
+            continue
+        if released >= 0:
+            slips = slip_sign(ints, numbers, state, released, along)
+        if slips != 0:
+            ints[ints[ENTERS] + contact] = CLOSE + 1 if slips > 0 else CLOSE + 2
+            for i in range(n):
+                numbers[pushing + k * n + i] -= slips * numbers[mu + contact] * numbers[along + i]
+            continue
+        for i in range(n):
+            numbers[ints[ROWS] + rows * n + i] = numbers[along + i]
+            numbers[pushing + rows * n + i] = numbers[along + i]
+        ints[ints[LEADERS] + rows] = k
+        numbers[ints[RATIOS] + rows] = numbers[(mu if released < 0 else ints[STATIC_FRICTIONS]) + contact]
+        rows += 1
+    return rows
+
+
+@compiled
+def slip_sign(ints: Ints, numbers: Numbers, state: int, released: int, row: int) -> int:
+    """Sign of the speed along a row after an impact, zero where it is round-off of what it could be."""
+    n, size = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], speed_size(ints, numbers, state, row)
+    speed = product(numbers, row, ints[state + SPEED], n)
+    if abs(speed) <= RESTING * (size + speed_size(ints, numbers, released, row)):
+        return 0
+    return 1 if speed > 0.0 else -1
+
+
+@compiled
 def nearest(
     ints: Ints,
     numbers: Numbers,
     level: int,
     contacts: int,
     count: int,
+    rows: int,
     vector: int,
     sizes: int,
     wanted: int,
     multipliers: int,
 ) -> int:
-    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (count,); OK or FAILED.
+    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (rows,); OK or FAILED.
 
-    sizes: (count,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero.
+    sizes: (rows,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero.
+    The first ``count`` rows are those of the contacts, the others of their friction.
     """
     r = ints[level + MODES]
     n = r + ints[CHANNELS]
-    for k in range(count):
+    for k in range(rows):
         row, value, terms = ints[ROWS] + k * n, 0.0, 0.0
         for i in range(n):
             value += numbers[row + i] * numbers[vector + i]
             terms += abs(numbers[row + i]) * abs(numbers[vector + i])
-        numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 else value
+        numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 and k < count else value
         numbers[ints[VALUE_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
         numbers[ints[LOWEST] + k] = 0.0
-        numbers[ints[HIGHEST] + k] = math.inf
-        ints[ints[LEADERS] + k] = -1
+        numbers[ints[HIGHEST] + k] = math.inf if k < count else 0.0
+        ints[ints[LEADERS] + k] = -1 if k < count else ints[ints[LEADERS] + k]
     if ints[level + MOBILITY] >= 0:
         limit_rows(ints, numbers, level, count)
     problem = ints[SMALL_PROBLEM]
     pose(
-        ints, problem, count, r, n, ints[ROWS], ints[ROWS], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
+        ints, problem, rows, r, n, ints[ROWS], ints[PUSHING], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
         ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], multipliers,
     )  # fmt: skip
     answer = solve(ints, numbers, problem)
@@ -109,7 +171,8 @@ def nearest(
         for i in range(ints[ELEMENTS]):
             ints[ints[CAUSED_BY] + i] = 0
         for k in range(ints[problem + EXCLUDING]):
-            ints[ints[CAUSED_BY] + ints[contacts + ints[ints[problem + EXCLUDED_ROWS] + k]]] = 1
+            row = ints[ints[problem + EXCLUDED_ROWS] + k]
+            ints[ints[CAUSED_BY] + ints[contacts + (row if row < count else ints[ints[LEADERS] + row])]] = 1
         return FAILED
     if answer == UNDECIDED:
         ints[CAUSE] = UNSETTLED
@@ -172,18 +235,30 @@ def collide(
     """
     level = ints[state + LEVEL]
     r, channels = ints[level + MODES], ints[CHANNELS]
+    n, both, plastic, size = r + channels, count + held, 0.0, 0.0
     fill_rows(ints, numbers, level, contacts, count, held)
-    if nearest(ints, numbers, level, contacts, count + held, ints[state + SPEED], -1, wanted, impulses) < 0:
+    rows = rub(ints, numbers, state, contacts, count if held == 0 else 0, both, -1)
+    if nearest(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, impulses) < 0:
         return FAILED
-    plastic = 0.0
-    for k in range(count + held):
+    for k in range(both):
         plastic -= 0.5 * numbers[impulses + k] * numbers[ints[VALUES] + k]
         if wanted >= 0:
             plastic -= numbers[impulses + k] * numbers[wanted + k]
+        size += numbers[impulses + k] * abs(numbers[ints[VALUES] + k])
     copy_state(ints, numbers, state, result)
     v, before, x, reach = ints[result + SPEED], ints[state + SPEED], ints[result + PLACE], ints[state + REACH]
     for i in range(r):
         numbers[v + i] += numbers[ints[CHANGE] + i]
+    for k in range(both, rows):
+        after = product(numbers, ints[ROWS] + k * n, v, n)
+        plastic -= 0.5 * numbers[impulses + k] * (numbers[ints[VALUES] + k] + after)
+    if rows > both and plastic < -RESTING * size:
+        ints[CAUSE] = GAINING
+        for i in range(ints[ELEMENTS]):
+            ints[ints[CAUSED_BY] + i] = 0
+        for k in range(count):
+            ints[ints[CAUSED_BY] + ints[contacts + k]] = 1
+        return FAILED
     rest = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
     for i in range(r):
         if rest or abs(numbers[v + i]) <= RESTING * abs(numbers[before + i]):

@@ -9,22 +9,26 @@ from multiphi_exudyn.events.arrays import (
     DIRECTIONS,
     ELEMENTS,
     HELD,
+    HELD_LINKS,
     INDEPENDENCE,
     JOIN_NUMBERS,
     JOINED,
+    KINDS,
     LEVEL,
-    LIMITS,
+    OPEN,
+    RIGID,
+    SPRINGS,
     STATES,
-    STICK,
+    STICKS,
     UNION,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, is_held
+from multiphi_exudyn.events.changes import NOBODY
 from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.free_rows import norm
 
-__all__ = ["independent", "join", "thin_out"]
+__all__ = ["held_links", "independent", "join", "thin_out"]
 
 
 @compiled
@@ -60,33 +64,47 @@ def join(ints: Ints, numbers: Numbers, closing: int) -> int:
 
 
 @compiled
+def held_links(ints: Ints, numbers: Numbers, element: int, state: int) -> int:
+    """Which links a state holds without a spring: 1 an element's first, of a rigid contact, 2 that of friction."""
+    first = 1 if ints[ints[KINDS] + element] == RIGID and state != OPEN else 0
+    rubs = numbers[ints[SPRINGS] + element] == 0.0 and ints[ints[STICKS] + element] >= 0
+    return first + 2 if rubs and state == ints[ints[STICKS] + element] else first
+
+
+@compiled
 def thin_out(ints: Ints, numbers: Numbers, wishes: int) -> None:
     """12. Of friction elements that wish to stick each stays that does not follow from those that are held already."""
     union, states = ints[UNION], ints[ints[WORKED + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
-        held = numbers[ints[LIMITS] + i] > 0.0 and ints[states + i] == STICK and ints[wishes + i] == NOBODY
-        ints[union + i] = 1 if held or is_held(ints, WORKED, i) == 1 else 0
+        held = held_links(ints, numbers, i, ints[states + i])
+        ints[union + i] = held if ints[wishes + i] == NOBODY else held % 2
     for i in range(ints[ELEMENTS]):
-        if numbers[ints[LIMITS] + i] > 0.0 and ints[wishes + i] == STICK:
-            ints[union + i] = 1
+        held, before = held_links(ints, numbers, i, ints[wishes + i]), ints[union + i]
+        if ints[wishes + i] != NOBODY and held >= 2:
+            ints[union + i] = held
             if independent(ints, numbers, union) == 0:
-                ints[union + i] = 0
-                ints[wishes + i] = NOBODY
+                ints[union + i] = before
+                slips = ints[ints[STICKS] + i] + 1
+                ints[wishes + i] = NOBODY if ints[states + i] >= slips else slips
 
 
 @compiled
 def independent(ints: Ints, numbers: Numbers, flags: int) -> int:
-    """1 where of the contacts with a flag (c,) none follows from the others, so that they can be closed together."""
+    """1 where of the links with a flag none follows from the others, so that they can be held together.
+
+    Flags (c,) of elements: 1 for the first link, 2 for the one that friction holds, 3 for both.
+    """
     m, found, smallest = ints[COORDINATES], 0, math.inf
     q = ints[JOIN_NUMBERS]
-    for k in range(ints[ELEMENTS]):
-        if ints[flags + k] == 0:
+    for k in range(2 * ints[ELEMENTS]):
+        i, link = k // 2, k // 2 if k % 2 == 0 else ints[ints[HELD_LINKS] + k // 2]
+        if ints[flags + i] % 2 != 1 if k % 2 == 0 else ints[flags + i] < 2:
             continue
         if found == m:
             return 0
         own = q + found * m
-        for i in range(m):
-            numbers[own + i] = numbers[ints[DIRECTIONS] + k * m + i]
+        for j in range(m):
+            numbers[own + j] = numbers[ints[DIRECTIONS] + link * m + j]
         for _ in range(2):
             for b in range(found):
                 product = 0.0

@@ -34,6 +34,7 @@ from multiphi_exudyn.events.arrays import (
     NEEDED,
     NEEDED_FROM,
     NEEDED_KEY,
+    OPEN,
     PHASES,
     REACHED,
     RECOVERING,
@@ -64,6 +65,7 @@ __all__ = [
     "is_refused",
     "keep_entered",
     "mark_chains",
+    "opening",
     "phase_of",
     "update_phases",
 ]
@@ -194,7 +196,8 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
         back = ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
-        back = back and ints[phase] == REFUSED and ints[ints[KINDS] + element] != RIGID
+        pulls = ints[ints[KINDS] + element] == RIGID and ints[exit_ + ASKED] == OPEN
+        back = back and ints[phase] == REFUSED and not pulls
         back = back and ints[ints[HEARD] + element] == 1
         if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0:
             ints[phase] = ARMED
@@ -204,6 +207,15 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
 def first_exit(ints: Ints, level: int, element: int) -> int:
     """The first exit of an element in a level."""
     return ints[level + EXITS] + ints[ints[level + FIRST_EXITS] + element] * EXIT_INTS
+
+
+@compiled
+def opening(ints: Ints, level: int, element: int) -> int:
+    """The exit of a closed contact by which it opens."""
+    k = ints[ints[level + FIRST_EXITS] + element]
+    while ints[ints[level + EXITS] + k * EXIT_INTS + ASKED] != OPEN:
+        k += 1
+    return ints[level + EXITS] + k * EXIT_INTS
 
 
 @compiled

@@ -49,6 +49,7 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SPEEDS,
     STATES,
+    STATIC_FRICTIONS,
     STILL,
     STRUCK,
     TOUCHING,
@@ -92,19 +93,23 @@ def lands(ints: Ints, state: int, element: int) -> int:
 
 @compiled
 def hear_touching(ints: Ints, numbers: Numbers, asking: int) -> None:
-    """11. HEARD: with one that strikes and rebounds are all rigid contacts that touch without a speed, or come in."""
-    level, rebounds = ints[WORKED + LEVEL], 0
+    """10, 11. HEARD: with one that strikes and rebounds are all rigid contacts that touch without a speed, or come in.
+
+    And all that touch where any rubs: an impact of all is then another one than impacts in turn.
+    """
+    level, struck, rebounds, rubs = ints[WORKED + LEVEL], 0, 0, 0
     for i in range(ints[ELEMENTS]):
+        rubs = 1 if numbers[ints[STATIC_FRICTIONS] + i] > 0.0 else rubs
         opened = ints[ints[level + STATES] + i] == OPEN and ints[ints[KINDS] + i] == RIGID
-        if opened and ints[asking + i] != NOBODY and numbers[ints[RESTITUTIONS] + i] > 0.0:
-            rebounds = 1
-    for i in range(ints[ELEMENTS] if rebounds == 1 else 0):
+        if opened and ints[asking + i] != NOBODY:
+            struck = 1
+            rebounds = 1 if numbers[ints[RESTITUTIONS] + i] > 0.0 else rebounds
+    for i in range(ints[ELEMENTS] if struck * max(rebounds, rubs) == 1 else 0):
         if ints[ints[level + STATES] + i] == OPEN and ints[ints[KINDS] + i] == RIGID and ints[ints[HEARD] + i] == 0:
-            signal = first_exit(ints, level, i) + SIGNAL
-            touches = (
-                row_sign(ints, numbers, WORKED, signal, 0.0) == 0 and rate_sign(ints, numbers, WORKED, signal) <= 0
-            )
-            ints[ints[HEARD] + i] = 1 if touches else 0
+            signal, leaves = first_exit(ints, level, i) + SIGNAL, 0
+            if rebounds == 1 or numbers[ints[RESTITUTIONS] + i] > 0.0:
+                leaves = rate_sign(ints, numbers, WORKED, signal)
+            ints[ints[HEARD] + i] = 1 if leaves <= 0 and row_sign(ints, numbers, WORKED, signal, 0.0) == 0 else 0
 
 
 @compiled

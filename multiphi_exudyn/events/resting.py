@@ -18,11 +18,13 @@ from multiphi_exudyn.events.arrays import (
     CLOSED,
     COMPLIANT_KEY,
     ELEMENTS,
+    ENTERS,
     FAILED,
     FREED,
     FURTHER,
     HELD,
     KEY,
+    LEADERS,
     LEVEL,
     LOST_STILLED,
     MATRIX,
@@ -41,6 +43,7 @@ from multiphi_exudyn.events.arrays import (
     ROW,
     ROWS,
     SIGNAL,
+    SMALL_PROBLEM,
     SPEED,
     STILL,
     STRUCK,
@@ -54,17 +57,18 @@ from multiphi_exudyn.events.impact import (
     fill_rows,
     nearest,
     resting_size,
+    rub,
     speed_size,
     unseen_speed,
 )
 from multiphi_exudyn.events.independence import join
 from multiphi_exudyn.events.maps import find_level, find_map, move
-from multiphi_exudyn.events.phases import first_exit, phase_of
+from multiphi_exudyn.events.phases import first_exit, opening, phase_of
 from multiphi_exudyn.events.rebounds import has_rebounded
 from multiphi_exudyn.events.signals import sign_of
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.free_rows import norm
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BELOW, SIDES, norm
 
 __all__ = ["press", "reaction_sign", "same_speed", "stay_closed"]
 
@@ -74,15 +78,16 @@ def press(ints: Ints, numbers: Numbers, waves: Waves, count: int) -> int:
     """2. CLOSED: contacts at rest relative to their stop after an impact whose free motion would close them further.
 
     Motion is acceleration, or where that presses none of them the first derivative that counts. At rest is also what
-    would be back at its stop, those at rest held, before its gap is more than round-off. How many they are, or FAILED.
+    would be back at its stop, those at rest held, before its gap is more than round-off. How many, NEED or FAILED.
     """
     level, resting, multipliers = ints[STRUCK + LEVEL], ints[RESTING_LIST], ints[FURTHER]
     strictly = list_resting(ints, numbers, count, 0)
-    if hold_resting(ints, numbers, strictly) < 0:
-        return FAILED
-    rest = list_resting(ints, numbers, count, 1)
-    if rest > strictly and hold_resting(ints, numbers, rest) < 0:
-        return FAILED
+    status = hold_resting(ints, numbers, strictly)
+    rest = list_resting(ints, numbers, count, 1) if status == OK else 0
+    if rest > strictly:
+        status = hold_resting(ints, numbers, rest)
+    if status < 0:
+        return status
     for i in range(ints[ELEMENTS]):
         ints[ints[CLOSED] + i] = 0
     pressed = 0
@@ -125,7 +130,7 @@ def list_resting(ints: Ints, numbers: Numbers, count: int, unseen: int) -> int:
 
 @compiled
 def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
-    """The accelerations that contacts at rest leave of the free ones, and their forces (rest,); OK or FAILED."""
+    """The accelerations that contacts at rest leave of the free ones, and their forces (rest,); OK, NEED or FAILED."""
     level = ints[STRUCK + LEVEL]
     n = ints[level + MODES] + ints[CHANNELS]
     accelerate(ints, numbers, STRUCK, ints[ACCELERATION])
@@ -134,15 +139,35 @@ def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
     acceleration_sizes(ints, numbers, STRUCK, ints[ACCELERATION_TERMS])
     acceleration_sizes(ints, numbers, RELEASED, ints[RELEASED_TERMS])
     fill_rows(ints, numbers, level, ints[RESTING_LIST], rest, 0)
-    for k in range(rest):
+    rows = rub(ints, numbers, STRUCK, ints[RESTING_LIST], rest, rest, RELEASED)
+    for k in range(rows):
         size = resting_size(numbers, ints[ACCELERATION_TERMS], ints[RELEASED_TERMS], ints[ROWS] + k * n, n)
         numbers[ints[RESTING_SIZES] + k] = size
     sizes, forces = ints[RESTING_SIZES], ints[FURTHER]
-    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, ints[ACCELERATION], sizes, -1, forces) < 0:
-        return FAILED
+    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, rows, ints[ACCELERATION], sizes, -1, forces) < 0:
+        return sliding_level(ints, rest)
+    for k in range(rest, rows):
+        side, leader = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], ints[ints[LEADERS] + k]
+        if numbers[forces + leader] > 0.0 and side in (BELOW, ABOVE):
+            ints[ints[ENTERS] + ints[ints[RESTING_LIST] + leader]] = CLOSE + 1 if side == BELOW else CLOSE + 2
     for i in range(ints[level + MODES]):
         numbers[ints[ACCELERATION] + i] += numbers[ints[CHANGE] + i]
     return OK
+
+
+@compiled
+def sliding_level(ints: Ints, rest: int) -> int:
+    """10. NEED where the level in which contacts slide, whose forces are not determined, has not been tried; or FAILED.
+
+    Where their motion is not either, it is refused when it is built (levels/sliding.py).
+    """
+    for i in range(ints[ELEMENTS]):
+        ints[ints[KEY] + i] = ints[ints[COMPLIANT_KEY] + i]
+    for k in range(rest):
+        i = ints[ints[RESTING_LIST] + k]
+        if ints[ints[ENTERS] + i] > CLOSE:
+            ints[ints[KEY] + i] = ints[ints[ENTERS] + i]
+    return NEED if find_level(ints, ints[KEY]) < 0 else FAILED
 
 
 @compiled
@@ -156,7 +181,7 @@ def stay_closed(ints: Ints, numbers: Numbers, count: int, same: int) -> int:
         return status
     key, closed, pulled = ints[KEY], ints[CLOSED], 0
     for i in range(ints[ELEMENTS]):
-        ints[key + i] = CLOSE if ints[closed + i] == 1 else ints[ints[COMPLIANT_KEY] + i]
+        ints[key + i] = ints[ints[ENTERS] + i] if ints[closed + i] == 1 else ints[ints[COMPLIANT_KEY] + i]
     level = find_level(ints, key)
     if level < 0:
         return level
@@ -219,7 +244,7 @@ def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level:
     xi of the state ``places``, xi' of ``speeds``. The same function as the signal after its change alone: a refused
     contact asks where that one says it may.
     """
-    row, n = ints[first_exit(ints, level, contact) + SIGNAL + ROW], ints[level + MODES] + ints[CHANNELS]
+    row, n = ints[opening(ints, level, contact) + SIGNAL + ROW], ints[level + MODES] + ints[CHANNELS]
     way, there = find_map(ints, ints[places + LEVEL], level), find_map(ints, ints[speeds + LEVEL], level)
     if way < 0 or there < 0:
         return min(way, there)

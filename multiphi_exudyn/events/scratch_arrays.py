@@ -13,7 +13,7 @@ from multiphi_exudyn.mathematics.complementarity import lay_out, problem_ints, p
 __all__ = ["ScratchArrays"]
 
 POWERS = 96  # of a response to one term: where a carrier meets a pole it takes some 40
-OF_ELEMENTS = (*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY, a.LASTS, a.GROUPS)
+OF_ELEMENTS = (*range(a.ASKING, a.RESTING_LIST + 1), a.NEEDED_KEY, a.CAUSED_BY, a.LASTS, a.GROUPS, a.ENTERS)
 OF_A_PROBLEM = (a.VALUES, a.VALUE_SIZES, a.LOWEST, a.HIGHEST, a.RATIOS, a.WANTED)
 STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
 
@@ -31,8 +31,9 @@ class ScratchArrays:
         self._elements = int(ints[a.ELEMENTS])
         self._rigid = int(np.sum(ints[ints[a.KINDS] :][: self._elements] == a.RIGID))
         sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
-        self._struck = max(2 * self._rigid, int(sliding), 1)
-        self._together = self._rigid + int(sliding)  # that may be held at once
+        self._rough = np.count_nonzero(buffers.numbers[ints[a.STATIC_FRICTIONS] :][: self._elements])
+        self._struck = max(2 * self._rigid + self._rough, int(sliding), 1)
+        self._together = self._rigid + int(np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0))  # held at once
         self.coordinates = self.exponentials = self.exits = 0
         self.changes = ROUNDS * (3 * self._elements + 1)
         self.powers = ints[a.FORCED_ROOM] = POWERS
@@ -48,6 +49,8 @@ class ScratchArrays:
             return
         self.coordinates, self.exponentials, self.exits = n, p, exits
         self._take(self._of_levels(n, p, max(2 * exits, 1)))
+        if not self._rough:
+            self._buffers.ints[a.PUSHING] = self._buffers.ints[a.ROWS]
         self._reserve_problem(n)
         self._reserve_flow(p)
         for state in STATES_OF_A_RUN:
@@ -98,7 +101,7 @@ class ScratchArrays:
         q, room = int(ints[a.PRESCRIBED]), max(self.powers, terms) if ints[a.CHANNELS] else 0
         return {
             "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
-            | {a.ROWS: struck * wide, a.MOVED: wide, a.CHANGE: wide}
+            | {a.ROWS: struck * wide, a.PUSHING: struck * wide if self._rough else 0, a.MOVED: wide, a.CHANGE: wide}
             | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
             | {a.CONSTANTS: signals, a.NOISES: signals}
             | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},

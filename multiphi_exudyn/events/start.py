@@ -29,7 +29,6 @@ from multiphi_exudyn.events.arrays import (
     IMPULSES,
     KINDS,
     LEVEL,
-    LIMITS,
     LOSSES,
     LOST,
     LOST_AT_START,
@@ -54,7 +53,7 @@ from multiphi_exudyn.events.arrays import (
     WANTED,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, clear
+from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear
 from multiphi_exudyn.events.decision import decide
 from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.impact import collide
@@ -84,8 +83,9 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     for i in range(ints[ELEMENTS]):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
-        if numbers[ints[LIMITS] + i] > 0.0 and touching > 0:  # which bears no impulse (striking.py)
-            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], 1)
+        sticks = ints[ints[STICKS] + i]
+        if touching > 0 and bears_nothing(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)  # in slip, either way
         ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
         ints[ints[FREED] + i] = 0
         ints[ints[ASKING] + i] = NOBODY

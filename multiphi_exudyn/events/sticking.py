@@ -48,9 +48,9 @@ from multiphi_exudyn.events.arrays import (
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, enter, is_held, note, transfer
+from multiphi_exudyn.events.changes import NOBODY, enter, note, transfer
 from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
-from multiphi_exudyn.events.independence import independent
+from multiphi_exudyn.events.independence import held_links, independent
 from multiphi_exudyn.events.phases import first_exit
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, measure
@@ -233,15 +233,14 @@ def thin_out_idle(ints: Ints, numbers: Numbers, count: int) -> None:
     """12. Of those at rest with exactly their limit, each sticks that does not follow from those that stick already."""
     union, wishes, sides = ints[UNION], ints[WISHES], ints[ints[SMALL_PROBLEM] + SIDES]
     for i in range(ints[ELEMENTS]):
-        sticks = numbers[ints[LIMITS] + i] > 0.0 and ints[wishes + i] == STICK
-        ints[union + i] = 1 if sticks or is_held(ints, WORKED, i) == 1 else 0
+        ints[union + i] = held_links(ints, numbers, i, ints[wishes + i])
     for k in range(count):
         if ints[sides + k] == WAITING:
             ints[union + ints[ints[RESTING_LIST] + k]] = 0
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
         if ints[sides + k] == WAITING:
-            ints[union + i] = 1
+            ints[union + i] = 2
             if independent(ints, numbers, union) == 0:
                 ints[union + i] = 0
                 ints[wishes + i] = ints[ints[KEY] + i]

@@ -15,11 +15,10 @@ from multiphi_exudyn.events.arrays import (
     FAILED,
     FURTHER,
     HELD,
+    HELD_LINKS,
     IMPULSES,
     KEY,
-    KINDS,
     LEVEL,
-    LIMITS,
     LOSSES,
     LOST_IN_IMPACT,
     LOST_NOW,
@@ -30,13 +29,13 @@ from multiphi_exudyn.events.arrays import (
     OPEN,
     PUSHED,
     RELEASED,
-    RIGID,
     SHARED,
     SLIP_BACKWARD,
     SLIP_FORWARD,
     SPEED,
     SPEEDS,
     STATES,
+    STICKS,
     STILL,
     STRIKING,
     STRUCK,
@@ -44,7 +43,7 @@ from multiphi_exudyn.events.arrays import (
     WANTED,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, clear, enter, is_held, note, transfer
+from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, is_held, note, transfer
 from multiphi_exudyn.events.energies import kinetic, lose
 from multiphi_exudyn.events.impact import RESTING, collide, speed_size
 from multiphi_exudyn.events.independence import join
@@ -127,12 +126,13 @@ def slide_on(ints: Ints, numbers: Numbers) -> int:
     n, before = ints[level + MODES] + ints[CHANNELS], ints[ints[WORKED + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
         ints[key + i] = ints[ints[level + STATES] + i]
-        if numbers[ints[LIMITS] + i] > 0.0:
-            row = ints[level + SPEEDS] + i * (n + 1)
+        sticks = ints[ints[STICKS] + i]
+        if bears_nothing(ints, numbers, i) == 1 and ints[key + i] >= sticks:
+            row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
             speed = product(numbers, row, ints[AFTER + SPEED], n)
             rests = abs(speed) <= RESTING * speed_size(ints, numbers, AFTER, row)
-            slips = SLIP_FORWARD if speed > 0.0 else SLIP_BACKWARD
-            ints[key + i] = ints[before + i] if rests else slips
+            slips = sticks + (SLIP_FORWARD if speed > 0.0 else SLIP_BACKWARD)
+            ints[key + i] = max(ints[before + i], sticks) if rests else slips
             turned += 1 if ints[key + i] != ints[ints[level + STATES] + i] else 0
     if turned == 0:
         return OK
@@ -159,7 +159,7 @@ def close_without_impact(ints: Ints, numbers: Numbers, waves: Waves, asking: int
         if ints[closing + i] == 0:
             continue
         for k in range(c):
-            ints[key + k] = CLOSE if k == i else ints[states + k]
+            ints[key + k] = ints[asking + k] if k == i else ints[states + k]
         level = find_level(ints, key)
         if level < 0:
             return level
@@ -172,13 +172,13 @@ def close_without_impact(ints: Ints, numbers: Numbers, waves: Waves, asking: int
         update_phases(ints, numbers, waves, WORKED, ints[DENIED])
         return OK
     for i in range(c):
-        ints[key + i] = CLOSE if ints[closing + i] == 1 else ints[states + i]
+        ints[key + i] = ints[asking + i] if ints[closing + i] == 1 else ints[states + i]
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
     for i in range(c):
         if ints[closing + i] == 1:
-            note(ints, numbers, i, CLOSE, 0.0)
+            note(ints, numbers, i, ints[asking + i], 0.0)
     enter(ints, numbers, waves, ENTERED_STATE)
     return OK
 
@@ -193,16 +193,16 @@ def list_changes(ints: Ints, numbers: Numbers, count: int) -> None:
     for k in range(count):
         numbers[pushed + ints[ints[TOUCHING] + k]] = numbers[ints[IMPULSES] + k]
     for i in range(c):
-        stays = ints[before + i] == CLOSE and ints[after + i] == CLOSE
+        stays = ints[before + i] == ints[after + i] and ints[before + i] != OPEN
         if stays and numbers[pushed + i] > 0.0:
             note(ints, numbers, i, SHARED, numbers[pushed + i])
     unchanged = ints[CHANGE_COUNT]
     for i in range(c):
-        if ints[striking + i] == 1 and (ints[after + i] == CLOSE or numbers[pushed + i] > 0.0):
-            note(ints, numbers, i, CLOSE, numbers[pushed + i])
+        if ints[striking + i] == 1 and (ints[after + i] != OPEN or numbers[pushed + i] > 0.0):
+            note(ints, numbers, i, max(ints[after + i], CLOSE), numbers[pushed + i])
     for i in range(c):
-        if ints[ints[KINDS] + i] != RIGID and ints[after + i] != ints[before + i] and ints[after + i] != OPEN:
-            note(ints, numbers, i, ints[after + i], 0.0)
+        if ints[striking + i] == 0 and ints[after + i] != ints[before + i] and ints[after + i] != OPEN:
+            note(ints, numbers, i, ints[after + i], numbers[pushed + i])
     for i in range(c):
         if ints[striking + i] == 1 and ints[after + i] == OPEN and numbers[pushed + i] > 0.0:
             note(ints, numbers, i, OPEN, 0.0)

@@ -135,7 +135,7 @@ def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     wishes, opened, entered = ints[WISHES], 0, ENTERED_STATE
     for i in range(ints[ELEMENTS]):
         numbers[ints[PUSHED] + i] = 0.0
-        if ints[wishes + i] != NOBODY and ints[ints[KINDS] + i] == RIGID:
+        if ints[wishes + i] == OPEN and ints[ints[KINDS] + i] == RIGID:
             ints[ints[TOUCHING] + opened] = i
             opened += 1
     if opened > 0:

@@ -13,7 +13,19 @@ import math
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 
-__all__ = ["PROBLEM", "bound", "factor", "free_row", "meet", "move_free", "norm", "product", "release_row", "tied"]
+__all__ = [
+    "PROBLEM",
+    "bound",
+    "factor",
+    "free_row",
+    "leave",
+    "meet",
+    "move_free",
+    "norm",
+    "product",
+    "release_row",
+    "tied",
+]
 
 # given: sizes; where A and G (k, stride), b, the sizes of its terms, low, high (k,) begin, in the ints the leaders
 # (k,), -1 for none, and mu (k,); where x (r,) and z (k,) go

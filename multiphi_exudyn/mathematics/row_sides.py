@@ -16,6 +16,7 @@ from multiphi_exudyn.mathematics.free_rows import (
     HIGHS,
     LACKING,
     LEADERS,
+    LEFT,
     LENGTHS,
     LOWS,
     MOVES,
@@ -40,6 +41,9 @@ from multiphi_exudyn.mathematics.free_rows import (
     WAY,
     X,
     bound,
+    factor,
+    free_row,
+    leave,
     norm,
     product,
 )
@@ -128,10 +132,25 @@ def most_lacking(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> in
 
 @compiled
 def choose_sides(ints: Ints, numbers: Numbers, problem: int, leader: int) -> None:
-    """Rows tied to a leader that leaves zero come to the side to which their w calls them."""
+    """Rows tied to a leader that leaves zero come to the side to which their w calls them, to none where it is zero."""
+    reach = norm(numbers, ints[problem + X], ints[problem + UNKNOWNS])
     for k in range(ints[problem + COUNT]):
         if ints[ints[problem + LEADERS] + k] == leader and is_wide(ints, numbers, problem, k) == 0:
-            ints[ints[problem + SIDES] + k] = BELOW if numbers[ints[problem + RESULTS] + k] > 0.0 else ABOVE
+            w, terms = numbers[ints[problem + RESULTS] + k], numbers[ints[problem + TERMS] + k] + reach
+            ints[ints[problem + SIDES] + k] = BELOW if w > 0.0 else ABOVE
+            if abs(w) <= numbers[ints[problem + SLACKS] + k] * terms and is_apart(ints, numbers, problem, k) == 1:
+                free_row(ints, problem, k)
+
+
+@compiled
+def is_apart(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
+    """1 where a row does not follow from the free ones."""
+    r, found, left = ints[problem + UNKNOWNS], ints[problem + FREE_COUNT], ints[problem + LEFT]
+    factor(ints, numbers, problem)
+    for i in range(r):
+        numbers[left + i] = numbers[ints[problem + UNITS] + row * r + i]
+    leave(ints, numbers, problem, left, -1)
+    return 1 if found < r and norm(numbers, left, r) > INDEPENDENT else 0
 
 
 @compiled

@@ -277,5 +277,7 @@ class Motion:
             + ("" if complete else " in the kept modes, need more of them"),
             a.UNSETTLED: "impact: round-off decides which contacts push",
             a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
+            a.GAINING: f"rigid contacts {names}: an impact with restitution and friction would make energy, need one "
+            "of them alone",
         }
         return NumericalFailure(sentences[cause])

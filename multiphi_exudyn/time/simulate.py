@@ -70,7 +70,6 @@ def simulate(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
-    _check_impacts(model)
     run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
@@ -229,15 +228,6 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
     stuck = [i for i, contact in enumerate(model.contacts) if contact.held and states[i] == 0]
     sprung = tuple(sorted([*(i for i in closed if i not in touching), *stuck]))
     return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
-
-
-def _check_impacts(model: MultiPhiModel) -> None:
-    """Refuse friction at rigid contacts: their levels are known, their impacts are not."""
-    rigid = [contact.name for contact in model.contacts if contact.rigid and contact.further]
-    if rigid:
-        raise MultiPhiValueError(
-            f"simulate: got friction at the rigid contacts {', '.join(rigid)}, which strike, need a finite stiffness"
-        )
 
 
 def started(run: Run) -> Run:

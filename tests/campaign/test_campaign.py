@@ -28,6 +28,7 @@ LIGHT = dict.fromkeys(KINDS, (3, 4)) | {
     "friction contacts": (2, 6),
     "friction impacts": (0, 1),
     "contact friction": (1, 2),
+    "rigid friction": (1, 2),
     "friction limits": (1, 4),
     "friction free": (1, 5),
     "friction units": (5, 9),

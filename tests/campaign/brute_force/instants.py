@@ -43,18 +43,21 @@ class Instants:
         return best
 
     def _least_violating(self, before, resting, y, t, moment):
-        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not."""
+        """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not.
+
+        Of several, as where friction wedges a contact that may open as well, the one in which fewest contacts change.
+        """
         w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
+        every = [held for count in range(len(resting) + 1) for held in itertools.combinations(resting, count)]
         for slides in self.levels.sliding.choices(before, y, w, self.speed):
-            for count in range(len(resting) + 1):
-                for held in itertools.combinations(resting, count):
-                    if worst <= ZERO or not self._independent(held, slides):
-                        continue
-                    state = self._compliant(before, held, slides, y, t)
-                    after = self.levels.sliding.entered(before, state, y, w)
-                    violation = self._violation(state, resting, after, t, moment)
-                    if violation < worst:
-                        best, worst = (state, after), violation
+            for held in sorted(every, key=lambda held: sum((before[i] == "closed") != (i in held) for i in resting)):
+                if worst <= ZERO or not self._independent(held, slides):
+                    continue
+                state = self._compliant(before, held, slides, y, t)
+                after = self.levels.sliding.entered(before, state, y, w)
+                violation = self._violation(state, resting, after, t, moment)
+                if violation < worst:
+                    best, worst = (state, after), violation
         return best, worst
 
     def at_rest(self, y, t):
@@ -107,31 +110,69 @@ class Instants:
         return values[0] > DEPENDENT * values[-1]
 
     def _struck(self, y, w, touching, answer):
-        """Moreau's impact: impulses p >= 0, speeds u >= 0 (and e times those before), p u = 0, by trying every set."""
+        """Moreau's impact: p >= 0, speeds u >= 0 (and e times those before), p u = 0, and |q| <= mu p of what rubs.
+
+        By trying every set of contacts that push, and whether each of them that rubs then sticks or slides, and where.
+        """
         u = np.array([self._rate(i, y, w) for i in touching])
         if not len(u) or np.min(u) >= -ZERO * self.speed:
             return y
-        rows, stops = self.rows[touching], self.levels.system.stops
-        flexibility, best = rows @ self.inverse @ rows.T, (np.inf, None)
-        before, u = u, u * np.array([1 + stops[i].restitution for i in touching])
+        best = np.inf, None, None
         for count in range(1, len(touching) + 1):
-            for chosen in itertools.combinations(range(len(touching)), count):
-                pushed = list(chosen)
-                if not self._independent([touching[i] for i in pushed]):
-                    continue
-                impulses = np.zeros(len(touching))
-                impulses[pushed] = np.linalg.solve(flexibility[np.ix_(pushed, pushed)], -u[pushed])
-                after = u + flexibility @ impulses
-                violation = max(np.max(-impulses) * np.max(np.diag(flexibility)), np.max(-after)) / self.speed
-                if violation < 0.1 * best[0]:
-                    best = max(violation, ZERO / 10), impulses
+            for pushed in itertools.combinations(touching, count):
+                rough = [e for e in range(len(self.levels.system.sliders)) if self._rubs(e, pushed)]
+                for slides in itertools.product(("stick", *SIGNS), repeat=len(rough)):
+                    violation, rows, p = self._impulses(y, w, touching, pushed, dict(zip(rough, slides, strict=True)))
+                    if violation < 0.1 * best[0]:
+                        best = max(violation, ZERO / 10), rows, p
         if best[0] > 1e-8:
             raise NoAnswer("no admissible impact")
-        y = y.copy()
-        answer.impact += float(-best[1] @ before - 0.5 * best[1] @ flexibility @ best[1])
-        y[self.n : 2 * self.n] += self.inverse @ rows.T @ best[1]
-        y[2 * self.n :][touching] += best[1]
+        y, before = y.copy(), y
+        y[self.n : 2 * self.n] += self.inverse @ best[1].T @ best[2]
+        for i, p in zip(touching, best[2][: len(touching)], strict=True):
+            answer.impact -= 0.5 * p * (self._rate(i, before, w) + self._rate(i, y, w))
+            y[2 * self.n + i] += p
         return y
+
+    def _rubs(self, e, contacts):
+        """Whether one of these rigid contacts rubs with the slider, which bears an impulse then."""
+        return self.levels.system.sliders[e].contact in contacts and self.levels.sliding.rigid(e)
+
+    def _impulses(self, y, w, touching, pushed, slides):
+        """By how much an impact violates its law, of the scene's speed; rows, and impulses along them.
+
+        pushed: the contacts that push. slides: of their sliders. Rows are those of all that touch, then the sliders'.
+        """
+        sliders, stops = self.levels.system.sliders, self.levels.system.stops
+        if not self._independent(pushed):
+            return np.inf, None, None
+        rows = np.array([self.rows[i] for i in touching] + [sliders[e].row for e in slides])
+        speeds = np.array([self._rate(i, y, w) for i in touching] + [self._passing(e, y, w) for e in slides])
+        wanted = -speeds * [*(stops[i].restitution for i in touching), *(0.0 for _ in slides)]
+        flexibility, matrix = rows @ self.inverse @ rows.T, np.eye(len(rows))
+        asked = np.zeros(len(rows))
+        for k, i in enumerate(touching):
+            if i in pushed:
+                matrix[k], asked[k] = flexibility[k], wanted[k] - speeds[k]
+        for k, (e, state) in enumerate(slides.items(), start=len(touching)):
+            if state == "stick":
+                matrix[k], asked[k] = flexibility[k], -speeds[k]
+            else:
+                matrix[k, touching.index(sliders[e].contact)] = SIGNS[state] * sliders[e].limit
+        if np.linalg.cond(matrix) > 1 / DEPENDENT:
+            return np.inf, None, None
+        p = np.linalg.solve(matrix, asked)
+        after, size, count = speeds + flexibility @ p, np.max(np.diag(flexibility)), len(touching)
+        wrong = [np.max(-p[:count]) * size, np.max(wanted - after, where=np.arange(len(p)) < count, initial=0.0)]
+        for k, (e, state) in enumerate(slides.items(), start=count):
+            limit = sliders[e].limit * p[touching.index(sliders[e].contact)]
+            wrong.append((abs(p[k]) - limit) * size if state == "stick" else -SIGNS[state] * after[k])
+        return max(0.0, *wrong) / self.speed, rows, p
+
+    def _passing(self, e, y, w):
+        """Speed at which a slider passes its counter-surface."""
+        row, row_w = self.levels.sliding.rate(e)
+        return row @ y + row_w @ w
 
     def moment(self, t, share=MOMENT):
         """A short time [s]: of the fastest motion, less where loads change within a step."""

@@ -102,8 +102,25 @@ def _impacts(random):
 def _pressed(random):
     """Contacts that give way and rub in proportion to their forces, blocks and springs in series."""
     parts = random_parts(random, int(random.integers(2, 7)))
-    law = str(random.choice(["compliant", "compliant", "viscous"]))
-    add_contacts(parts, law, int(random.integers(1, min(3, parts.n) + 1)), gap=(-0.1, 0.2))
+    return _rubbing(parts, str(random.choice(["compliant", "compliant", "viscous"])), (-0.1, 0.2))
+
+
+def _rough(random):
+    """Rigid contacts that rub, alone, beside some that give way, or with restitution; some press from the start."""
+    parts = random_parts(random, int(random.integers(2, 7)))
+    kind, restitution = str(random.choice(["rigid", "rigid", "mixed"])), float(random.uniform(0.1, 0.9))
+    return _rubbing(parts, kind, (0.0, 0.2) if random.random() < 0.3 else (0.02, 0.3), restitution)
+
+
+def _rubbing(parts, law, gap, restitution=0.0):
+    """Contacts of a law, most of which rub; under a load."""
+    random = parts.random
+    add_contacts(parts, law, int(random.integers(1, min(3, parts.n) + 1)), gap=gap)
+    if restitution and random.random() < 0.3:
+        for i, contact in enumerate(parts.contacts):
+            if contact.rigid:
+                parts.contacts[i] = replace(contact, restitution=restitution)
+                parts.stops[i] = replace(parts.stops[i], restitution=restitution)
     rows = [stop.row for stop in parts.stops]
     for i in range(len(parts.contacts)):
         row = next(
@@ -174,6 +191,7 @@ DRAWN = {
     "friction contacts": _contacts,
     "friction impacts": _impacts,
     "contact friction": _pressed,
+    "rigid friction": _rough,
     "friction limits": _limits,
     "friction free": _free,
     "friction units": _units,

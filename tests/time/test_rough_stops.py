@@ -1,0 +1,252 @@
+"""Rigid contacts with friction: impacts on the edge of Coulomb's cone and inside it, sliding, sticking, lifting off."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kernels import KERNELS, output_on
+from numpy.testing import assert_allclose
+from small_structures import chain
+
+import multiphi_exudyn as mp
+
+G = 9.81
+COUPLED = np.array([[1.0, 0.4], [0.4, 1.0]])
+
+
+def dropped(speed, friction, *, height=1.0, t_end=3.0, mass=None, slope=0.0, compiled=None, **given):
+    """A block at a height above a rough floor, with a speed along it; slope: of the floor [rad]."""
+    mass = np.eye(2) if mass is None else mass
+    structure = mp.LinearStructure(mass, np.zeros((2, 2)), points={"x": 0, "y": 1})
+    floor = mp.UnilateralContact("floor", "y", 0.0, friction=friction, tangential="x", **given)
+    weight = [mp.ConstantLoad("x", G * math.sin(slope)), mp.ConstantLoad("y", -G * math.cos(slope))]
+    model = mp.MultiPhiModel(structure, [floor], modes="all")
+    return mp.simulate(model, t_end, displacement=[0.0, height], velocity=[speed, 0.0], loads=weight, compiled=compiled)
+
+
+class TestDroppedBlock:
+    """m 1: it falls sqrt(2 h / g), strikes with v_n = sqrt(2 g h), and slides on with v_t - mu v_n."""
+
+    @pytest.mark.parametrize("compiled", [None, False])
+    @pytest.mark.parametrize("speed", [5.0, -5.0, 2.0])
+    def test_slides_until_it_sticks(self, speed, compiled):
+        run, falls, sign = dropped(speed, 0.3, compiled=compiled), math.sqrt(2 / G), math.copysign(1.0, speed)
+        left = abs(speed) - 0.3 * math.sqrt(2 * G)
+        stops, way = falls + left / (0.3 * G), left**2 / (2 * 0.3 * G)
+        assert [event.kind for event in run.events] == ["close", "stick"]
+        assert run.events[0].impulse == pytest.approx(math.sqrt(2 * G), rel=1e-12)
+        assert_allclose([event.time for event in run.events], [falls, stops], rtol=1e-12)
+        assert run.velocity(falls + 1e-14)[0] == pytest.approx(sign * left, rel=1e-12)
+        assert run.at("x", 3.0) == pytest.approx(speed * falls + sign * way, rel=1e-12)
+        assert run.friction_force("floor", falls + 0.01) == pytest.approx(sign * 0.3 * G, rel=1e-12)
+        assert run.friction_force("floor", 3.0) == pytest.approx(0.0, abs=1e-12)
+        assert run.contact_force("floor", 3.0) == pytest.approx(G, rel=1e-12)
+        assert run.ledger.impact == pytest.approx(G + speed**2 / 2 - left**2 / 2, rel=1e-12)
+        assert run.ledger.friction == pytest.approx(left**2 / 2, rel=1e-12)
+        assert abs(run.ledger.residual) < 1e-12 * G
+
+    @pytest.mark.parametrize("speed", [1.32, -1.32, 0.0])
+    def test_sticks_at_once_inside_the_cone(self, speed):
+        """mu v_n = 1.3289 m/s."""
+        run = dropped(speed, 0.3)
+        assert [event.kind for event in run.events] == ["close"]
+        assert_allclose(run.stick_intervals("floor"), [[math.sqrt(2 / G), 3.0]], rtol=1e-12)
+        assert run.at("x", 3.0) == pytest.approx(speed * math.sqrt(2 / G), rel=1e-12, abs=1e-15)
+        assert run.ledger.impact == pytest.approx(G + speed**2 / 2, rel=1e-12)
+
+    def test_has_its_friction_whatever_its_static_friction_is(self):
+        """In an impact, and while it slides, only mu counts."""
+        runs = [dropped(5.0, 0.3, static_friction=static) for static in (None, 0.9)]
+        assert_allclose(runs[0].at("x", [1.0, 3.0]), runs[1].at("x", [1.0, 3.0]), rtol=1e-14)
+
+    def test_is_carried_along_by_a_belt(self):
+        run, falls = dropped(0.0, 0.1, tangential_velocity=2.0), math.sqrt(2 / G)
+        left = 2.0 - 0.1 * math.sqrt(2 * G)
+        assert run.events[1].time == pytest.approx(falls + left / (0.1 * G), rel=1e-12)
+        assert run.velocity(3.0)[0] == pytest.approx(2.0, rel=1e-12)
+        assert abs(run.ledger.residual) < 1e-12 * G
+
+    def test_bounces_and_slides_as_long_as_one_that_does_not_bounce(self):
+        """All its impulses together, and the weight while it slides, are the same mu m g t."""
+        plain, bouncing = dropped(5.0, 0.3), dropped(5.0, 0.3, restitution=0.5)
+        assert bouncing.status == "ok"
+        closed = bouncing.contact_intervals("floor")[-1][0]
+        assert closed == pytest.approx(1.354570922957, abs=1e-11)
+        assert bouncing.events[-1].time == pytest.approx(plain.events[-1].time, rel=1e-10)
+        assert abs(bouncing.ledger.residual) < 1e-12 * G
+
+
+class TestIncline:
+    @pytest.mark.parametrize(("friction", "static"), [(0.5, None), (0.3, 0.7)])
+    def test_holds_below_the_static_friction(self, friction, static):
+        run = dropped(0.0, friction, height=0.0, slope=math.atan(0.49), static_friction=static, t_end=50.0)
+        assert run.at("x", 50.0) == 0.0
+        assert run.friction_force("floor", 50.0) == pytest.approx(G * math.sin(math.atan(0.49)), rel=1e-12)
+
+    @pytest.mark.parametrize(("friction", "static"), [(0.48, None), (0.2, 0.45)])
+    def test_slides_above_it(self, friction, static):
+        slope = math.atan(0.49)
+        run = dropped(0.0, friction, height=0.0, slope=slope, static_friction=static)
+        accelerated = G * (math.sin(slope) - friction * math.cos(slope))
+        assert run.at("x", 3.0) == pytest.approx(accelerated * 4.5, rel=1e-12)
+        assert abs(run.ledger.residual) < 1e-12 * G
+
+
+def _impacts(mass, speed, friction):
+    """All speeds after an impact that Moreau's law with friction admits: x along the floor, y away from it."""
+    flexibility = np.linalg.inv(mass)
+    found = []
+    for state in ("stick", 1.0, -1.0):
+        matrix = flexibility if state == "stick" else np.array([[1.0, state * friction], flexibility[1]])
+        q, p = np.linalg.solve(matrix, -np.asarray(speed) if state == "stick" else [0.0, -speed[1]])
+        after = speed + flexibility @ [q, p]
+        inside = abs(q) <= friction * p if state == "stick" else state * after[0] > 0
+        found += [after] if p >= 0 and inside else []
+    return found
+
+
+class TestCoupledImpact:
+    """Mass that couples x and y: an impulse against the floor makes a speed along it, and friction changes it."""
+
+    @pytest.mark.parametrize("friction", [0.1, 0.5, 1.5])
+    @pytest.mark.parametrize("speed", [-2.0, -0.3, 0.1, 0.3, 2.0])
+    def test_is_the_only_one_that_coulombs_law_admits(self, speed, friction):
+        run = dropped(speed, friction, mass=COUPLED, slope=0.0, t_end=1.0)
+        struck = run.events[0].time
+        before = run.velocity(struck - 1e-13)
+        (expected,) = _impacts(COUPLED, before, friction)
+        assert_allclose(run.velocity(struck + 1e-13), expected, rtol=0, atol=1e-11)
+        assert run.events[0].loss.impact > 0
+        assert abs(run.ledger.residual) < 1e-12 * run.ledger.work_of_loads
+
+    def test_with_restitution_that_would_make_energy_is_refused(self):
+        """Newton's law of restitution beside friction: Kane's paradox."""
+        structure = mp.LinearStructure([[1.0, 0.5], [0.5, 1.0]], np.zeros((2, 2)), points={"x": 0, "y": 1})
+        runs = []
+        for restitution in (0.3, 0.9):
+            floor = mp.UnilateralContact("floor", "y", 0.1, friction=0.5, tangential="x", restitution=restitution)
+            runs.append(mp.simulate(mp.MultiPhiModel(structure, [floor], modes="all"), 0.2, velocity=[0.5, -1.0]))
+        assert runs[0].status == "ok"
+        assert runs[0].ledger.impact > 0
+        assert runs[1].status == "failed"
+        assert "rigid contacts floor: an impact with restitution and friction would make energy" in runs[1].message
+
+
+def rod(friction, speed, height):
+    """Painleve's rod, m 1, half length 1, J 1/3, with one end on the floor, at an angle."""
+    angle = math.atan(2.0)
+    structure = mp.LinearStructure(np.diag([1.0, 1.0, 1 / 3]), np.zeros((3, 3)), points={"x": 0, "y": 1})
+    normal, along = [0.0, 1.0, -math.cos(angle)], [1.0, 0.0, math.sin(angle)]
+    floor = mp.UnilateralContact("floor", normal, 0.0, friction=friction, tangential=along)
+    model = mp.MultiPhiModel(structure, [floor], modes="all")
+    weight = [mp.ConstantLoad("y", -G)]
+    return mp.simulate(model, 0.6, displacement=[0.0, height, 0.0], velocity=[speed, 0.0, 0.0], loads=weight)
+
+
+class TestRod:
+    @pytest.mark.parametrize("speed", [-1.0, 1.0])
+    def test_slides_below_the_critical_coefficient(self, speed):
+        run = rod(1.0, speed, 0.0)
+        assert [event.kind for event in run.events] == ["close", "stick"]
+        assert abs(run.ledger.residual) < 1e-12
+
+    def test_that_slides_without_a_unique_motion_is_refused_with_its_number(self):
+        run = rod(1.4, -1.0, 0.0)
+        assert run.status == "failed"
+        assert "leaves h.M^-1 (h - s mu h_t) = -0.05 h.M^-1 h" in run.message
+        assert rod(1.4, 1.0, 0.0).status == "ok"  # the other way it slides
+
+    def test_that_strikes_sticks_where_it_could_not_slide(self):
+        run = rod(1.4, -1.0, 1.0)
+        assert [event.kind for event in run.events] == ["close"]
+
+
+def rubbing_chain(contacts, modes="all", masses=8):
+    return mp.MultiPhiModel(chain(masses, stiffness=40.0), contacts, modes=modes)
+
+
+def _rough(i, sign=1.0, **given):
+    """A stop at a mass, which rubs with its neighbours."""
+    along = {f"m{i + 1}": 1.0, f"m{i - 1}": -0.5}
+    return mp.UnilateralContact(f"c{i}", {f"m{i}": sign}, 0.01, friction=0.4, tangential=along, **given)
+
+
+class TestSeveral:
+    LOADS = (mp.HarmonicLoad("m2", 6.0, 0.7), mp.HarmonicLoad("m5", -5.0, 0.9))
+
+    def test_forces_stay_inside_their_cones_and_the_ledger_closes(self):
+        run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 6.0, loads=self.LOADS)
+        assert run.status == "ok"
+        assert {event.kind for event in run.events} >= {"close", "open", "slip", "stick"}
+        t = np.linspace(0, 6, 4001)
+        for name in ("c2", "c5"):
+            pressure, rubbing = run.contact_force(name, t), run.friction_force(name, t)
+            assert np.min(pressure) > -1e-9
+            assert np.max(np.abs(rubbing) - 0.4 * pressure) < 1e-9
+            assert np.min(run.gap(name, t)) > -1e-12
+        assert abs(run.ledger.residual) < 1e-10 * run.ledger.work_of_loads
+        assert run.ledger.friction > 0 < run.ledger.impact
+        size = np.max(np.abs([event.loss.truncation_kinetic for event in run.events]))
+        assert size < 1e-12 * run.ledger.work_of_loads
+
+    def test_mirrored_are_mirrored(self):
+        run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 4.0, loads=self.LOADS)
+        loads = [mp.HarmonicLoad(load.at, -load.amplitude, load.frequency_hz) for load in self.LOADS]
+        other = mp.simulate(rubbing_chain([_rough(2, -1.0), _rough(5)]), 4.0, loads=loads)
+        assert [(e.contact, e.kind) for e in run.events] == [(e.contact, e.kind) for e in other.events]
+        assert_allclose(run.at("m4", np.linspace(0, 4, 50)), -other.at("m4", np.linspace(0, 4, 50)), atol=1e-10)
+
+    def test_few_modes_converge_as_without_friction(self):
+        t, errors = np.linspace(0.05, 2.0, 200), []
+        for friction in (0.4, 0.0):
+            found = []
+            for modes in ("all", 12, 6):
+                stop = replace(_rough(4, -1.0), friction=friction)
+                model = rubbing_chain([stop], modes=modes, masses=16)
+                run = mp.simulate(model, 2.0, loads=[mp.HarmonicLoad("m10", 3.0, 0.5)])
+                assert abs(run.ledger.residual) < 1e-10 * abs(run.ledger.work_of_loads)
+                found.append(run.at("m10", t))
+            errors.append([np.linalg.norm(y - found[0]) / np.linalg.norm(found[0]) for y in found[1:]])
+        assert errors[0][0] < 0.6 * errors[0][1]
+        assert errors[0][0] < 1.1 * errors[1][0]
+
+    def test_stiffer_and_stiffer_contacts_come_to_them(self):
+        """Without a speed of impact: the stop is touched at rest, and pressed on ever more."""
+        loads = [mp.HarmonicLoad("m2", -3.0, 0.3, -math.pi / 2), mp.HarmonicLoad("m4", 2.0, 0.45, -math.pi / 2)]
+        t, found = np.linspace(0.05, 1.4, 100), []
+        for stiffness in (math.inf, 1e4, 1e6):
+            along = {"m4": 1.0}
+            stop = mp.UnilateralContact("c", "m2", 0.0, stiffness, friction=0.4, tangential=along)
+            run = mp.simulate(rubbing_chain([stop]), 1.4, loads=loads)
+            found.append(run.at("m4", t))
+        errors = [np.linalg.norm(y - found[0]) / np.linalg.norm(found[0]) for y in found[1:]]
+        assert errors[1] < 0.1 * errors[0] < 0.01
+
+    @pytest.mark.parametrize("kernel", KERNELS)
+    def test_have_the_same_events_on_every_processor(self, kernel):
+        code = (
+            "import multiphi_exudyn as mp\n"
+            "from test_rough_stops import TestSeveral, _rough, rubbing_chain\n"
+            "run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 4.0, loads=TestSeveral.LOADS)\n"
+            "print([(e.contact, e.kind, f'{e.time:.9g}') for e in run.events])\n"
+        )
+        run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 4.0, loads=self.LOADS)
+        expected = str([(e.contact, e.kind, f"{e.time:.9g}") for e in run.events])
+        assert output_on(kernel, code).strip().splitlines()[-1] == expected
+
+
+def test_friction_on_a_compliant_contact_bears_no_impulse():
+    """Two masses in one: y presses a spring on the floor that rubs along x, and x strikes a rigid wall."""
+    structure = mp.LinearStructure(np.diag([1.0, 1.0]), np.zeros((2, 2)), points={"x": 0, "y": 1})
+    floor = mp.UnilateralContact("floor", "y", 0.0, 1000.0, friction=0.5, tangential="x")
+    wall = mp.UnilateralContact("wall", {"x": -1.0}, 0.1, restitution=0.5)
+    model = mp.MultiPhiModel(structure, [floor, wall], modes="all")
+    weight = [mp.ConstantLoad("y", -10.0)]
+    run = mp.simulate(model, 0.5, displacement=[0.0, -0.01], velocity=[2.0, 0.0], loads=weight)
+    struck = next(event for event in run.events if event.contact == "wall")
+    slowed = math.sqrt(4.0 - 2 * 5.0 * 0.1)
+    assert struck.impulse == pytest.approx(1.5 * slowed, rel=1e-12)
+    assert run.velocity(struck.time + 1e-13)[0] == pytest.approx(-0.5 * slowed, rel=1e-10)
+    assert run.friction_force("floor", struck.time + 1e-9) == pytest.approx(-5.0, rel=1e-12)
+    assert abs(run.ledger.residual) < 1e-12
