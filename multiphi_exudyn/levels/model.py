@@ -147,6 +147,11 @@ class MultiPhiModel:
         """Where every element's links stand among them."""
         return link_places(self.contacts)
 
+    @functools.cached_property
+    def rubbing(self) -> tuple[int, ...]:
+        """Positions of the elements that have friction: a link with a held place."""
+        return tuple(i for i, places in enumerate(self.link_places) if not set(places).isdisjoint(self.held))
+
     def pressing_links(self, element: int) -> list[int]:
         """Positions of the links whose gap is that of an element's first one: they press with and without friction."""
         places = self.link_places[element]
