@@ -394,10 +394,3 @@ class TestArguments:
         plain, zero = (mp.UnilateralContact("c", "y", 0.1, 5.0, **k) for k in ({}, {"tangential": "x"}))
         assert plain.states == zero.states
         assert not zero.further
-
-    def test_what_does_not_know_them_refuses_them(self):
-        model = mp.MultiPhiModel(flutter_structure(), flutter_model(0.3).contacts)
-        with pytest.raises(mp.MultiPhiValueError, match="static equilibrium: got friction at the contacts belt"):
-            model.static_equilibrium({"x": 1.0})
-        with pytest.raises(mp.MultiPhiValueError, match="steady state: got friction at the contacts belt"):
-            mp.steady_state(model, mp.HarmonicLoad("x", 1.0, 1.0))
