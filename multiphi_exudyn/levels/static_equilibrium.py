@@ -243,7 +243,7 @@ def _at_rest(base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarr
 def _check_unique(base: ModalBase, sliders: list[int], own: np.ndarray) -> None:
     """Refuse friction under which contacts wedge: W (o, o)."""
     alone = np.abs(np.diagonal(own))
-    minors = {(k,): 1 - float(alone[k]) for k in range(len(sliders))}
+    minors: dict[tuple[int, ...], float] = {(k,): 1 - float(alone[k]) for k in range(len(sliders))}
     for count in range(2, len(sliders) + 1):
         for chosen in itertools.combinations(range(len(sliders)), count):
             minors[chosen] = float(np.linalg.det((np.eye(len(own)) - own)[np.ix_(chosen, chosen)]))
