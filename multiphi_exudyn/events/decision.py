@@ -96,6 +96,7 @@ from multiphi_exudyn.events.arrays import (
     FIRST_CHANGE,
     FIRST_EXITS,
     FREED,
+    FRICTION,
     HEARD,
     KINDS,
     LANDING,
@@ -143,7 +144,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """WORKED becomes the state right after an instant at which the elements in ASKING ask; OK, NEED or FAILED.
 
     AGAIN: those refused at it before. Energies lost are added up in LOST, changes listed. Where in the end all elements
-    are as before, and none was struck, nothing has happened at it.
+    are as before, none was struck and no spring of friction has let go, nothing has happened at it.
     """
     clear(numbers, LOST)
     first, struck = ints[FIRST_CHANGE], 0
@@ -160,7 +161,8 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         shared = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == SHARED
         if shared or numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
             struck = 1
-    if ints[CHANGE_COUNT] > first and struck == 0 and same_level(ints, REACHED, WORKED) == 1:
+    moved = struck == 1 or numbers[LOST + FRICTION] != 0.0
+    if ints[CHANGE_COUNT] > first and not moved and same_level(ints, REACHED, WORKED) == 1:
         copy_state(ints, numbers, REACHED, WORKED)
         flag_asking(ints, ints[ASKING], ints[DENIED])
         update_phases(ints, numbers, waves, WORKED, ints[DENIED])

@@ -15,7 +15,17 @@ from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
-__all__ = ["after", "entered_row", "exits_of", "force_shares", "signal_row", "signal_rows", "state_of", "way_back"]
+__all__ = [
+    "after",
+    "asked_alone",
+    "entered_row",
+    "exits_of",
+    "force_shares",
+    "signal_row",
+    "signal_rows",
+    "state_of",
+    "way_back",
+]
 
 
 def state_of(level: LoadedLevel, element: int) -> ElementState:
@@ -34,6 +44,14 @@ def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
     states = list(level.states)
     states[element] = names.index(exit_.asked)
     return tuple(states)
+
+
+def asked_alone(exit_: Exit) -> Exit:
+    """The exit by which an element is asked in the level entered alone.
+
+    A contact that would slide is asked where it does: to stick would take its speed away.
+    """
+    return exit_ if exit_.turn is None else Exit(exit_.turn.forward)
 
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:

@@ -12,7 +12,7 @@ from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.channel_arrays import ChannelArrays
 from multiphi_exudyn.events.defect_forms import defect_form
 from multiphi_exudyn.events.element_arrays import describe_elements
-from multiphi_exudyn.events.exits import after, entered_row, exits_of
+from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
 from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal
 from multiphi_exudyn.events.level_tables import LevelTables
@@ -20,7 +20,6 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.scratch_arrays import ScratchArrays
 from multiphi_exudyn.events.state_arrays import measure
-from multiphi_exudyn.mechanics.element import Exit
 
 __all__ = ["LevelArrays"]
 
@@ -236,14 +235,10 @@ class LevelArrays:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
-        """The signal that an exit's element would have in the level entered alone.
-
-        A contact that would slide is asked where it does: to stick would take its speed away.
-        """
+        """The signal that an exit's element would have in the level entered alone."""
         level = self.loaded[int(self.ints[source + a.NUMBER])]
         element, exit_ = exits_of(level)[exit_number]
-        asked = exit_ if exit_.turn is None else Exit(exit_.turn.forward)
-        entered = self.level(after(level, element, asked))  # may make the buffers anew
+        entered = self.level(after(level, element, asked_alone(exit_)))  # may make the buffers anew
         target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
         signal = self.buffers.put("ints", put_signal(self.buffers, level, row))

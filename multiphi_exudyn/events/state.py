@@ -105,7 +105,7 @@ class Event:
     time [s]; contact: its name; kind: "close" | "open", of friction "stick" | "slip"; loss: the energy [J] of the whole
     instant, carried by its first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an
     "open" of equal time. shared: name and impulse of contacts that are closed and stay so in the impact, carried by its
-    first event.
+    first event. state: the one that is entered, as a contact that closes may stick or slip.
     """
 
     time: float
@@ -114,6 +114,7 @@ class Event:
     loss: Loss
     impulse: float = 0.0
     shared: tuple[tuple[str, float], ...] = ()
+    state: str = ""
 
     @property
     def energy_loss(self) -> float:

@@ -125,14 +125,6 @@ class MultiPhiModel(Shown):
         """Whether there are elements with other states than open and closed."""
         return any(not _opens_and_closes(contact) for contact in self.contacts)
 
-    def need_smooth_contacts(self, what: str) -> None:
-        """Refuse friction at contacts where it is not provided for."""
-        rubbing = [contact.name for contact in self.contacts if contact.further]
-        if rubbing:
-            raise MultiPhiValueError(
-                f"{what}: got friction at the contacts {', '.join(rubbing)}, need contacts without"
-            )
-
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
         """Positions of the links that have a held place, one channel each."""
@@ -147,6 +139,11 @@ class MultiPhiModel(Shown):
     def link_places(self) -> tuple[tuple[int, ...], ...]:
         """Where every element's links stand among them."""
         return link_places(self.contacts)
+
+    @functools.cached_property
+    def rubbing(self) -> tuple[int, ...]:
+        """Positions of the elements that have friction: a link with a held place."""
+        return tuple(i for i, places in enumerate(self.link_places) if not set(places).isdisjoint(self.held))
 
     def pressing_links(self, element: int) -> list[int]:
         """Positions of the links whose gap is that of an element's first one: they press with and without friction."""
@@ -330,17 +327,16 @@ class MultiPhiModel(Shown):
     def equilibrium(self, forces: Mapping[str, float]) -> Equilibrium:
         """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``."""
         y, stretches = self._at_rest(forces)
-        named = {c.name: float(stretch) for c, stretch in zip(self.contacts, stretches, strict=True) if c.held}
+        named = {self.links[k].name: float(stretches[k]) for k in self.held}
         return Equilibrium(self.base.modes.shapes @ y, named)
 
     def _at_rest(self, forces: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
-        """y (m,) and stretches (c,) [m] at rest under forces [N] at points."""
+        """y (m,) and stretches (l,) [m] of links at rest under forces [N] at points."""
         base = self.base
         if base.modes.rigid:
             raise MultiPhiValueError(
                 f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
             )
-        self.need_smooth_contacts("static equilibrium")
         load = self.base_load(forces)
         if self.force_laws or self.general:
             return equilibrium(base, load)

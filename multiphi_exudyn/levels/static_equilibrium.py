@@ -10,12 +10,22 @@ does, friction slips where its limit is reached and sticks again where others tu
 contact turns the path back, the structure snaps through there, and the equilibrium beyond is no longer the one that
 was followed: that is refused, and so is friction whose force drops from a static limit.
 
-Source: R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, ch. 4.5.
+Friction at a contact goes with its pressure N, and changes it: where it slides, with U = f - h (levels/sliding.py),
+
+    N = N_0 + W N,   N_0 without it, W the forces that the loads U leave on the contacts
+
+That has one answer where |W| < 1 for a contact alone, whichever way it slides, and for several together where all
+principal minors of 1 - W are positive. Otherwise it wedges, and is refused with its number.
+
+Sources: A. Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact problems with
+friction, Ing. Archiv 60 (1990); R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, ch.
+4.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +46,7 @@ CHANGES = 20  # for every contact on the path: more is an exchange without end
 class Equilibrium:
     """At rest under slowly applied forces, as a start of a run: displacement x (n,) [m, rad].
 
-    stretches: of the links of friction [m], by name; zero without a spring.
+    stretches: of the links of friction [m], by name, at a contact NAME.tangential; zero without a spring.
     """
 
     displacement: np.ndarray
@@ -45,7 +55,7 @@ class Equilibrium:
 
 @dataclass
 class _Standing:
-    """What the elements have come to: numbers of their states (c,), places w (c,) [m]."""
+    """What the elements have come to: numbers of their states (c,), places w (l,) of links [m]."""
 
     states: list[int]
     held: np.ndarray
@@ -54,10 +64,15 @@ class _Standing:
         """The state of an element."""
         return base.contacts[element].states[self.states[element]]
 
+    def closed(self, base: ModalBase) -> list[int]:
+        """The links that hold."""
+        given = enumerate(base.link_places)
+        return sorted(places[k] for i, places in given for k in self.of(base, i).holds)
+
 
 @dataclass(frozen=True)
 class _Path:
-    """Straight lines in s, by their values at s = 0 and s = 1: y (2, m), q + w (2, c) and lambda (2, c)."""
+    """Straight lines in s, by their values at s = 0 and s = 1: y (2, m), q + w (2, l) and lambda (2, l) of links."""
 
     configuration: np.ndarray
     places: np.ndarray
@@ -67,11 +82,19 @@ class _Path:
         """One of them at s."""
         return np.asarray((1 - s) * ends[0] + s * ends[1])
 
-    def signal(self, element: int, exit_: Exit, held: float, s: float) -> np.ndarray:
-        """The signal (2,) of an exit; a rate is that of a way from s on."""
-        way = self.places[:, element]
-        gaps = exit_.gap * (way - held) + exit_.rate * (way - self.at(s, way))
-        return np.asarray(gaps + exit_.force * self.forces[:, element] + exit_.constant)
+    def signal(self, links: Sequence[int], exit_: Exit, held: np.ndarray, s: float) -> tuple[np.ndarray, float]:
+        """The signal (2,) of an exit of an element with these links, and its size; rates are of ways from s on."""
+        value, size = np.full(2, exit_.constant), 0.0
+        for share in exit_.shares:
+            k = links[share.link]
+            way = self.places[:, k]
+            value += (
+                share.gap * (way - held[k]) + share.rate * (way - self.at(s, way)) + share.force * self.forces[:, k]
+            )
+            size += abs(share.rate) * float(np.max(np.abs(way))) + abs(share.force) * float(
+                np.max(np.abs(self.forces[:, k]))
+            )
+        return value, max(size, float(np.max(np.abs(value))))
 
 
 def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,22 +103,24 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
     Raises NumericalFailure where the path snaps through.
     """
     rigid = np.isinf(base.stiffnesses)
-    pressed = np.flatnonzero((base.gaps < 0) & ~rigid)
-    standing = _Standing([0] * len(base.contacts), np.zeros(len(base.contacts)))
+    count = len(base.contacts)
+    pressed = np.flatnonzero((base.gaps < 0)[:count] & ~rigid[:count])
+    standing = _Standing([0] * count, np.zeros(len(base.links)))
     for i in pressed.tolist():
         standing.states[i] = 1
     first = base.directions[:, pressed] @ (base.stiffnesses[pressed] * base.gaps[pressed])
     ends = np.array([first, load + base.preload])
     lifts = np.where(rigid, np.maximum(-base.gaps, 0.0), 0.0)
     s, path = 0.0, _path(base, standing, ends, lifts)
-    for _ in range(CHANGES * (1 + len(base.contacts))):
+    for _ in range(CHANGES * (1 + count)):
         change = _next_change(base, standing, path, s)
         if change is None:
-            return path.configuration[1], _stretches(base, standing, path.places[1])
+            return path.configuration[1], _stretches(base, standing, path)
         s, element, asked = change
+        left = standing.of(base, element)
         _enter(base, standing, path, s, element, asked)
         path = _path(base, standing, ends, lifts)
-        if not base.contacts[element].held:
+        if "open" in (left.name, standing.of(base, element).name):
             _check_snap(base, standing, path, s, element)
     raise NumericalFailure("static equilibrium: contacts, friction and force laws exchange their states without end")
 
@@ -105,8 +130,7 @@ def _next_change(base: ModalBase, standing: _Standing, path: _Path, s: float) ->
     found: tuple[float, int, int] | None = None
     for i, element in enumerate(base.contacts):
         for exit_ in standing.of(base, i).exits:
-            ends = path.signal(i, exit_, standing.held[i], s)
-            size = max(np.max(np.abs(ends)), abs(exit_.rate) * np.max(np.abs(path.places[:, i])))
+            ends, size = path.signal(base.link_places[i], exit_, standing.held, s)
             fall = ends[0] - ends[1]
             if fall > SLACK * size:
                 at = s + max(float(path.at(s, ends)), 0.0) / fall
@@ -116,57 +140,120 @@ def _next_change(base: ModalBase, standing: _Standing, path: _Path, s: float) ->
 
 
 def _enter(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int, asked: int) -> None:
-    """An element changes its state at s; where its link begins to hold, its place is what gives it its stretch."""
+    """An element changes its state at s; where its held link begins to hold, its place gives it its stretch."""
     before, standing.states[element] = standing.of(base, element), asked
-    after = standing.of(base, element)
-    if not base.contacts[element].held:
+    after, link = standing.of(base, element), _held_link(base, element)
+    if link is None:
         return
-    if after.holds:
-        standing.held[element] = path.at(s, path.places[:, element]) - before.stretch
-    elif before.holds and not np.isclose(path.at(s, path.forces[:, element]), after.push, rtol=SLACK**0.5, atol=0):
-        raise NumericalFailure(
-            f"static equilibrium: at {s:.3g} of the forces {base.contacts[element].name!r} lets go at its static limit "
-            "and where it then comes to rest depends on inertia, need smaller forces, or a run"
-        )
+    if _holds(base, element, after, link):
+        pulled = 0.0 if before.name == "open" else _sliding_force(base, element, before, path, s)
+        stiffness = base.stiffnesses[link]
+        standing.held[link] = path.at(s, path.places[:, link]) - (0.0 if np.isinf(stiffness) else pulled / stiffness)
+    elif after.name != "open" and _holds(base, element, before, link):
+        stuck, slips = -path.at(s, path.forces[:, link]), _sliding_force(base, element, after, path, s)
+        if abs(stuck - slips) > SLACK**0.5 * abs(slips) + SLACK * np.max(np.abs(path.forces)):
+            raise NumericalFailure(
+                f"static equilibrium: at {s:.3g} of the forces {base.contacts[element].name!r} lets go at its static "
+                "limit and where it then comes to rest depends on inertia, need smaller forces, or a run"
+            )
+
+
+def _held_link(base: ModalBase, element: int) -> int | None:
+    """The link of an element that has a held place."""
+    return next((k for k in base.link_places[element] if base.links[k].held), None)
+
+
+def _holds(base: ModalBase, element: int, state: ElementState, link: int) -> bool:
+    return base.link_places[element].index(link) in state.holds
+
+
+def _sliding_force(base: ModalBase, element: int, state: ElementState, path: _Path, s: float) -> float:
+    """T [N] of friction that slips, at s."""
+    if state.rubs is None:
+        return -state.push
+    normal = [k for k in base.link_places[element] if not base.links[k].held]  # one of them holds, the others have none
+    return float(state.rubs[1] * path.at(s, np.sum(path.forces[:, normal], axis=1)))
 
 
 def _check_snap(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int) -> None:
-    """Refuse a change that turns the path back."""
-    for exit_ in standing.of(base, element).exits:
-        ends = path.signal(element, exit_, standing.held[element], s)
-        if ends[1] < ends[0]:
+    """Refuse a contact that closes or opens where that turns the path back."""
+    state = standing.of(base, element)
+    for exit_ in state.exits:
+        ends, _ = path.signal(base.link_places[element], exit_, standing.held, s)
+        if "open" in (state.name, exit_.asked) and ends[1] < ends[0]:
             raise NumericalFailure(
                 f"static equilibrium: at {s:.3g} of the forces the structure snaps through "
                 f"({base.contacts[element].name}), need forces that reach an equilibrium slowly"
             )
 
 
-def _stretches(base: ModalBase, standing: _Standing, places: np.ndarray) -> np.ndarray:
-    """Of all links (c,) [m], zero of contacts; places: q + w (c,)."""
-    found = np.zeros(len(places))
-    for i, element in enumerate(base.contacts):
-        state = standing.of(base, i)
-        if element.held and not element.rigid:
-            found[i] = places[i] - standing.held[i] if state.holds else state.stretch
+def _stretches(base: ModalBase, standing: _Standing, path: _Path) -> np.ndarray:
+    """Of all links (l,) [m], zero of contacts."""
+    found = np.zeros(len(base.links))
+    for i in range(len(base.contacts)):
+        state, link = standing.of(base, i), _held_link(base, i)
+        if link is None or np.isinf(base.stiffnesses[link]) or state.name == "open":
+            continue
+        if _holds(base, i, state, link):
+            found[link] = path.places[1, link] - standing.held[link]
+        else:
+            found[link] = _sliding_force(base, i, state, path, 1.0) / base.stiffnesses[link]
     return found
 
 
 def _path(base: ModalBase, standing: _Standing, loads: np.ndarray, lifts: np.ndarray) -> _Path:
     """The path with the elements in these states."""
     states = [standing.of(base, i) for i in range(len(base.contacts))]
-    index = [i for i, state in enumerate(states) if state.holds]
-    pushes = base.directions @ np.array([state.push for state in states])
+    index = standing.closed(base)
+    pushes = base.directions[:, : len(states)] @ np.array([state.push for state in states])
     configurations, places, forces = [], [], []
     for load, part in zip(loads, (1.0, 0.0), strict=True):
         initial = base.gaps + part * lifts
-        gaps = initial - standing.held
-        closed_directions = base.closed_directions(index, gaps[index])
-        along, configuration = static_response(base, closed_directions, load + pushes)
-        moved = base.directions.T @ configuration
+        pressing, configuration = _with_friction(base, index, initial - standing.held, load + pushes)
         configurations.append(configuration)
-        places.append(moved + initial)
-        forces.append(base.contact_forces(closed_directions, along, moved + gaps))
+        places.append(base.directions.T @ configuration + initial)
+        forces.append(pressing)
     return _Path(np.array(configurations), np.array(places), np.array(forces))
+
+
+# ---------------------------------------------------------------------- friction that goes with pressure
+
+
+def _with_friction(
+    base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (l,) and y (m,) at rest where links hold, with the friction of those that slide."""
+    forces, configuration = _at_rest(base, index, gaps, load)
+    sliders = [k for k in index if k in base.oblique]
+    if not sliders:
+        return forces, configuration
+    added = base.pushes[:, sliders] - base.directions[:, sliders]
+    own = np.array([_at_rest(base, index, 0 * gaps, push)[0][sliders] for push in added.T]).T
+    _check_unique(base, sliders, own)
+    return _at_rest(base, index, gaps, load + added @ np.linalg.solve(np.eye(len(sliders)) - own, forces[sliders]))
+
+
+def _at_rest(base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same without friction, of gaps (l,)."""
+    closed_directions = base.closed_directions(index, gaps[index])
+    along, configuration = static_response(base, closed_directions, load)
+    return base.contact_forces(closed_directions, along, base.directions.T @ configuration + gaps), configuration
+
+
+def _check_unique(base: ModalBase, sliders: list[int], own: np.ndarray) -> None:
+    """Refuse friction under which contacts wedge: W (o, o)."""
+    alone = np.abs(np.diagonal(own))
+    minors: dict[tuple[int, ...], float] = {(k,): 1 - float(alone[k]) for k in range(len(sliders))}
+    for count in range(2, len(sliders) + 1):
+        for chosen in itertools.combinations(range(len(sliders)), count):
+            minors[chosen] = float(np.linalg.det((np.eye(len(own)) - own)[np.ix_(chosen, chosen)]))
+    for chosen, minor in minors.items():
+        if not minor > SLACK:
+            names = ", ".join(repr(base.label(sliders[k])) for k in chosen)
+            raise NumericalFailure(
+                f"static equilibrium: friction at the contact {names} wedges: it leaves {minor:.6g} of the pressure, "
+                "so there is no one equilibrium, need a positive number, by a smaller coefficient"
+            )
 
 
 def pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:

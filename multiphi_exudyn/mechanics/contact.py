@@ -196,8 +196,8 @@ class UnilateralContact:
         if math.isinf(self.tangential_stiffness):
             back = Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
         else:
-            ratio = self.friction / self.tangential_stiffness
-            back = Exit("stick", rate=ratio * self.stiffness, firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
+            ratio, firmness = self.friction / self.tangential_stiffness, TAKEN_FALLING if self.drop else TAKEN_ONCE
+            back = Exit("stick", rate=ratio * self.stiffness, firmness=firmness, further=(Share(1, rate=s),))
         return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), rubs=(link, s * self.friction))
 
     def first_state(self, gap: float, rate: float, *rates: float) -> str:

@@ -11,7 +11,7 @@ circle. Between events the map is linear, so that few steps suffice.
 
 A link that slips forgets its place: a multiplier is zero. One that never slips keeps it: its multiplier is one, and to
 every such place belongs another state that repeats. Those places are no unknowns: they stay what the path that led here
-has made them, and their multipliers are left out.
+has made them, and their multipliers are left out. Neither are those of links that never hold.
 
 Source: A. H. Nayfeh, B. Balachandran, Applied Nonlinear Dynamics, 1995, ch. 3, 5.
 """
@@ -28,6 +28,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.time.going_on import stops_moved
 from multiphi_exudyn.time.segment import listed
@@ -36,8 +37,8 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["ATTRACTS", "PeriodMap", "Shooting"]
 
-MOST_STEPS = 8  # of Newton's method: within one order of events the map is nearly linear,
-SHRINKING = 0.5  # and a step longer than this part of the one before shows that it is not
+MOST_STEPS = 16  # of Newton's method: within one order of events the map is nearly linear,
+SHRINKING = 0.6  # at a double root steps halve; one longer than this part of the one before shows that it is neither
 ATTRACTS = 1 - 1e-7  # a multiplier above this cannot be told from 1 by finite differences
 
 
@@ -54,12 +55,12 @@ class PeriodMap:
         return Run(self.model, periods * self.period, loads=self.loads, start=start, rewound=True).trajectory()
 
     def states(self, trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
-        """(s y, y', T / sqrt(k)) (2 m + e, k) at times (k,) [s], T of the e springs with held places."""
+        """(s y, y', T / sqrt(k)) (2 m + e, k) at times (k,) [s], T of the e springs in series with friction."""
         base = self.model.base
         scales = np.maximum(base.modes.omega, 2 * math.pi / self.period)[:, None]
         places, rates = base.coordinates(trajectory.displacement(times)), base.coordinates(trajectory.velocity(times))
-        sprung = [c for c in self.model.contacts if c.held and not c.rigid]
-        stretched = [trajectory.friction_force(c.name, times) / math.sqrt(c.stiffness) for c in sprung]
+        springs = ((c.name, friction_spring(c)[2]) for c in self.model.contacts)
+        stretched = [trajectory.friction_force(name, times) / math.sqrt(k) for name, k in springs if k]
         return np.vstack([scales * places, rates, *stretched])
 
 
@@ -75,7 +76,8 @@ class Shooting:
     def attracting(self, tolerance: float, far: float) -> tuple[Trajectory, float] | None:
         """A run that ends in a state that repeats and attracts, with its largest multiplier in a period; or None.
 
-        tolerance: length of the last step of Newton's method. far: the longest step it may take.
+        tolerance: length of the last step of Newton's method, or of what a period still changes: where the multiplier
+        tends to one with the distance, steps only halve. far: the longest step it may take.
         """
         place, allowed = np.zeros(len(self._scales)), far
         for _ in range(MOST_STEPS):
@@ -86,13 +88,13 @@ class Shooting:
             jacobian = self._jacobian(place, reached, free)
             if jacobian is None:
                 return None
-            step = np.zeros(len(place))
-            step[free] = np.linalg.lstsq(np.eye(len(free)) - jacobian, (reached - place)[free])[0]
+            step, left = np.zeros(len(place)), (reached - place)[free]
+            step[free] = np.linalg.lstsq(np.eye(len(free)) - jacobian, left)[0]
             length = float(np.linalg.norm(step))
             if not length <= allowed:
                 return None
             place, allowed = place + step, max(SHRINKING * length, tolerance)
-            if length <= tolerance:
+            if length <= tolerance or np.linalg.norm(left) <= tolerance:
                 largest = float(np.max(np.abs(np.linalg.eigvals(jacobian)), initial=0.0)) ** (1 / self.order)
                 return (self._moved(place), largest) if largest < ATTRACTS else None
         return None
@@ -140,10 +142,11 @@ class Shooting:
         return self._scales * np.concatenate([vectors.T @ y, vectors.T @ v, held - own.held])
 
     def _free(self, trajectory: Trajectory) -> np.ndarray:
-        """Which coordinates are unknowns: all but places that links have held all the time."""
+        """Which coordinates are unknowns: all but places that links have held all the time, or never."""
         model = self.map.model
-        holding = [model.links_held(level.states) for level in listed(trajectory.segments).levels]
-        kept = [all(i in held for held in holding) for i in model.held]
+        levels = [self._state.level, *listed(trajectory.segments).levels]
+        holding = [model.links_held(level.states) for level in levels]
+        kept = [len({i in held for held in holding}) == 1 for i in model.held]
         return np.flatnonzero(np.append(np.ones(len(self._scales) - len(kept), bool), ~np.array(kept, bool)))
 
     def _jacobian(self, place: np.ndarray, reached: np.ndarray, free: np.ndarray) -> np.ndarray | None:

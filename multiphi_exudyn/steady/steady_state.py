@@ -314,7 +314,6 @@ def _check(
         raise MultiPhiValueError(
             "model modes: got a Tolerance that has not decided yet, need a run of simulate first, a number or 'all'"
         )
-    model.need_smooth_contacts("steady state")
     if not isinstance(load, (HarmonicLoad, BaseMotion)):
         raise MultiPhiTypeError(f"load: got {type(load).__name__}, need HarmonicLoad or BaseMotion")
     if frequency(load) == 0:

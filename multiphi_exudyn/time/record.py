@@ -348,4 +348,5 @@ class Record:
         contact, entered, left = self.kinds[place].tolist()
         shared = tuple((self._told[self.kinds[k, 0]][0], float(self.amounts[k, -1])) for k in range(before, place))
         name, states = self._told[contact]
-        return Event(time, name, event_kind(states, left, entered), Loss(*lost), impulse, shared)
+        kind = event_kind(states, left, entered)
+        return Event(time, name, kind, Loss(*lost), impulse, shared, states[entered].name)

@@ -265,7 +265,7 @@ def _check_start(run: Run) -> None:
     if run.displacement is not None or run.velocity is not None:
         raise MultiPhiValueError("start: got a displacement or velocity as well, need one of them")
     if isinstance(start, Equilibrium):
-        names = {contact.name for contact in run.model.contacts if contact.held}
+        names = {run.model.links[k].name for k in run.model.held}
         if set(start.stretches) != names:
             raise MultiPhiValueError(
                 f"start: got an equilibrium with the friction {', '.join(start.stretches) or 'none'}, need that of the "

@@ -1,4 +1,4 @@
-"""What is to be said of a scene's answer: the run against brute force, its own laws, and itself in the Exudyn body.
+"""What is to be said of a scene's answer: the run against brute force, its own laws, itself in two parts, in Exudyn.
 
 A difference is excused only by a motion that is sensitive by itself: a run nudged by 1e-12 must drift away no later,
 and in more than one event. Nudges scale the start and the stiffness matrix, so that what is zero by structure stays
@@ -32,7 +32,9 @@ IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated l
 RUBBED = 1e-6  # of the energy: what friction takes
 BODY_STEPS = 400  # of the Exudyn body, each of which ends exactly
 BODY_NUDGE = 1e-9  # of the start and of the stiffness: what Newton's iterations leave of a state
-BODY_SHARE = 16  # one scene in so many runs in the body too
+BODY_SHARE = 16  # one scene in so many runs in the body too, and in two parts,
+RUBBING_SHARE = 2  # of those with friction one in so many
+MIDDLE = 0.437  # of the run, where that ends and goes on
 
 
 @dataclass(frozen=True)
@@ -122,8 +124,11 @@ def _verdicts(scene, motion):
         return [("named failure", motion.message)]
     found = [(f"failure: {text.split(':')[0]}", text) for run in motion.runs for text in laws_of(scene, run)]
     found += _compared(scene, motion)
-    alone = scene.split or scene.units != (0, 0, 0) or (scene.system is not None and scene.system.sliders)
-    if not found and scene.number % BODY_SHARE == 0 and not alone:
+    rubs = scene.system is not None and scene.system.sliders
+    looked_at = scene.number % (RUBBING_SHARE if rubs else BODY_SHARE) == 0 and not scene.split
+    if not found and looked_at:
+        found += in_two_parts(scene, motion)
+    if not found and looked_at and scene.units == (0, 0, 0):
         found += in_the_body(scene, motion)
     return found or [("ok", motion.message)]
 
@@ -278,6 +283,29 @@ def _reordered(scene):
     model = mp.MultiPhiModel(structure, contacts, modes=scene.model.modes)
     start = {"displacement": scene.displacement[order], "velocity": scene.velocity[order]}
     return replace(scene, model=model, loads=loads, **start)
+
+
+# ---------------------------------------------------------------------- in two parts
+
+
+def in_two_parts(scene, motion):
+    """A run that goes on where another one has ended, with all that contacts and friction keep, is the whole one."""
+    model, t_end, x, v, loads = scaled(scene)
+    whole, times = motion.runs[0], instants(scene)[instants(scene) > MIDDLE * scene.t_end] * (t_end / scene.t_end)
+    first = mp.simulate(model, MIDDLE * t_end, x, v, loads)
+    rest = mp.simulate(model, t_end, start=first, loads=loads)
+    if rest.status != "ok":
+        return [("failure: restart", f"{rest.status}: {rest.message}")]
+    pairs = ((rest.displacement(times), whole.displacement(times)), (rest.velocity(times), whole.velocity(times)))
+    scale = np.array(motion.scale) * 2.0 ** np.array([scene.units[1], scene.units[1] - scene.units[0]])
+    errors = [
+        np.max(np.abs(ours - theirs), axis=0) / max(np.max(np.abs(theirs)), NO_MOTION * size, 1e-300)
+        for (ours, theirs), size in zip(pairs, scale, strict=True)
+    ]
+    if np.max(errors) <= NEAR:
+        return []
+    at = int(np.argmax(np.max(errors, axis=0) > NEAR)) + INSTANTS - len(times)
+    return [("sensitive" if sensitive(scene, motion, at) else "failure: restart", f"off by {np.max(errors):.3g}")]
 
 
 # ---------------------------------------------------------------------- in the Exudyn body

@@ -1,5 +1,6 @@
 """Multi-Phi body under loads and stops that vary in time: alone it is ``simulate``, beside others of second order."""
 
+import dataclasses
 import math
 
 import exudyn as exu
@@ -9,6 +10,7 @@ from exudyn.itemInterface import CoordinateSpringDamper, LoadCoordinate, MarkerN
 from small_structures import chain
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.certified_step import jump_times
 from reference_models.exudyn_quiet import quiet
@@ -133,3 +135,22 @@ def test_a_step_in_which_a_load_jumps_is_never_taken_for_clear():
     native, found = mp.simulate(model, T_END, loads=[load]), solved(model, [load], 2000)
     assert jump_times(native.segments[0].level.excitation).tolist() == [0.5, 2.5]
     assert [(e.contact, e.kind) for e in found.events] == [(e.contact, e.kind) for e in native.events]
+
+
+@pytest.mark.parametrize("loads", [(), (mp.HarmonicLoad("ball", 0.01, 1.0),)], ids=["weight", "own loads"])
+def test_a_ball_on_its_last_bounce_lands_for_good(loads):
+    """The phase is handed on by a start, under loads that vary too: taken for armed, the ball rebounded."""
+    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"ball": 0})
+    model = mp.MultiPhiModel(structure, [mp.UnilateralContact("floor", "ball", 0.0, restitution=0.5)], modes="all")
+    weight = mp.ConstantLoad("ball", -9.81)
+    first = mp.simulate(model, 0.6, displacement=[1.0], loads=[weight])
+    last = dataclasses.replace(first, final=dataclasses.replace(first.final, phases=(Phase.LANDING,)))
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, start=last, loads=[weight, *loads])
+    mbs.Assemble()
+    with quiet():
+        mbs.SolveDynamic(fixed_steps(1.0, 100), solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    found = body_histories(mbs, items)
+    assert [event.kind for event in found.events] == ["close"]
+    assert found.points["ball"][-1] == pytest.approx(0.0, abs=1e-12)

@@ -2,12 +2,13 @@
 
 import dataclasses
 
+import body_runs
 import exudyn as exu
 import numpy as np
 import pytest
 import scipy.linalg
+from body_runs import TRAPEZOIDAL, coordinate, settings, system
 from exudyn.itemInterface import (
-    MarkerNodeCoordinate,
     NodeGenericODE2,
     ObjectConnectorCoordinateSpringDamper,
     ObjectGenericODE2,
@@ -19,7 +20,6 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 
 END = 8.0
-TRAPEZOIDAL = exu.DynamicSolverType.TrapezoidalIndex2
 DAMPING = mp.ModalDamping([0.02, 0.01, 0.03])
 RING = {
     "rigid": mp.Friction("ring", "m1", 0.4),
@@ -34,38 +34,9 @@ def model(*elements, **given):
     return mp.MultiPhiModel(chain(3, damping=DAMPING, stiffness=10.0), elements, **{"modes": "all", **given})
 
 
-def settings(step, end=END):
-    settings = exu.SimulationSettings()
-    settings.timeIntegration.numberOfSteps = round(end / step)
-    settings.timeIntegration.endTime = end
-    settings.timeIntegration.verboseMode = 0
-    settings.timeIntegration.newton.useModifiedNewton = True
-    settings.timeIntegration.newton.relativeTolerance = 1e-12
-    settings.timeIntegration.newton.absoluteTolerance = 1e-14
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = step
-    return settings
-
-
-def system():
-    exu.config.printToConsole = False
-    return exu.SystemContainer().AddSystem()
-
-
-def run(of, step, end=END, add=None, **given):
+def run(of, step, end=END, **given):
     """Histories and body of a run."""
-    container = exu.SystemContainer()
-    mbs = container.AddSystem()
-    items = CreateMultiPhiBody(mbs, of, name="b", **{"displacement": START, **given})
-    if add is not None:
-        add(mbs, items)
-    mbs.Assemble()
-    mbs.SolveDynamic(settings(step, end), solverType=TRAPEZOIDAL)
-    return body_histories(mbs, items), mbs.variables["multiPhi"]["b"]
-
-
-def coordinate(mbs, node):
-    return mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+    return body_runs.run(of, step, end, **{"displacement": START, **given})
 
 
 class TestAlone:

@@ -129,6 +129,9 @@ class Coulomb:
             self.settle(t, z, i)
         else:
             self.modes[i] = what
+            slides = self.slip_end(i, what)
+            if c.most > c.friction and slides(t, z) < 0 and slides(t, z + 1e-6 * self.slope(t, z)) < slides(t, z):
+                self.change(t, z, i, "stick")  # the force has fallen, and its patch would slide back
 
     def run(self, t_end, x, v, times):
         """x (n, k) at times, and (time, contact, kind) of every event."""

@@ -135,3 +135,89 @@ def test_friction_that_others_turn_back_sticks_again():
         assert np.all(np.abs(forces) <= [0.5 * (1 + 1e-12), 0.01 * (1 + 1e-12), 0.2 * (1 + 1e-12)])
         load = np.array([-0.7 * force, 0.0, force])
         assert_allclose(structure.stiffness @ found.displacement, load - forces, rtol=0, atol=1e-13)
+
+
+class TestContacts:
+    """A block on springs, pressed onto a floor at an angle to them: friction and pressure change each other."""
+
+    STIFFNESS = np.array([[10.0, 2.0], [2.0, 20.0]])
+
+    def model(self, friction=0.4, spring=math.inf, gap=0.05, **given):
+        structure = mp.LinearStructure(np.eye(2), self.STIFFNESS, points={"x": 0, "y": 1})
+        floor = mp.UnilateralContact(
+            "floor", "y", gap, 80.0, friction=friction, tangential="x", tangential_stiffness=spring, **given
+        )
+        return mp.MultiPhiModel(structure, [floor], modes="all")
+
+    @pytest.mark.parametrize("spring", [math.inf, 40.0])
+    @pytest.mark.parametrize("force", [(3.0, -6.0), (0.5, -1.0), (-8.0, -6.0)])
+    def test_slide_where_the_sliding_structure_is_at_rest(self, spring, force):
+        found = self.model(spring=spring).equilibrium({"x": force[0], "y": force[1]})
+        s = math.copysign(1.0, force[0])
+        sliding = self.STIFFNESS + 80.0 * np.array([[0.0, -0.4 * s], [0.0, 1.0]])
+        expected = np.linalg.solve(sliding, np.array(force) + 80.0 * 0.05 * np.array([0.4 * s, -1.0]))
+        assert_allclose(found.displacement, expected, rtol=1e-13)
+        tension = s * 0.4 * -80.0 * (found.displacement[1] + 0.05)
+        assert_allclose(found.stretches["floor.tangential"], tension / spring, rtol=1e-12)
+
+    @pytest.mark.parametrize("spring", [math.inf, 40.0])
+    def test_stick_where_they_have_touched(self, spring):
+        """Until it touches it moves freely; from there on the spring holds it, or nothing moves it."""
+        free = np.linalg.solve(self.STIFFNESS, [1.0, -6.0])
+        place = free[0] * 0.05 / -free[1]
+        found = self.model(spring=spring).equilibrium({"x": 1.0, "y": -6.0})
+        if math.isinf(spring):
+            expected = [place, (-6.0 - 80 * 0.05 - 2 * place) / 100.0]
+        else:
+            stuck = self.STIFFNESS + np.diag([spring, 80.0])
+            expected = np.linalg.solve(stuck, [1.0 + spring * place, -6.0 - 80 * 0.05])
+        assert_allclose(found.displacement, expected, rtol=1e-13)
+
+    @pytest.mark.parametrize("spring", [math.inf, 40.0])
+    @pytest.mark.parametrize("force", [{"x": 1.0, "y": -6.0}, {"x": 3.0, "y": -6.0}])
+    def test_stay_there(self, spring, force):
+        model = self.model(spring=spring)
+        start = model.equilibrium(force)
+        run = mp.simulate(model, 5.0, start=start, loads=[mp.ConstantLoad(at, f) for at, f in force.items()])
+        assert not run.events
+        assert_allclose(run.displacement(5.0), start.displacement, rtol=0, atol=1e-15)
+
+    def test_that_wedge_are_refused_with_their_number(self):
+        """Friction presses more than it takes: h_y.K^-1 h_x 80 mu > 1; then it could hold what is to open."""
+        stuck = self.STIFFNESS + np.diag([0.0, 80.0])
+        share = 80.0 * 7.0 * abs(np.linalg.inv(stuck)[1, 0])
+        model, forces = self.model(friction=7.0, gap=-0.05), {"x": 3.0, "y": 8.0}
+        with pytest.raises(mp.NumericalFailure, match=f"'floor' wedges: it leaves {1 - share:.6g} of the pressure"):
+            model.equilibrium(forces)
+        free = np.linalg.solve(self.STIFFNESS, [3.0, 8.0])
+        assert_allclose(self.model(friction=0.9 * 7.0 / share, gap=-0.05).equilibrium(forces).displacement, free)
+
+    def test_that_let_go_are_refused(self):
+        model = self.model(static_friction=0.5, spring=40.0, gap=-0.05)
+        with pytest.raises(mp.NumericalFailure, match="'floor' lets go at its static limit"):
+            model.equilibrium({"x": 4.0, "y": -1.0})
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_are_where_a_slow_run_leads(self, seed):
+        n, mass, _, _, random = random_structure(seed)
+        given = random.uniform(5.0, 50.0, n)
+        springs = np.diag(given + np.append(given[1:], 0.0)) - np.diag(given[1:], 1) - np.diag(given[1:], -1)
+        structure = mp.LinearStructure(
+            mass, springs, damping=mp.ModalDamping([0.7] * n), points={f"m{i}": i for i in range(n)}
+        )
+        places = [f"m{i}" for i in random.permutation(n)]
+        elements = [
+            mp.UnilateralContact("near", places[0], 0.005, 60.0, friction=0.4, tangential=places[1]),
+            mp.UnilateralContact(
+                "reached", places[2], 0.02, 200.0, friction=0.5, tangential={places[0]: 1.0, places[1]: 0.5},
+                tangential_stiffness=35.0,
+            ),
+        ]  # fmt: skip
+        model = mp.MultiPhiModel(structure, elements, modes="all")
+        forces = {places[0]: 1.5, places[1]: -1.0, places[2]: -3.0}
+        found = model.equilibrium(forces)
+        loads = [mp.SampledLoad(at, [0.0, 3000.0, 4000.0], [0.0, force, force]) for at, force in forces.items()]
+        run = mp.simulate(model, 3100.0, loads=loads)
+        assert "reached" in {event.contact for event in run.events}
+        size = np.max(np.abs(found.displacement))
+        assert_allclose(found.displacement, run.displacement(3100.0), rtol=0, atol=3e-4 * size)

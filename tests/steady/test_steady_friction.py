@@ -94,3 +94,84 @@ def test_a_belt_goes_on_for_ever():
     assert np.max(np.abs(shown - expected)) < 1e-8 * np.max(np.abs(expected))
     slipped = state.trajectory.slip("belt", state.trajectory.t_end)
     assert slipped == pytest.approx(-0.3 / load.frequency_hz, rel=1e-7)
+
+
+def pressed(share, **given):
+    """The block on a floor that presses with 10 N for ever: its friction is constant."""
+    structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 1e-3]), points={"x": 0, "y": 1})
+    floor = mp.UnilateralContact("floor", "y", 0.0, 100.0, friction=share / 10, tangential="x", **given)
+    return mp.MultiPhiModel(structure, [floor], modes="all")
+
+
+PRESS = mp.ConstantLoad("y", -10.0 - 1e-4)  # what the contact and the small spring carry at a depth of 0.1
+
+
+class TestContacts:
+    @pytest.mark.parametrize(("beta", "share", "expected"), [(0.7, 0.5, 1.744253936249), (1.5, 0.4, 0.653197264742)])
+    def test_with_constant_pressure_have_den_hartogs_amplitude(self, beta, share, expected):
+        load = mp.HarmonicLoad("x", 1.0, beta / (2 * math.pi))
+        state = mp.steady_state(pressed(share), load, other_loads=[PRESS], displacement=[0.0, -0.1], tolerance=1e-9)
+        assert (state.status, state.order) == ("periodic", 1)
+        assert state.amplitude("x") == pytest.approx(expected, abs=2e-12)
+        assert state.trajectory.ledger.friction == pytest.approx(4 * share * expected, rel=1e-9)
+        assert state.duty("floor") == 1.0
+
+    @pytest.mark.parametrize("spring", [math.inf, 40.0])
+    @pytest.mark.parametrize("static", [None, 0.6])
+    def test_that_lift_off_repeat_where_a_long_run_does(self, spring, static):
+        structure = mp.LinearStructure(
+            np.diag([1.0, 0.5]), [[4.0, 0.6], [0.6, 6.0]], damping=[[0.2, 0.0], [0.0, 0.3]], points={"x": 0, "y": 1}
+        )
+        floor = mp.UnilateralContact(
+            "floor", "y", 0.0, 80.0, friction=0.4, static_friction=static, tangential="x", tangential_stiffness=spring
+        )
+        model, press = mp.MultiPhiModel(structure, [floor], modes="all"), mp.ConstantLoad("y", -1.0)
+        load = mp.HarmonicLoad({"x": 1.0, "y": 0.8}, 3.0, 0.45)
+        state = mp.steady_state(model, load, other_loads=[press], tolerance=1e-10)
+        assert state.status == "periodic"
+        kinds = {event.kind for event in state.trajectory.events}
+        assert kinds >= {"close", "open", "slip"}
+        assert 0 < state.duty("floor") < 1
+        period = 1 / load.frequency_hz
+        long = mp.simulate(model, 240 * period, loads=[load, press])
+        t = np.linspace(0, period, 101)
+        last = (240 - state.order) * period
+        size = state.amplitude("x")
+        assert np.max(np.abs(state.trajectory.at("x", t) - long.at("x", last + t))) < 1e-7 * size
+        work = state.trajectory.ledger
+        assert work.work_of_loads == pytest.approx(work.friction + work.damping, rel=1e-7)
+
+    def test_have_a_frequency_response(self):
+        """Going up through resonance: every amplitude is Den Hartog's; Newton leaves out the place that never holds."""
+        load, betas = mp.HarmonicLoad("x", 1.0, 0.1), np.array([0.7, 0.8, 1.2, 1.5])
+        response = mp.frequency_response(
+            pressed(0.4), load, betas / (2 * math.pi), other_loads=[PRESS], displacement=[0.0, -0.1], tolerance=1e-9
+        )
+        v = 1 / (1 - betas**2)
+        u = np.sin(math.pi / betas) / (betas * (1 + np.cos(math.pi / betas)))
+        assert np.array(response.orders).tolist() == [1, 1, 1, 1]
+        assert response.amplitude("x") == pytest.approx(np.sqrt(v**2 - (0.4 * u) ** 2), abs=1e-9)
+
+    def test_that_slide_for_ever_keep_no_place(self):
+        """On a fast belt: linear, with the friction of the pressure; a place that never holds is no unknown."""
+        structure = mp.LinearStructure(
+            np.eye(2), [[4.0, 0.6], [0.6, 6.0]], damping=np.diag([0.2, 0.2]), points={"x": 0, "y": 1}
+        )
+        belt = mp.UnilateralContact("belt", "y", -0.5, 30.0, friction=0.3, tangential="x", tangential_velocity=-50.0)
+        model, hz = mp.MultiPhiModel(structure, [belt], modes="all"), 0.3
+        state = mp.steady_state(model, mp.HarmonicLoad("y", 1.0, hz), tolerance=1e-6)
+        assert state.status == "periodic"
+        assert not state.trajectory.events
+        stiffness, w = np.array([[4.0, 0.6 - 0.3 * 30], [0.6, 36.0]]), 2 * math.pi * hz
+        answer = np.linalg.solve(stiffness - w**2 * np.eye(2) + 0.2j * w * np.eye(2), [0.0, 1.0])
+        assert state.amplitude("x") == pytest.approx(abs(answer[0]), rel=1e-5)
+        assert 0 < state.multiplier < 1
+
+
+def test_den_hartogs_neutral_orbit_is_found():
+    """Half the natural frequency: in half a period a disturbance swings once, and shrinks with its own square."""
+    load = mp.HarmonicLoad("m", 1.0, 0.5 / (2 * math.pi))
+    state = mp.steady_state(block(mp.Friction("floor", "m", 0.3)), load, tolerance=1e-9)
+    assert (state.status, state.order) == ("periodic", 1)
+    assert state.amplitude("m") == pytest.approx(4 / 3, abs=1e-11)
+    assert 0.999 < state.multiplier < 1

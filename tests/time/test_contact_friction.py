@@ -3,7 +3,6 @@
 import math
 import warnings
 
-import exudyn
 import numpy as np
 import pytest
 import scipy.linalg
@@ -12,7 +11,6 @@ from numpy.testing import assert_allclose
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
 
 
 def flutter_structure():
@@ -238,6 +236,30 @@ def test_random_systems_move_as_an_integrator_says(seed):
     against_the_law(model, 4.0, x, v, np.linspace(0, 4, 101), loads, force)
 
 
+def test_a_spring_that_lets_go_while_the_pressure_falls_faster_sticks_again_at_once():
+    """Its patch would slide back: the force has fallen from the static limit, and the motion goes on without a slip."""
+    mass = np.diag([1.0, 0.6, 1.2])
+    stiffness = np.array([[8.0, -3.0, 0.8], [-3.0, 9.0, 1.0], [0.8, 1.0, 12.0]])
+    damping = np.diag([0.05, 0.03, 0.025]) + 0.02 * stiffness
+    structure = mp.LinearStructure(mass, stiffness, damping=damping, points={"x": 0, "z": 1, "y": 2})
+    floor = mp.UnilateralContact(
+        "floor", "y", 0.0, 80.0, friction=0.3, static_friction=0.5, tangential="x", tangential_stiffness=60.0
+    )
+    model = mp.MultiPhiModel(structure, [floor], modes="all")
+    run = against_the_law(
+        model, 6.0, np.array([0.4, 0.6, -0.08]), np.array([0.3, 0.0, 0.0]), np.linspace(0, 6, 201),
+        [mp.ConstantLoad("y", -1.5)], lambda t: np.array([0.0, 0.0, -1.5]),
+    )  # fmt: skip
+    first, second = run.events[:2]
+    assert (first.kind, second.kind) == ("slip", "stick")
+    assert first.time == second.time
+    before, after = (run.friction_force("floor", first.time, side) for side in ("left", "right"))
+    assert before == pytest.approx(0.5 * run.contact_force("floor", first.time), rel=1e-12)
+    assert after == pytest.approx(0.3 * run.contact_force("floor", first.time), rel=1e-12)
+    assert first.loss.friction == pytest.approx((before**2 - after**2) / (2 * 60.0), rel=1e-12)
+    assert first.state == "slip+"
+
+
 @pytest.mark.parametrize(("static", "spring"), [(None, math.inf), (0.6, 40.0)])
 def test_forces_balance_beside_a_rigid_stop(static, spring):
     """M x'' + K x = f + h N - h_t T + h_1 lambda, x'' from differences of x'."""
@@ -368,12 +390,3 @@ class TestArguments:
         plain, zero = (mp.UnilateralContact("c", "y", 0.1, 5.0, **k) for k in ({}, {"tangential": "x"}))
         assert plain.states == zero.states
         assert not zero.further
-
-    def test_what_does_not_know_them_refuses_them(self):
-        model = mp.MultiPhiModel(flutter_structure(), flutter_model(0.3).contacts)
-        with pytest.raises(mp.MultiPhiValueError, match="static equilibrium: got friction at the contacts belt"):
-            model.static_equilibrium({"x": 1.0})
-        with pytest.raises(mp.MultiPhiValueError, match="steady state: got friction at the contacts belt"):
-            mp.steady_state(model, mp.HarmonicLoad("x", 1.0, 1.0))
-        with pytest.raises(mp.MultiPhiValueError, match="model: got friction at the contacts belt"):
-            CreateMultiPhiBody(exudyn.SystemContainer().AddSystem(), model)

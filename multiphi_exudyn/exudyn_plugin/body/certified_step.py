@@ -6,8 +6,9 @@ h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s
     min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'| exp(sigma h)
 
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
-velocities: under a constant force it grows no faster than with the largest rate sigma of a growing mode (omega^2 < 0),
-mostly not at all, so the values at the two ends bound it in between, whatever that force is. What fails the test is
+velocities: under a constant force it grows no faster than with a rate sigma, that of a growing mode (omega^2 < 0) or
+what friction that goes with pressure feeds (levels/sliding.py), mostly not at all, so the values at the two ends bound
+it in between, whatever that force is. What fails the test is
 looked at exactly (body.py): the test may not decide, but it does not err. Of forces f on points s also holds L f
 (modal_force.py), of the step's mean: what stands at each end, less half its change.
 
@@ -231,18 +232,24 @@ def _padded(stepped: SteppedLevel, rows: list[Row], channels: int) -> tuple[np.n
 
 
 def _omega(stepped: SteppedLevel) -> np.ndarray:
-    return np.asarray(np.sqrt(np.abs(np.diagonal(stepped.stiffness))))
+    return np.asarray(np.sqrt(np.abs(stepped.squares)))
 
 
-def _signed(stepped: SteppedLevel) -> np.ndarray:
-    """omega^2 / |omega|."""
-    return np.asarray(np.sign(np.diagonal(stepped.stiffness)) * _omega(stepped))
+def _pulling(stepped: SteppedLevel) -> np.ndarray:
+    """K diag(1/|omega|) (s, s), zero where omega is: K acts on no mode of zero frequency."""
+    omega, coupling = _omega(stepped), stepped.stiffness - np.diag(stepped.squares)
+    found = np.divide(coupling, omega, out=np.zeros_like(coupling), where=omega > 0)
+    return np.asarray(found + np.diag(np.sign(stepped.squares) * omega))
 
 
 def _swell(stepped: SteppedLevel, duration: float) -> float:
-    """How much |S z'| can grow in this time."""
-    lowest = float(np.min(np.diagonal(stepped.stiffness), initial=0.0))
-    return math.exp(math.sqrt(-lowest) * duration)
+    """How much |S z'| can grow in this time: exp(sigma t), sigma the largest eigenvalue of S A S^-1's symmetric part.
+
+    G. G. Dahlquist, Stability and error bounds in the numerical integration of ordinary differential equations, 1958.
+    """
+    upper, s = np.diag(_omega(stepped)) - _pulling(stepped).T, stepped.size
+    flow = np.block([[np.zeros((s, s)), upper], [upper.T, -stepped.own_damping - stepped.own_damping.T]]) / 2
+    return math.exp(max(float(np.linalg.eigvalsh(flow)[-1]), 0.0) * duration)
 
 
 def _energy_norm(stepped: SteppedLevel) -> np.ndarray:
@@ -253,10 +260,10 @@ def _energy_norm(stepped: SteppedLevel) -> np.ndarray:
 
 def _gains(stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, power: int) -> np.ndarray:
     """|[P R] A^power S^-1| of every row [P R] (2 s,), also where omega = 0; [P R] A = [-R K, P - R D]."""
-    damping, stiffness = stepped.own_damping, np.diagonal(stepped.stiffness)
+    damping, stiffness = stepped.own_damping, stepped.stiffness
     for _ in range(power - 1):
-        along, rate = -rate * stiffness, along - rate @ damping
-    return np.asarray(np.linalg.norm(np.hstack([-rate * _signed(stepped), along - rate @ damping]), axis=1))
+        along, rate = -rate @ stiffness, along - rate @ damping
+    return np.asarray(np.linalg.norm(np.hstack([-rate @ _pulling(stepped), along - rate @ damping]), axis=1))
 
 
 # ---------------------------------------------------------------------- under loads that vary

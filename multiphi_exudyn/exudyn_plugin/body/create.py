@@ -77,7 +77,6 @@ def CreateMultiPhiBody(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
-    model.need_smooth_contacts("model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
     rows = interface_rows(model.structure, interface)
@@ -88,7 +87,7 @@ def CreateMultiPhiBody(
         PROVISIONAL,
         matchedStepSize,
     )
-    moving = [contact for contact in model.contacts if contact.velocity]
+    moving = [link for link in model.links if link.velocity]
     if rows and moving:
         name, speed = moving[0].name, moving[0].velocity
         raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")

@@ -137,7 +137,7 @@ def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.nda
     time = np.array([mbs.systemData.GetTime(shown)])
     none = np.zeros((body.coordinates.points, 1))  # forces on points are not drawn
     moved, *_ = rebuilt(body, rows, data[None, :], time, np.concatenate(stored)[None, :], none)
-    return moved[:, 0], body.coordinates.layout.states(data) == 1
+    return moved[:, 0], body.coordinates.layout.states(data) > 0
 
 
 def _bars(line: np.ndarray, radius: float) -> list[dict[str, Any]]:

@@ -202,7 +202,7 @@ def _check_driven(body: BodyInStep, around: Surroundings, x: np.ndarray) -> None
     for i in around.inertia.held - set(loaded.level.indices):
         terms = np.append(loaded.level.gap_rows[i] * xi, loaded.gap_constants[i])
         if np.sum(terms) < -DRIVEN * np.sum(np.abs(terms)):
-            name = body.model.contacts[i].name
+            name = body.model.links[i].name
             raise NumericalFailure(f"body {body.name!r}: what is tied to it drives contact {name!r} into its stop")
 
 

@@ -106,12 +106,13 @@ class OwnLoads:
         return plain_conditions(stepped, rows, step, carried)
 
     def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:
-        """Phases of a state that was entered with others: who has risen since is armed again."""
+        """Phases of a state that was entered with others: who has risen since is armed again, or still lands."""
         level, r, drive = self.loaded.level(state.states), state.level.modal.modes, self.excitation.drive(time)
         given = (state.displacement, drive.values[0]), (state.velocity, drive.values[1]), (state.reach, drive.sizes[0])
         xi, xi_t, reach = (np.concatenate([x[:r], w, x[r:]]) for x, w in given)
         signs = (row.sign(xi, xi_t, reach) for row in signal_rows(level))
-        return tuple(Phase.ARMED if sign > 0 else phase for sign, phase in zip(signs, state.phases, strict=True))
+        standing = zip(signs, state.phases, strict=True)
+        return tuple(phase if sign <= 0 or phase is Phase.LANDING else Phase.ARMED for sign, phase in standing)
 
     def _forces(self, states: tuple[int, ...], values: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) of w, w' (k, 2, q) in a level."""

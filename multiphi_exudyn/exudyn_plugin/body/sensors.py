@@ -2,7 +2,7 @@
 
     x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (level.py), and L f
 
-and of elements with held places T = -lambda, less what they push, and how far their patches have gone.
+and of friction T and the places of its patches (time/friction_rows.py).
 
 Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing
 during a run.
@@ -20,10 +20,11 @@ import numpy as np
 from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.exits import state_of
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
+from multiphi_exudyn.time.friction_rows import force_row, patch_row, pressing_row
 
 __all__ = ["BodyHistories", "add_sensors", "body_histories", "rebuilt"]
 
@@ -40,8 +41,8 @@ class BodyHistories:
 
     time (k,) [s]; points: name -> displacement (k,) [m]; velocities: name -> (k,) [m/s]; gaps: contact -> (k,) [m];
     contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> [(closed at, opened at), ...] [s];
-    closed: contact -> (k,) bool; friction_force: friction -> T (k,) [N]; slip: friction -> (k,) [m];
-    stick_intervals: friction -> (m, 2) [s]; events and warnings as in a Trajectory.
+    closed: contact -> (k,) bool; friction_force: T (k,) [N], slip: (k,) [m], stick_intervals: (m, 2) [s], by the names
+    of frictions and of contacts that have friction; events and warnings as in a Trajectory.
     """
 
     time: np.ndarray
@@ -95,21 +96,22 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in RECORDED])
     values = rebuilt(body, rows, data, time, stored, np.reshape(on_points, (len(on_points), len(time))))
-    moved, rates, gaps, forces, patches = values
-    contacts = {c.name: i for i, c in enumerate(body.model.contacts) if not c.held}
-    frictions = {c.name: i for i, c in enumerate(body.model.contacts) if c.held}
+    moved, rates, gaps, forces, tensions, patches = values
+    model = body.model
+    contacts = {c.name: i for i, c in enumerate(model.contacts) if not c.held}
+    frictions = {model.contacts[i].name: i for i in model.rubbing}
     return BodyHistories(
         time=time,
         points=dict(zip(names, moved, strict=True)),
         velocities=dict(zip(names, rates, strict=True)),
         gaps={name: gaps[i] for name, i in contacts.items()},
         contact_force={name: forces[i] for name, i in contacts.items()},
-        contact_intervals={name: _intervals(body, i, data, time) for name, i in contacts.items()},
-        closed={name: _holds(body, i, data) for name, i in contacts.items()},
-        friction_force={name: -forces[i] for name, i in frictions.items()},
+        contact_intervals={name: _intervals(body, i, data, time, held=False) for name, i in contacts.items()},
+        closed={name: _holds(body, i, data, held=False) for name, i in contacts.items()},
+        friction_force={name: tensions[i] for name, i in frictions.items()},
         slip={name: patches[i] - patches[i, 0] for name, i in frictions.items()},
         stick_intervals={
-            name: np.array(_intervals(body, i, data, time)).reshape(-1, 2) for name, i in frictions.items()
+            name: np.array(_intervals(body, i, data, time, held=True)).reshape(-1, 2) for name, i in frictions.items()
         },
         events=tuple(body.events),
         warnings=body.warnings,
@@ -130,16 +132,15 @@ def rebuilt(
     time: np.ndarray,
     stored: np.ndarray,
     on_points: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Displacements and velocities of points, gaps, forces along +h and patches of elements, each (.., k).
+) -> tuple[np.ndarray, ...]:
+    """Displacements and velocities of points, gaps, lambda, T and patches of elements, each (.., k).
 
-    data: of the levels (k, width), one after the other of which they are rebuilt. on_points: f (m, k). A patch is where
-    an element with a held place touches: that place while the link holds, and while it slips what it would be.
+    data: of the levels (k, width), one after the other of which they are rebuilt. on_points: f (m, k).
     """
     layout, elements = body.coordinates.layout, body.model.contacts
     k, all_states = len(stored), layout.states(data)
     moved, velocities = np.zeros((2, len(rows), k))
-    gaps, forces, patches = np.zeros((3, len(elements), k))
+    gaps, forces, tensions, patches = np.zeros((4, len(elements), k))
     in_base = rows @ body.model.base.modes.shapes
     for states in np.unique(all_states, axis=0):
         here = np.flatnonzero(np.all(all_states == states, axis=1))
@@ -150,31 +151,46 @@ def rebuilt(
         own, rest = loaded.level, loaded.asymptotic
         moved[:, here] = in_base @ (own.vectors @ xi + rest.configuration[:, None])
         velocities[:, here] = in_base @ own.vectors @ xi_t
-        gaps[:, here] = own.gap_rows @ xi + loaded.gap_constants[:, None]
-        pushed = own.force_rows @ xi + own.force_rate_rows @ xi_t + rest.forces[:, None]
-        pushed += body.coordinates.direct(stepped) @ on_points[:, here]
-        forces[np.array(own.indices, dtype=int)[:, None], here] = pushed
-        for i, state in enumerate(state_of(loaded, i) for i in range(len(elements))):
-            forces[i, here] += state.push
-            patches[i, here] = 0.0 if state.holds else gaps[i, here] - state.stretch
-        patches[list(body.model.held), here[:, None]] += held.T
-    return moved, velocities, gaps, forces, patches
+        gaps[:, here] = (own.gap_rows @ xi + loaded.gap_constants[:, None])[: len(elements)]
+        state, direct = np.vstack([xi, xi_t, np.ones(len(here))]), body.coordinates.direct(stepped) @ on_points[:, here]
+        for i in range(len(elements)):
+            forces[i, here] = pressing_row(loaded, i) @ state + _carried(loaded, i, direct, held=False)
+        for i in body.model.rubbing:
+            tensions[i, here] = force_row(loaded, i) @ state - _carried(loaded, i, direct, held=True)
+            patches[i, here] = patch_row(loaded, i) @ state
+    return moved, velocities, gaps, forces, tensions, patches
 
 
-def _holds(body: MultiPhiBody, element: int, data: np.ndarray) -> np.ndarray:
-    """When (k,) the link of an element holds."""
-    holds = np.array([bool(state.holds) for state in body.model.contacts[element].states])
-    return np.asarray(holds[body.coordinates.layout.states(data)[:, element]])
+def _carried(level: LoadedLevel, element: int, direct: np.ndarray, held: bool) -> np.ndarray:
+    """What the links of an element with or without held places carry of L f (k, ..), summed."""
+    base, indices = level.level.base, level.level.indices
+    own = [k for k, link in enumerate(indices) if link in base.link_places[element] and base.links[link].held == held]
+    return np.asarray(np.sum(direct[own], axis=0))
 
 
-def _intervals(body: MultiPhiBody, element: int, data: np.ndarray, time: np.ndarray) -> list[tuple[float, float]]:
-    """[(from, to), ...] [s] in which the link of an element holds, from events; instants are left out."""
+def _holding(body: MultiPhiBody, element: int, held: bool) -> np.ndarray:
+    """In which of an element's states (n,) a link holds that has a held place, or one that has none."""
+    contact = body.model.contacts[element]
+    links = (contact, *contact.further)
+    return np.array([any(links[k].held == held for k in state.holds) for state in contact.states])
+
+
+def _holds(body: MultiPhiBody, element: int, data: np.ndarray, held: bool) -> np.ndarray:
+    """When (k,) such a link of an element holds."""
+    return np.asarray(_holding(body, element, held)[body.coordinates.layout.states(data)[:, element]])
+
+
+def _intervals(
+    body: MultiPhiBody, element: int, data: np.ndarray, time: np.ndarray, held: bool
+) -> list[tuple[float, float]]:
+    """[(from, to), ...] [s] in which such a link of an element holds, from events; instants are left out."""
     contact, end = body.model.contacts[element], float(time[-1])
-    holding = {state.event for state in contact.states if state.holds}
-    changes = [(e.time, e.kind in holding) for e in body.events if e.contact == contact.name]
-    changes = [(float(time[0]), bool(_holds(body, element, data)[0])), *changes, (end, False)]
+    holds = dict(zip((state.name for state in contact.states), _holding(body, element, held).tolist(), strict=True))
+    changes = [(e.time, holds[e.state]) for e in body.events if e.contact == contact.name]
+    changes = [(float(time[0]), bool(_holds(body, element, data, held)[0])), *changes, (end, False)]
     found = list[tuple[float, float]]()
-    for (start, holds), (until, _) in itertools.pairwise(changes):
-        if holds and until > start:
-            found.append((start, until))
+    for (start, closed), (until, _) in itertools.pairwise(changes):
+        if closed and until > start:
+            joins = bool(found) and found[-1][1] == start
+            found[-1:] = [(found[-1][0], until)] if joins else [*found[-1:], (start, until)]
     return found

@@ -121,7 +121,8 @@ class Surroundings:
             return self
         own, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
         x, v = state.displacement, state.velocity
-        eta_tt = state.level.alone.asymptotic.drive + force[:r] - own.damping @ v[:r] - own.squares * x[:r]
+        eta_tt = state.level.alone.asymptotic.drive + force[:r]
+        eta_tt -= own.damping_matrix @ v[:r] + own.squares * x[:r] + own.coupling @ x[:r]
         reactions = _reactions_of(self.body, self.hanging, state.level, (x, v, eta_tt), force[s:])
         return replace(self, reactions=reactions)
 
@@ -174,7 +175,15 @@ def _reactions_of(
     carried = loaded.asymptotic.forces + here.direct(body.stepped_level(loaded.states)) @ points
     pushed = carried + level.force_rows @ x + level.force_rate_rows @ v
     rows = here.interface.in_base(level.base)
-    return Reactions(hanging.attached, level.base, rows, loaded.modal.vectors @ eta_tt, loaded, pushed)
+    acceleration = loaded.modal.vectors @ eta_tt
+    return Reactions(hanging.attached, level.base, rows, acceleration, loaded, pushed, _pressures(loaded, x, v))
+
+
+def _pressures(loaded: LoadedLevel, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """-k q - c q' (l,) [N] of all links with a finite stiffness, whether they hold or not."""
+    base, own = loaded.level.base, loaded.level
+    springs = np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)
+    return np.asarray(-springs * (own.gap_rows @ x + loaded.gap_constants) - base.dampings * (own.gap_rows @ v))
 
 
 def _inertia(body: BodyAmongOthers, hanging: Hanging) -> PointInertia | None:

@@ -84,8 +84,9 @@ class AttachedInertia:
 class Reactions:
     """Forces on the points of a body that follow from those of its elements at one instant.
 
-    These are the reactions of rigid links, and what elements push. rows: R (m, b) of the points in base coordinates.
-    acceleration: y'' (b,) of the body in ``level``, where links hold with the forces ``reactions`` (k,) [N].
+    These are the reactions of rigid links, what elements push, and friction that goes with pressures (c,) [N].
+    rows: R (m, b) of the points in base coordinates. acceleration: y'' (b,) of the body in ``level``, where links hold
+    with the forces ``reactions`` (k,) [N].
     """
 
     def __init__(
@@ -96,8 +97,9 @@ class Reactions:
         acceleration: np.ndarray,
         level: LoadedLevel,
         reactions: np.ndarray,
+        pressures: np.ndarray,
     ) -> None:
-        self._attached, self._base, self._rows = attached, base, rows
+        self._attached, self._base, self._rows, self._pressures = attached, base, rows, pressures
         directions, answers = self._answers(level)
         pushed = reactions[np.isinf(base.stiffnesses[list(level.level.indices)])]
         push, answer = self._push(level)
@@ -122,7 +124,10 @@ class Reactions:
 
     def _push(self, level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
         """What elements push (b,), and the forces (m,) that follow."""
-        push = level.alone.excitation.static - level.excitation.static
+        push, base = level.alone.excitation.static - level.excitation.static, self._base
+        for i in level.rubbing_elements:
+            link = next(k for k in base.link_places[i] if k in base.oblique and k in level.level.indices)
+            push = push + (base.pushes[:, link] - base.directions[:, link]) * self._pressures[i]
         return push, self._attached.reactions(self._rows, push)
 
 
@@ -172,6 +177,6 @@ class PointInertia:
 
 
 def _striking(base: ModalBase) -> np.ndarray:
-    """Positions of the elements that are struck where their links begin to hold."""
-    held = np.array([contact.held for contact in base.contacts], bool)
+    """Positions of the links that are struck where their links begin to hold."""
+    held = np.array([link.held for link in base.links], bool)
     return np.flatnonzero(np.isinf(base.stiffnesses) & ~held)

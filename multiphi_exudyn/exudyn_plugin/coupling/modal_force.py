@@ -2,7 +2,9 @@
 
 A force p on the coordinates eta of a level only moves the centre of their motion,
 
-    eta'' + D eta' + diag(omega^2) (eta - d) = drive + p_0,   d = omega^-2 p,   p_0 the part on zero-frequency modes
+    eta'' + D eta' + S (eta - d) = drive + p_0,   d = S^-1 p,   S = diag(omega^2) and what friction couples (sliding.py)
+
+with S^-1 on the modes that have a frequency and p_0 = (1 - S S^-1) p what acts on the others,
 
 so a level under p is the same level with other constants, those of signals, gaps, energies and maps, and the event rule
 holds unchanged. Coordinates of such a level are eta - d. A force on coordinate k acts on mode k of whichever level
@@ -19,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.exits import after, exits_of, force_shares, way_back
+from multiphi_exudyn.events.exits import after, asked_alone, exits_of, force_shares, way_back
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
@@ -29,8 +31,22 @@ __all__ = ["Acting", "HeldForces", "Inertia", "shift"]
 
 def shift(level: Level, force: np.ndarray) -> np.ndarray:
     """d (r,) of a modal force (s,), s >= r."""
-    centre = np.zeros(level.modes)
-    return np.divide(force[: level.modes], level.squares, out=centre, where=level.squares != 0)
+    return np.asarray(_yielding(level) @ force[: level.modes])
+
+
+def _yielding(level: Level) -> np.ndarray:
+    """S^-1 (r, r), zero on modes without a frequency."""
+    elastic, inverse = np.flatnonzero(level.squares), np.zeros((level.modes, level.modes))
+    place = np.ix_(elastic, elastic)
+    inverse[place] = np.linalg.inv(np.diag(level.squares[elastic]) + level.coupling[place])
+    return inverse
+
+
+def _beside(level: Level, inverse: np.ndarray) -> np.ndarray:
+    """1 - S S^-1 (r, r), zero on modes with a frequency."""
+    left = np.eye(level.modes) - level.coupling @ inverse
+    left[level.squares != 0] = 0.0
+    return left
 
 
 @dataclass(frozen=True)
@@ -64,7 +80,7 @@ class Inertia(Protocol):
 class _Level:
     """Constants of a level, and how forces change them: numbers[places] = constants + gains . (p, reactions).
 
-    inverse: omega^-2 (r,), zero where omega is. linear, squares: of its energy without forces, whose constant stands at
+    inverse: S^-1 (r, r). linear, squares: of its energy without forces, whose constant stands at
     ``energy``. exits: their records; elements: theirs. ends: what is looked at; mobility: where F has its place.
     """
 
@@ -130,7 +146,7 @@ class HeldForces:
         known = self._known(level)
         ints, numbers, acting = self.arrays.ints, self.arrays.numbers, self._acting(known.states)
         force = acting.force[: len(known.inverse)]
-        d = self._shifts[level] = known.inverse * force
+        d = self._shifts[level] = known.inverse @ force
         numbers[known.places] = known.constants + known.gains.dot(np.concatenate([force, acting.reactions]))
         numbers[known.energy] = known.potential + known.linear.dot(d) + 0.5 * known.squares.dot(d * d)
         for exit_ in known.exits:
@@ -168,7 +184,8 @@ class HeldForces:
         """Give the signal of a contact in the level entered alone its constant."""
         ints, numbers, n, r = self.arrays.ints, self.arrays.numbers, self._width(level), len(self._shifts[level])
         loaded, row = self.arrays.loaded[int(ints[level + a.NUMBER])], int(ints[ints[exit_ + a.ENTERED] + a.ROW])
-        element, taken = exits_of(loaded)[(exit_ - int(ints[level + a.EXITS])) // a.EXIT_INTS]
+        element, exit_taken = exits_of(loaded)[(exit_ - int(ints[level + a.EXITS])) // a.EXIT_INTS]
+        taken = asked_alone(exit_taken)
         back = way_back(loaded, element, taken)
         plain = self._entered.setdefault(exit_, float(numbers[row + 2 * n]))
         numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
@@ -189,10 +206,8 @@ class HeldForces:
     def _read(self, level: int) -> _Level:
         arrays = self.arrays
         loaded, n, r = arrays.loaded[int(arrays.ints[level + a.NUMBER])], self._width(level), self._modes(level)
-        own, ways = loaded.level, exits_of(loaded)
-        squares = own.squares[:r]
-        inverse = np.divide(1.0, squares, out=np.zeros(r), where=squares != 0)
-        beside = np.diag((squares == 0).astype(float))
+        own, ways, inverse = loaded.level, exits_of(loaded), _yielding(loaded.modal)
+        beside = _beside(loaded.modal, inverse)
         if np.any(beside) and arrays.ints[level + a.FORCE] < 0:
             place = arrays.buffers.take("numbers", r)
             arrays.ints[level + a.FORCE] = place
@@ -201,15 +216,17 @@ class HeldForces:
         exits = ints[level + a.EXITS] + a.EXIT_INTS * np.arange(ints[level + a.EXIT_COUNT])
         rows, energy = ints[exits + a.SIGNAL + a.ROW], int(ints[level + a.POTENTIAL])
         forms = numbers[energy + 1 + n + r :][: (n - r) * n].reshape(n - r, n)
+        follows = numbers[ints[level + a.FOLLOWS] :][: ints[level + a.FOLLOW_COUNT] * (n + 1)].reshape(-1, n + 1)
         gaps, patterns, channels = len(own.gap_rows), self._patterns(level), np.arange(n - r)
         parts = [
             (ints[level + a.MOTION] + 2 * n + (2 * n + 1) * np.arange(r), beside),
-            (ints[level + a.GAPS] + n + (n + 1) * np.arange(gaps), own.gap_rows[:, :r] * inverse),
-            (energy + 1 + np.arange(r), np.diag(numbers[energy + 1 + n :][:r] * inverse)),
-            (energy + 1 + r + channels, forms[:, :r] * inverse),
-            (ints[level + a.PATTERNS] + n + (n + 1) * channels, patterns * inverse),
+            (ints[level + a.GAPS] + n + (n + 1) * np.arange(gaps), own.gap_rows[:, :r] @ inverse),
+            (energy + 1 + np.arange(r), numbers[energy + 1 + n :][:r, None] * inverse),
+            (energy + 1 + r + channels, forms[:, :r] @ inverse),
+            (ints[level + a.PATTERNS] + n + (n + 1) * channels, patterns @ inverse),
             (ints[level + a.FORCE] + np.arange(r if ints[level + a.FORCE] >= 0 else 0), beside),
-            (rows + 2 * n, numbers[rows[:, None] + np.arange(r)] * inverse),
+            (ints[level + a.FOLLOWS] + n + (n + 1) * np.arange(len(follows)), follows[:, :r] @ inverse),
+            (rows + 2 * n, numbers[rows[:, None] + np.arange(r)] @ inverse),
         ]
         places = np.concatenate([at for at, _ in parts])
         gains = np.zeros((len(places), r + len(own.indices)))

@@ -2,7 +2,8 @@
 
     M q'' + D q' + K q = p + drive,   q = eta, padded to the body's size with coordinates that stay zero
 
-Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in either.
+Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in either. Where contacts
+slide friction adds its own to D and K, which are then not symmetric (levels/sliding.py).
 
 Matched to the step h: the trapezoidal rule turns exp(h s) into (1 + h s/2) / (1 - h s/2), so it is exact for
 z = (eta, eta') if it is given, instead of z' = A z + B p,
@@ -35,7 +36,8 @@ class SteppedLevel:
     """See the module's docstring. All matrices (s, s), s >= r the size of the body.
 
     Coordinates beyond the level's r modes are never excited; they have the frequency of its highest one.
-    loaded: the level. mass, damping, stiffness: for the solver. own_damping: Phi^T C Phi. drive: (s,).
+    loaded: the level. mass, damping, stiffness: for the solver. own_damping: D of the plain level. squares: omega^2
+    (s,). drive: (s,).
     from_displacement, from_velocity, from_force: Q, V, G. step: h [s], or None.
     """
 
@@ -45,6 +47,7 @@ class SteppedLevel:
     damping: np.ndarray
     stiffness: np.ndarray
     own_damping: np.ndarray
+    squares: np.ndarray
     drive: np.ndarray
     from_displacement: np.ndarray
     from_velocity: np.ndarray
@@ -56,12 +59,14 @@ class SteppedLevel:
         level = loaded.modal
         squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
-        damping[: level.modes, : level.modes] = level.damping
+        stiffness = np.diag(squares)
+        stiffness[: level.modes, : level.modes] += level.coupling
+        damping[: level.modes, : level.modes] = level.damping_matrix
         drive = np.zeros(size)
         drive[: level.modes] = loaded.asymptotic.drive
-        maps = _plain(damping) if step is None else _matched(squares, damping, step)
+        maps = _plain(damping) if step is None else _matched(squares, stiffness, damping, step)
         mass, stepped, q, v, g = maps
-        return cls(loaded, step, mass, stepped, np.diag(squares), damping, drive, q, v, g)
+        return cls(loaded, step, mass, stepped, stiffness, damping, squares, drive, q, v, g)
 
     @property
     def states(self) -> tuple[int, ...]:
@@ -145,18 +150,19 @@ def _plain(damping: np.ndarray) -> Maps:
     return identity, damping, none, identity, none
 
 
-def _matched(squares: np.ndarray, damping: np.ndarray, step: float) -> Maps:
+def _matched(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, step: float) -> Maps:
     omega = np.sqrt(np.abs(squares))
-    if np.max(omega) * step >= math.pi:
+    fastest = math.sqrt(np.max(np.abs(np.linalg.eigvals(stiffness))))
+    if fastest * step >= math.pi:
         raise MultiPhiValueError(
-            f"matchedStepSize: got {step:g} s, need less than {math.pi / np.max(omega):g} s, half the shortest "
+            f"matchedStepSize: got {step:g} s, need less than {math.pi / fastest:g} s, half the shortest "
             "period of the kept modes"
         )
     s, identity = len(squares), np.eye(len(squares))
     scale = np.where(omega > 0, omega, 1 / step)  # both halves of z alike
     system = np.zeros((3 * s, 3 * s))
     system[:s, s : 2 * s] = np.diag(scale)
-    system[s : 2 * s, :s] = -np.diag(squares / scale)
+    system[s : 2 * s, :s] = -stiffness / scale
     system[s : 2 * s, s : 2 * s] = -damping
     system[s : 2 * s, 2 * s :] = identity
     flow = scipy.linalg.expm(system * step)[: 2 * s]

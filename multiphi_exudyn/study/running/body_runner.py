@@ -92,6 +92,9 @@ def _ledger(bench: Workbench, recorded: BodyHistories) -> dict[str, float]:
     lost = {row: float(sum(getattr(event.loss, row) for event in recorded.events)) for row in rows}
     for friction in bench.mechanics.frictions:
         lost["friction"] += friction.limit * way(recorded.slip[friction.name])
+    for contact in bench.mechanics.contacts:
+        if contact.friction:
+            lost["friction"] += float(np.trapezoid(recorded.friction_force[contact.name], recorded.slip[contact.name]))
     return lost
 
 

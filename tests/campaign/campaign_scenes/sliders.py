@@ -177,9 +177,36 @@ def _free(random):
     return parts.scene(**_start(parts))
 
 
+def _redundant(random):
+    """Scenes of other kinds, blocks split in two or three of one direction: the motion is the same."""
+    scene = (_blocks, _loads, _impacts)[int(random.integers(3))](random)
+    contacts, blocks = [], [f for f in scene.model.contacts if isinstance(f, mp.Friction) and f.rigid]
+    for contact in scene.model.contacts:
+        if contact not in blocks or (contact is not blocks[0] and random.random() < 0.3):
+            contacts.append(contact)
+            continue
+        shares = random.dirichlet(np.full(int(random.integers(2, 4)), 2.0))
+        for k, share in enumerate(shares.tolist()):
+            lever = float(random.choice([1.0, -1.0, 0.5, 3.0]))
+            contacts.append(_part(contact, f"{contact.name}.{k}", share / abs(lever), lever))
+    return replace(scene, model=mp.MultiPhiModel(scene.model.structure, contacts, modes="all"))
+
+
+def _part(block, name, share, lever):
+    """A share of a block's limits along its direction times a number."""
+    return mp.Friction(
+        name,
+        lever * np.asarray(block.direction),
+        share * block.limit,
+        share * block.most,
+        velocity=lever * block.velocity,
+    )
+
+
 def _units(random):
     """A scene of another of these kinds, in units that are powers of two."""
-    scene = DRAWN[str(random.choice([kind for kind in DRAWN if kind != "friction units"]))](random)
+    kinds = [kind for kind in DRAWN if kind not in ("friction units", "friction redundant")]
+    scene = DRAWN[str(random.choice(kinds))](random)
     return replace(scene, units=tuple(int(k) for k in random.integers(-UNITS, UNITS + 1, 3)))
 
 
@@ -195,4 +222,5 @@ DRAWN = {
     "friction limits": _limits,
     "friction free": _free,
     "friction units": _units,
+    "friction redundant": _redundant,
 }
