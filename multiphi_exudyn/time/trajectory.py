@@ -9,7 +9,7 @@ a closed-form integral of eta'^T D eta') and what loads did; its residual is the
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -23,8 +23,10 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.time.base_share import row_warnings
 from multiphi_exudyn.time.friction_rows import force_row, patch_row, pressing_row
 from multiphi_exudyn.time.segment import Segment, Segments, listed
+from multiphi_exudyn.time.warning_groups import issue
 
 __all__ = ["Again", "Ledger", "Start", "Statistics", "Trajectory"]
 
@@ -144,6 +146,8 @@ class Trajectory:
 
     def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,)."""
+        if not isinstance(point, (str, Mapping)):
+            issue(row_warnings(self.model, self.model.structure.row(point)))
         row = self.model.base.modes.shapes.T @ self.model.structure.row(point)
 
         def function(level: LoadedLevel) -> np.ndarray:
