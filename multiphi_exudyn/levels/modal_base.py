@@ -3,8 +3,8 @@
     x = Phi y,   y = Phi^T M x
 
 Phi (n, m) are the open structure's own modes, so the mass is the identity and the stiffness diag(Omega^2). They are all
-of them where that is affordable, else the lowest ones and the static shapes of contacts and points. A set of closed
-contacts then adds
+of them where that is affordable, else the lowest ones and, orthogonal to them, what Krylov vectors of contacts and
+points leave (build_base.py). A set of closed contacts then adds
 
     closed rigid contacts      H_r^T y = -gap
     closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
@@ -18,23 +18,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
-from multiphi_exudyn.mathematics.modes import Modes, complete_modes, lowest_modes
+from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.element import AnyLink, Link, is_oblique, link_places, links_of
+from multiphi_exudyn.mechanics.element import AnyLink, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, LawSpring
-from multiphi_exudyn.mechanics.structure import LinearStructure
 
-__all__ = ["BASE_MARGIN", "ModalBase", "build_base", "direction_indices"]
+__all__ = ["ModalBase", "direction_indices"]
 
-BASE_MARGIN = 4  # modes of an incomplete base for each mode of a level taken from it
-COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and static shapes
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
 
@@ -46,6 +40,8 @@ class ModalBase(Shown):
     modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, l) of
     the l links; pushes: F (m, l), along which their forces act. contacts: elements (c,) as given, whose first links
     come first (element.py). complete: whether m = n. mass: M (n, n), the structure's own.
+    exact: how many of its modes, the lowest, are the structure's own. served: modes that levels may have at most.
+    further: rows (k, n) that it holds beside those of contacts and points. error: of omega^2 of sample levels.
     """
 
     modes: Modes
@@ -56,6 +52,10 @@ class ModalBase(Shown):
     contacts: tuple[Contact, ...]
     complete: bool
     mass: Matrix
+    exact: int
+    served: int
+    further: np.ndarray
+    error: float
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "coordinates", f"{self.modes.count} of {len(self.modes.shapes)}"
@@ -245,62 +245,7 @@ class ModalBase(Shown):
         return forces
 
 
-def build_base(structure: LinearStructure, contacts: Sequence[Contact], modes: int | str) -> ModalBase:
-    """The base of a structure: all its modes where that is affordable, else enough for ``modes`` of any level."""
-    links = links_of(contacts)
-    rows = np.array([structure.row(link.direction) for link in links]).reshape(-1, structure.n)
-    pushed = np.array([_pushed(structure, link) for link in links]).reshape(-1, structure.n)
-    points = structure.point_rows
-    complete = structure.n <= COMPLETE or modes == "all"
-    if complete:
-        found = complete_modes(_dense(structure.mass), _dense(structure.stiffness))
-    else:
-        count = min(structure.n - 2, BASE_MARGIN * int(modes) + 40)
-        distinct = rows[sorted(set(direction_indices(links)))]
-        found = lowest_modes(structure.mass, structure.stiffness, count, np.vstack([distinct, points]))
-    found = found.turned(points)
-    return ModalBase(
-        modes=found,
-        points=points @ found.shapes,
-        damping=_base_damping(structure, found),
-        directions=_seen(found, rows),
-        pushes=_seen(found, pushed),
-        contacts=tuple(contacts),
-        complete=complete,
-        mass=structure.mass,
-    )
-
-
 def direction_indices(links: Sequence[AnyLink]) -> list[int]:
     """For every link itself, or its law's first spring, which has the same direction up to its sign."""
     first: dict[ForceLaw, int] = {}
     return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(links)]
-
-
-def _pushed(structure: LinearStructure, link: AnyLink) -> np.ndarray:
-    """The row (n,) along which a link's force acts."""
-    if isinstance(link, Link) and link.push:
-        return np.sum([share * structure.row(at) for share, at in link.push], axis=0)
-    return structure.row(link.direction)
-
-
-def _seen(modes: Modes, rows: np.ndarray) -> np.ndarray:
-    """Rows (l, n) in base coordinates (m, l), zero where that is round-off."""
-    return drop_round_off(modes.shapes.T @ rows.T, np.abs(modes.shapes.T) @ np.abs(rows.T))
-
-
-def _dense(matrix: Matrix) -> np.ndarray:
-    return matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
-
-
-def _base_damping(structure: LinearStructure, modes: Modes) -> np.ndarray:
-    """Phi^T C Phi (m, m)."""
-    given = structure.damping
-    if given is None:
-        return np.zeros((modes.count, modes.count))
-    if isinstance(given, ModalDamping):
-        return np.diag(2 * given.of(modes.count) * modes.omega)
-    if isinstance(given, RayleighDamping):
-        return np.diag(given.alpha + given.beta * modes.omega**2)
-    projected = modes.shapes.T @ (given @ modes.shapes)
-    return (projected + projected.T) / 2

@@ -14,7 +14,7 @@ in the level l that every compliant contact makes alone, for a force law in that
 in the open level for every named point, rigid-body modes left out. A closed rigid contact does not move, so nothing is
 said of it by a static response: with one r is at least RIGID. Friction on a spring is a compliant contact that sticks,
 and with RIGID modes it has enough as well: its force keeps below its limit. Where the base does not hold all modes it
-is that of FIRST modes; contacts, not points, may ask for a larger one.
+is that of FIRST modes; contacts, not points, may ask for twice as many, until it serves them.
 """
 
 from __future__ import annotations
@@ -38,8 +38,7 @@ __all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "Tolerance", "UpTo", "chos
 SMALL = 30  # degrees of freedom up to which all modes are kept: they cost less than a choice
 FEWEST = 6  # modes: a start or a load may move what no contact and no point tells of
 RIGID = 12  # modes beside a rigid stop, where the error of the rig's displacements is 1 % and hardly falls with more
-FIRST = 12  # modes that an incomplete base is built for before more are known to be needed
-SERVED = 22  # modes that a base of FIRST modes serves: BASE_MARGIN of its own for each
+FIRST = 22  # modes that an incomplete base is built for before more are known to be needed
 MOST = 60  # modes: levels beyond it take longer than most models are worth
 CONTACT_SHARE = 0.1  # of a closed level's flexibility at its contact: peak forces of the rig are right to 1 % below it
 POINT_SHARE = 0.01  # of the open level's flexibility at a point
@@ -80,7 +79,7 @@ def chosen_modes(
     chains: Sequence[Sequence[int]],
     level: Callable[[tuple[int, ...], int], Level],
 ) -> int:
-    """The number of modes r for ``None``; see the module's docstring.
+    """The number of modes r for ``None``; see the module's docstring. More than the base serves: to choose anew there.
 
     chains: positions of every force law's springs on either side, from its centre outward. level: of closed contacts by
     their positions, with its lowest so many modes at least or all that it has.
@@ -90,11 +89,13 @@ def chosen_modes(
         count = max(count, RIGID)
     rows = np.array([structure.row(name) for name in structure.points]).reshape(-1, structure.n)
     of_points = _of_points(base, rows @ base.modes.shapes)
-    count = max(count, of_points if base.complete else min(of_points, SERVED))
-    most = min(MOST, base.modes.count)
+    count = max(count, of_points if base.complete else min(of_points, FIRST))
+    most = min(MOST, base.served)
     for closed in _alone(base, chains):
         bound = most if not base.contacts[closed[0]].held else min(most, max(count, RIGID))
         count = count if count >= bound else _of_contact(level, closed, count, bound)
+        if bound == count == base.served and not base.complete and not _held(level(closed, count).truncated(count)):
+            return min(2 * count, MOST)
     return min(count, most)
 
 

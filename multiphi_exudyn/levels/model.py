@@ -5,20 +5,22 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.build_base import build_base
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
-from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base, direction_indices
+from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.lowest_modes import left_out
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
@@ -62,6 +64,7 @@ class MultiPhiModel(Shown):
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
     )
     _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
+    _wider: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
@@ -83,28 +86,31 @@ class MultiPhiModel(Shown):
     @functools.cached_property
     def base(self) -> ModalBase:
         """Coordinates common to all levels, built on first use."""
-        base = self._shared_base()
-        if self.modes is None and not self._serves(base, self.most_modes):
-            object.__setattr__(self, "_shared", {**self._unbuilt, "chosen": self.most_modes})
-            base = self._shared_base()
-        return base
+        _ = self._chosen if self.modes is None else None  # it may need a larger one
+        return self._shared_base()
 
     def _shared_base(self) -> ModalBase:
         """The base of all models that share levels with this one."""
         if "base" not in self._shared:
-            given = self._shared.get("chosen", FIRST) if self.modes is None else self.most_modes
-            self._shared["base"] = build_base(self.structure, self.contacts, given or "all")
+            given = self._shared.get("first", FIRST) if self.modes is None else self.most_modes
+            less, further = self._shared.pop("less", None), self._shared.get("further")
+            self._shared["base"] = build_base(self.structure, self.contacts, given or "all", less, further)
         base: ModalBase = self._shared["base"]
         return base
 
     @property
     def _unbuilt(self) -> dict[str, Any]:
-        return {"structure": self.structure, "contacts": self.contacts}
+        """What is shared where levels begin anew: modes that are known of the same structure, and rows of loads."""
+        known = {"structure": self.structure, "contacts": self.contacts}
+        if self._shared.get("structure") is not self.structure:
+            return known
+        less = self._shared.get("base", self._shared.get("less"))
+        return {**known, "less": less, "further": self._shared.get("further")}
 
     @staticmethod
     def _serves(base: ModalBase, modes: int | None) -> bool:
         """Whether levels with so many modes may be taken from a base."""
-        return base.complete or (modes is not None and BASE_MARGIN * modes <= base.modes.count)
+        return base.complete or (modes is not None and modes <= base.served)
 
     @functools.cached_property
     def force_laws(self) -> tuple[ForceLaw, ...]:
@@ -193,9 +199,13 @@ class MultiPhiModel(Shown):
         """The number of modes where none was given."""
         if self.structure.n <= SMALL:
             return None
-        if "chosen" not in self._shared:
-            given = self.structure, self._shared_base(), self.chains, self._with_modes
-            self._shared["chosen"] = chosen_modes(*given)
+        while "chosen" not in self._shared:
+            base = self._shared_base()
+            found = chosen_modes(self.structure, base, self.chains, self._with_modes)
+            if self._serves(base, found):
+                self._shared["chosen"] = found
+            else:
+                object.__setattr__(self, "_shared", {**self._unbuilt, "first": found})
         chosen: int = self._shared["chosen"]
         return chosen
 
@@ -212,6 +222,38 @@ class MultiPhiModel(Shown):
     def decide(self, chosen: MultiPhiModel) -> None:
         """Keep what the first run of a model with a Tolerance has decided on."""
         self._decisions[:] = [chosen]
+
+    def holding(self, rows: np.ndarray) -> MultiPhiModel:
+        """The model whose base holds these rows (k, n) of loads too: itself, or one that it keeps for later runs."""
+        base = self.base
+        if base.complete:
+            return self
+        known = np.vstack([base.further, *(self.structure.row(link.direction) for link in self.links)])
+        new = [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
+        if not new:
+            return self
+        for wider in self._wider:
+            if wider.holding(rows) is wider:
+                return wider
+        wider = replace(self)
+        shared = {**self._unbuilt, "further": np.vstack([base.further, *new]), "first": self.base.served}
+        object.__setattr__(wider, "_shared", shared)
+        self._wider.append(wider)
+        return wider
+
+    def widened_to(self, other: MultiPhiModel) -> bool:
+        """Whether another model is this one, but for rows of loads that its base holds."""
+        return any(other is (wider.decided or wider) or wider.widened_to(other) for wider in self._wider)
+
+    def outside(self, row: np.ndarray) -> float:
+        """Share of the static flexibility at a row (n,) that the base does not hold."""
+        if self.base.complete:
+            return 0.0
+        shares: dict[bytes, float] = self._shared.setdefault("outside", {})
+        if row.tobytes() not in shares:
+            given = self.structure.mass, self.structure.stiffness, self.base.modes
+            shares[row.tobytes()] = float(left_out(*given, row[None, :])[0])
+        return shares[row.tobytes()]
 
     @property
     def levels_built(self) -> int:

@@ -205,7 +205,8 @@ def _read(function: FunctionType, library: _Library) -> Any:
     """Put a function in a library as numba calls it; numba's description of it."""
     called = {name: _external(callee) for name, callee in callees(function).items()}
     alone = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
-    kinds, flags = _types(function), Flags()
+    kinds = _types(function)
+    flags: Any = Flags()
     flags.error_model = "numpy"
     flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
     contexts = _known_types(), cpu_target.target_context

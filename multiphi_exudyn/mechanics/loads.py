@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -46,6 +46,7 @@ __all__ = [
     "StopMotion",
     "SweepLoad",
     "VaryingLoad",
+    "patterns",
     "unchanging",
 ]
 
@@ -203,6 +204,17 @@ class BaseMotion:
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
         _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
+
+
+def patterns(structure: LinearStructure, loads: Any) -> np.ndarray:
+    """Rows (k, n) of loads that act elsewhere than at points of the structure: given as a row, or on all its mass."""
+    found = [np.zeros((0, structure.n))]
+    for load in loads if isinstance(loads, (tuple, list)) else ():
+        if isinstance(load, (Gravity, BaseMotion)):
+            found.append((structure.mass @ structure.row(load.direction))[None, :])
+        elif isinstance(load, (ConstantLoad, VaryingLoad)) and not isinstance(load.at, (str, Mapping)):
+            found.append(structure.row(load.at)[None, :])
+    return np.vstack(found)
 
 
 def unchanging(loads: Any) -> tuple[Any, ...] | None:

@@ -11,6 +11,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "damping ratios: ..."     ratios that look like per cent
     "linear range: ..."       what the model's own validity check says
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
+    "base: ..."               what the base of a large structure does not hold (base_share.py)
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
 
 The thresholds are calibrated on random truncated models judged by the same with all modes:

@@ -24,7 +24,8 @@ from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import Load, unchanging
+from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
+from multiphi_exudyn.time.base_share import base_warnings
 from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.refinement import to_tolerance
@@ -61,6 +62,7 @@ def simulate(
     installed and None is given; the answer is the same to round-off.
     The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
     model, and of every later run of the same model.
+    Of a structure whose base does not hold all modes the trajectory's model has a base that holds the loads as well.
     The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
     that is ok says where the tolerance of a smooth load could not be reached. What else to distrust is in its warnings,
     each of which is issued as a MultiPhiWarning too.
@@ -70,12 +72,21 @@ def simulate(
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
+    model = _holding(model, loads, start)
     run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
     trajectory = run.trajectory()
     tolerance = model.modes if isinstance(model.modes, Tolerance) else None
-    found = warnings_of(trajectory, tolerance)
+    outside = base_warnings(trajectory.model, displacement=run.displacement, velocity=run.velocity)
+    found = (*warnings_of(trajectory, tolerance), *outside)
     issue(found)
     return replace(trajectory, warnings=found) if found else trajectory
+
+
+def _holding(model: MultiPhiModel, loads: Sequence[Load], start: Trajectory | Equilibrium | None) -> MultiPhiModel:
+    """The model whose base holds what the loads act on; a run that goes on keeps that of its start."""
+    if isinstance(start, Trajectory):
+        return start.model if model.widened_to(start.model) else model
+    return model.holding(patterns(model.structure, loads))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -28,10 +28,12 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.balance import Ledger, Statistics
+from multiphi_exudyn.time.base_share import row_warnings
 from multiphi_exudyn.time.histories import INSTANTS, Histories
 from multiphi_exudyn.time.level_rows import force_row, gap_row, patch_row, point_row, pressing_row
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segment import Segment
+from multiphi_exudyn.time.warning_groups import issue
 
 __all__ = ["Again", "Start", "Trajectory"]
 
@@ -224,6 +226,8 @@ class Trajectory(Histories):
 
     def _row(self, question: str, name: At) -> Callable[[LoadedLevel], np.ndarray]:
         if question == "at":
+            if not isinstance(name, (str, Mapping)):
+                issue(row_warnings(self.model, self.model.structure.row(name)))
             return functools.partial(point_row, self.model.base.modes.shapes.T @ self.model.structure.row(name))
         row = ROWS[question]
         place = self._friction if question in ("friction_force", "slip") else self._contact

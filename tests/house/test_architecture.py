@@ -31,6 +31,7 @@ HEAVY = {
     "numba": COMPILERS,
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
+    "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compilation",

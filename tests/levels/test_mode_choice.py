@@ -89,11 +89,11 @@ class TestDefault:
         monkeypatch.setattr(model_module, "build_base", lambda *given: built.append(given[2]) or build(*given))
         soft = mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1e-3)])
         assert soft.level(("stop",)).modes == soft.most_modes <= 22
-        assert built == [12]
+        assert built == [22]
         stiff = mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1.0)])
         x = stiff.static_equilibrium({"m": -1.0})
         assert stiff.level(("stop",)).modes == 60
-        assert built == [12, 12, 60]
+        assert built == [22, 22, 44, 60]
         assert x == pytest.approx(
             mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1.0)], 6).static_equilibrium({"m": -1})
         )
@@ -140,11 +140,11 @@ class TestTolerance:
         assert mp.simulate(model, 1.0, velocity=np.ones(2)).status == "failed"
         assert model.decided is None
 
-    def test_its_base_begins_as_that_of_twelve_and_is_extended_once(self, monkeypatch):
+    def test_its_base_is_extended_to_twice_as_many_modes_when_they_are_needed(self, monkeypatch):
         built = []
         build = model_module.build_base
         monkeypatch.setattr(model_module, "build_base", lambda *given: built.append(given[2]) or build(*given))
         model = mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1e-3)], modes=mp.Tolerance(1e-6))
         start = model.static_equilibrium({"m": -1e-3})
         mp.simulate(model, 5.0, displacement=start)
-        assert built == [12, 60]
+        assert built == [22, 44, 60]

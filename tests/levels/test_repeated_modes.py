@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.levels import level_modes, modal_base
-from multiphi_exudyn.mathematics import modes
+from multiphi_exudyn.levels import build_base, level_modes
+from multiphi_exudyn.mathematics import lowest_modes, modes
 from multiphi_exudyn.mechanics.structure import damping_matrix
 
 
@@ -35,7 +35,7 @@ STOPS = [mp.UnilateralContact("rigid", "p", 0.1), mp.UnilateralContact("soft", {
 def arbitrary(request, monkeypatch):
     """Eigensolvers with another sign of every mode, and another basis of modes of one frequency."""
     random = np.random.default_rng(request.param)
-    solver, lanczos = modes.right_singular_vectors, modes._lanczos
+    solver, lanczos = modes.right_singular_vectors, lowest_modes._lanczos
 
     def mixed(values, vectors):
         vectors = vectors * random.choice([-1.0, 1.0], vectors.shape[1])
@@ -46,7 +46,7 @@ def arbitrary(request, monkeypatch):
 
     for module in (modes, level_modes):
         monkeypatch.setattr(module, "right_singular_vectors", lambda matrix: mixed(*solver(matrix)))
-    monkeypatch.setattr(modes, "_lanczos", lambda *given: mixed(*lanczos(*given)))
+    monkeypatch.setattr(lowest_modes, "_lanczos", lambda *given: mixed(*lanczos(*given)))
 
 
 class TestTurned:
@@ -90,14 +90,14 @@ class TestTurned:
 @pytest.mark.parametrize("sparse", [False, True])
 def test_modes_of_every_level_are_the_same_from_any_eigensolver(arbitrary, monkeypatch, free, sparse):
     if sparse:
-        monkeypatch.setattr(modal_base, "COMPLETE", 30)
+        monkeypatch.setattr(build_base, "COMPLETE", 30)
     closed = [(), ("rigid",), ("soft",), ("rigid", "soft")]
     count = 6
     model = mp.MultiPhiModel(square(7, free=free, sparse=sparse), STOPS, modes=count)
     shapes = [model.level(names).shapes for names in closed]
     monkeypatch.undo()
     if sparse:
-        monkeypatch.setattr(modal_base, "COMPLETE", 30)
+        monkeypatch.setattr(build_base, "COMPLETE", 30)
     plain = mp.MultiPhiModel(square(7, free=free, sparse=sparse), STOPS, modes=count)
     for names, found in zip(closed, shapes, strict=True):
         assert_allclose(found, plain.level(names).shapes, atol=1e-10)
@@ -118,7 +118,7 @@ class TestACutCluster:
             assert mp.MultiPhiModel(square(4), STOPS, modes=mp.UpTo(cut_off, most=2)).level(()).modes == 3
 
     def test_is_kept_whole_where_only_few_modes_of_a_level_are_computed(self, monkeypatch):
-        monkeypatch.setattr(modal_base, "COMPLETE", 30)
+        monkeypatch.setattr(build_base, "COMPLETE", 30)
         structure = square(14, sparse=True)
         model = mp.MultiPhiModel(structure, [mp.UnilateralContact("c", structure.row("p"), 0.1, 50.0)], modes=5)
         for closed, count in (((), 6), (("c",), 5)):
@@ -141,7 +141,7 @@ class TestACutCluster:
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_the_basis_of_a_large_structure_leaves_a_cluster_out_that_its_number_of_modes_would_part(count):
     structure = square(9, sparse=True)
-    found = modes.lowest_modes(structure.mass, structure.stiffness, count, np.zeros((0, 81)))
+    found = lowest_modes.lowest_modes(structure.mass, structure.stiffness, count, np.zeros((0, 81))).modes
     assert found.count == {2: 1, 3: 3, 4: 4}[count]
 
 

@@ -2,7 +2,7 @@
 
     x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (level.py), and L f
 
-and of friction T and the places of its patches (time/friction_rows.py).
+and of friction T and the places of its patches (time/level_rows.py).
 
 Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing
 during a run.
@@ -24,7 +24,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
-from multiphi_exudyn.time.friction_rows import force_row, patch_row, pressing_row
+from multiphi_exudyn.time.level_rows import force_row, patch_row, pressing_row
 
 __all__ = ["BodyHistories", "add_sensors", "body_histories", "rebuilt"]
 
@@ -154,10 +154,10 @@ def rebuilt(
         gaps[:, here] = (own.gap_rows @ xi + loaded.gap_constants[:, None])[: len(elements)]
         state, direct = np.vstack([xi, xi_t, np.ones(len(here))]), body.coordinates.direct(stepped) @ on_points[:, here]
         for i in range(len(elements)):
-            forces[i, here] = pressing_row(loaded, i) @ state + _carried(loaded, i, direct, held=False)
+            forces[i, here] = pressing_row(i, loaded) @ state + _carried(loaded, i, direct, held=False)
         for i in body.model.rubbing:
-            tensions[i, here] = force_row(loaded, i) @ state - _carried(loaded, i, direct, held=True)
-            patches[i, here] = patch_row(loaded, i) @ state
+            tensions[i, here] = force_row(i, loaded) @ state - _carried(loaded, i, direct, held=True)
+            patches[i, here] = patch_row(i, loaded) @ state
     return moved, velocities, gaps, forces, tensions, patches
 
 

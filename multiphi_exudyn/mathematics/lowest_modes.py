@@ -1,0 +1,318 @@
+"""The lowest modes of sparse matrices, and a small space beside them that holds what happens at a few rows.
+
+    x = V eta + sum_j W_j zeta_j,   W_0 = A^-1 R^T,   W_j = A^-1 M W_j-1,   A = K + s M
+
+V are exact modes, by shift-invert Lanczos. The block Krylov vectors W_j of the rows R hold how the structure answers
+forces there, at rest (j = 0) and in motion: a level with those rows held moves, at omega^2, as sum_j omega^2j W_j f
+beside V. They are taken orthogonal to V in M and in K, so that the frequencies of V stay as accurate as Lanczos gives
+them, and as many blocks as the modes of sample levels need: with omega^2 and x those of a level in this space, and f
+the forces on its rows,
+
+    r = omega^2 M x + R^T f - K x,   error of omega^2 = r.A^-1 r
+
+is what the space leaves out, to first order.
+Source: P. Koutsovasilis, M. Beitelschmidt, Comparison of model reduction techniques for large mechanical systems,
+Multibody Syst. Dyn. 20 (2008) 111; the error of a Ritz value: B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+import scipy.sparse.linalg
+
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.mathematics.modes import (
+    FIRST_SHIFT,
+    NEAR,
+    ROUND_OFF,
+    Modes,
+    classified,
+    largest_ratio,
+    round_off_energy,
+)
+
+__all__ = ["ACCURATE", "HeldRows", "LowestModes", "left_out", "lowest_modes"]
+
+DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it is round-off below
+ACCURATE = 1e-9  # error of omega^2 of sample levels, up to which Krylov vectors are added
+DEEPEST = 8  # blocks of Krylov vectors at most
+CHECKED = 4  # highest modes of a sample level that are looked at: they have the largest errors
+BAR_DELAY = 2.0  # s before a progress bar appears
+
+Vectors: TypeAlias = tuple[np.ndarray, np.ndarray]  # shapes C (n, k), C^T A C = I, and A C
+
+
+@dataclass(frozen=True)
+class HeldRows:
+    """A sample level: rows by their positions, each with its stiffness [N/m], inf where it is held rigidly.
+
+    modes: of the level whose omega^2 are to be accurate.
+    """
+
+    rows: Sequence[int]
+    stiffness: np.ndarray
+    modes: int
+
+
+@dataclass(frozen=True)
+class LowestModes:
+    """A space of modes. exact: how many of them, the lowest, are modes of the structure. error: of omega^2 of samples.
+
+    The others are the space's own, and hold static shapes and Krylov vectors.
+    """
+
+    modes: Modes
+    exact: int
+    error: float
+
+
+def lowest_modes(
+    mass: Any,
+    stiffness: Any,
+    count: int,
+    rows: np.ndarray,
+    samples: Sequence[HeldRows] = (),
+    known: Modes | None = None,
+) -> LowestModes:
+    """The ``count`` lowest modes and the Krylov vectors of ``rows`` (k, n), for sparse matrices.
+
+    One block of Krylov vectors, the static shapes, then as many as ``samples`` need. Where ``count`` would part modes
+    of one frequency there are fewer or more. known: the lowest modes, which are not computed again.
+
+    The stiffness is factorised once (s = 0); for a structure with rigid-body modes three times: it is singular,
+    then s is small, then the first elastic omega^2. A mass that is not diagonal is factorised for its definiteness.
+
+    Raises MultiPhiValueError for an indefinite mass or stiffness, NumericalFailure if Lanczos does not converge.
+    """
+    from tqdm import tqdm
+
+    mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
+    with tqdm(desc="modes", unit="solve", disable=None, leave=False, delay=BAR_DELAY) as bar:
+        found = _Lowest(mass, stiffness, bar)
+        found.look_for(count, known)
+        modes, error = found.completed(rows, samples)
+    return LowestModes(modes, len(found.values), error)
+
+
+def left_out(mass: Any, stiffness: Any, modes: Modes, rows: np.ndarray) -> np.ndarray:
+    """Share (k,) of the static flexibility h.K^-1 h, or h.A^-1 h, of rows (k, n) that modes do not hold."""
+    mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
+    shift = float(modes.omega[modes.rigid]) ** 2 if modes.rigid else 0.0
+    factor = _definite_factor(scipy.sparse.csc_array(stiffness + shift * mass))
+    if factor is None:
+        raise NumericalFailure("static response: K is singular to round-off")
+    whole = np.einsum("ij,ji->i", rows, factor.solve(np.ascontiguousarray(rows.T)))
+    held = np.sum((rows @ modes.shapes) ** 2 / (modes.omega**2 + shift), axis=1)
+    return np.asarray(np.maximum(whole - held, 0.0) / np.where(whole > 0, whole, 1.0))
+
+
+class _Lowest:
+    """The lowest modes under way. values, vectors: omega^2 and shapes of those found. shift: s; factor: of A."""
+
+    def __init__(self, mass: Any, stiffness: Any, bar: Any) -> None:
+        _check_mass(mass)
+        self.mass, self.stiffness, self._bar = mass, stiffness, bar
+        self.values, self.vectors = np.zeros(0), np.zeros((mass.shape[0], 0))
+        self.shift, self._factor = 0.0, _definite_factor(stiffness)
+
+    def solve(self, given: np.ndarray) -> np.ndarray:
+        """A^-1 of vectors (n,) or (n, k)."""
+        assert self._factor is not None, "look_for has looked"
+        self._bar.update(1 if given.ndim == 1 else given.shape[1])
+        return np.asarray(self._factor.solve(np.ascontiguousarray(given)))
+
+    def look_for(self, count: int, known: Modes | None) -> None:
+        """Find so many modes; what is ``known`` of them is taken."""
+        if known is not None:
+            self.values, self.vectors = known.omega**2, known.shapes
+            if known.rigid:
+                self._move(float(known.omega[known.rigid]) ** 2)
+            self._find(count)
+            return
+        if self._factor is not None:
+            self._find(count)
+        if self._factor is None or np.any(self.values <= round_off_energy(self.stiffness, self.vectors)):
+            self._find_with_rigid_ones(count)
+
+    def _find_with_rigid_ones(self, count: int) -> None:
+        self._move(FIRST_SHIFT * largest_ratio(self.mass, self.stiffness))
+        self._find_anew(count)
+        elastic = self.values > round_off_energy(self.stiffness, self.vectors)
+        if np.any(elastic):
+            self._move(float(np.min(self.values[elastic])))
+            self._find_anew(count)
+
+    def _find_anew(self, count: int) -> None:
+        self.values, self.vectors = np.zeros(0), np.zeros((self.mass.shape[0], 0))
+        self._find(count)
+
+    def _move(self, shift: float) -> None:
+        self.shift = shift
+        self._factor = _definite_factor(scipy.sparse.csc_array(self.stiffness + shift * self.mass))
+        if self._factor is None:
+            raise MultiPhiValueError(
+                f"stiffness: indefinite, lowest eigenvalue omega^2 below {-shift:g}; need a positive semidefinite "
+                "matrix"
+            )
+
+    def _find(self, count: int) -> None:
+        """Further modes up to ``count``, by the compliance without those that are there."""
+        further = count - len(self.values)
+        if further <= 0:
+            return
+        given = self.values + self.shift
+
+        def answer(x: np.ndarray) -> np.ndarray:
+            return self.solve(x) - self.vectors @ ((self.vectors.T @ x) / given)
+
+        values, vectors = _lanczos(self.mass, self.stiffness, further, self.shift, answer)
+        vectors = vectors - self.vectors @ (self.vectors.T @ (self.mass @ vectors))
+        self.values = np.concatenate([self.values, values])
+        self.vectors = np.hstack([self.vectors, vectors])
+
+    def completed(self, rows: np.ndarray, samples: Sequence[HeldRows]) -> tuple[Modes, float]:
+        """The modes with the Krylov vectors of ``rows``, and the largest error of omega^2 of the samples."""
+        added, shapes, error = np.zeros(0), np.zeros((len(self.vectors), 0)), 0.0
+        for vectors in self._krylov(rows):
+            added, rotation = _ritz(self.mass, vectors[0])
+            shapes = vectors[0] @ rotation
+            error = max((self._error(added, rotation, vectors, rows, sample) for sample in samples), default=0.0)
+            if error <= ACCURATE:
+                break
+        upper = scipy.linalg.cholesky(shapes.T @ (self.mass @ shapes))  # once more: orthonormal to round-off
+        shapes = np.hstack([self.vectors, scipy.linalg.solve_triangular(upper, shapes.T, trans="T").T])
+        squares = np.concatenate([self.values, added - self.shift])
+        return classified(self.stiffness, squares, shapes, self.shift), error
+
+    def _krylov(self, rows: np.ndarray) -> Iterator[Vectors]:
+        """A-orthonormal bases of one, two and more blocks of Krylov vectors, until nothing is added."""
+        forces = rows[np.any(rows, axis=1)].T
+        if not forces.size:
+            return
+        sizes = np.sqrt(np.einsum("ij,ij->j", forces, self.solve(forces)))  # each row's own flexibility becomes 1
+        block = self._beside(forces / sizes)
+        vectors = np.zeros((len(forces), 0)), np.zeros((len(forces), 0))
+        for _ in range(DEEPEST):
+            block = _orthonormal(block, vectors)
+            if not block[0].shape[1]:
+                return
+            vectors = np.hstack([vectors[0], block[0]]), np.hstack([vectors[1], block[1]])
+            yield vectors
+            shapes, forces = self._beside(self.mass @ block[0])
+            sizes = np.sqrt(np.einsum("ij,ij->j", shapes, forces))
+            block = shapes / sizes, forces / sizes
+
+    def _beside(self, forces: np.ndarray) -> Vectors:
+        """What V leaves of A^-1 F, orthogonal to V in M and in K, and of F."""
+        shapes, taken = self.solve(forces), self.vectors.T @ forces
+        shapes -= self.vectors @ (taken / (self.values + self.shift)[:, None])
+        shapes -= self.vectors @ (self.vectors.T @ (self.mass @ shapes))
+        return shapes, forces - self.mass @ (self.vectors @ taken)
+
+    def _error(
+        self, added: np.ndarray, rotation: np.ndarray, vectors: Vectors, rows: np.ndarray, sample: HeldRows
+    ) -> float:
+        """Largest relative error of omega^2 among the highest modes of a sample level.
+
+        added, rotation: eigenvalues of A (k,) in the space of ``vectors``, and what makes its modes of them (k, k).
+        """
+        held, (own, pushed), values = rows[list(sample.rows)], vectors, self.values + self.shift
+        directions = np.hstack([held @ self.vectors, (held @ own) @ rotation])
+        squares, y, forces = _sample_modes(np.concatenate([self.values, added - self.shift]), directions, sample)
+        first, beside = y[: len(values)], rotation @ y[len(values) :]
+        left = (squares + self.shift) * (self.mass @ (self.vectors @ first + own @ beside)) + held.T @ forces
+        left -= self.mass @ (self.vectors @ (values[:, None] * first)) + pushed @ beside
+        known = self.vectors.T @ left, rotation.T @ (own.T @ left)  # round-off of the small problem
+        energy = np.einsum("ij,ij->j", left, self.solve(left))
+        energy -= sum(
+            np.sum(part**2 / given[:, None], axis=0) for part, given in zip(known, (values, added), strict=True)
+        )
+        return float(np.max(np.abs(energy) / np.maximum(np.abs(squares), self.shift), initial=0.0))
+
+
+def _sample_modes(
+    squares: np.ndarray, directions: np.ndarray, sample: HeldRows
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """omega^2 (k,), modes (m, k) and forces on its rows (l, k) of the highest modes of a sample level.
+
+    squares: (m,) of the space. directions: (l, m), the rows in it.
+    """
+    rigid = np.isinf(sample.stiffness)
+    stiffness = np.where(rigid, 0.0, sample.stiffness)
+    units = directions[rigid] / np.linalg.norm(directions[rigid], axis=1, keepdims=True)
+    free = scipy.linalg.null_space(units) if np.any(rigid) else np.eye(len(squares))
+    springs = np.sqrt(stiffness)[:, None] * directions
+    whole = np.diag(squares) + springs.T @ springs
+    last = min(sample.modes, free.shape[1])
+    wanted = [max(last - CHECKED, 0), last - 1]
+    found, y = scipy.linalg.eigh(free.T @ whole @ free, subset_by_index=wanted)
+    y = free @ y
+    forces = -stiffness[:, None] * (directions @ y)
+    forces[rigid] = np.linalg.lstsq(directions[rigid].T, whole @ y - found * y, rcond=None)[0]
+    return found, y, forces
+
+
+def _orthonormal(block: Vectors, others: Vectors) -> Vectors:
+    """A-orthonormal vectors of a block beside others; what is round-off of one, or of another, is left out."""
+    own, pushed = block
+    for _ in range(2):
+        taken = others[1].T @ own
+        own, pushed = own - others[0] @ taken, pushed - others[1] @ taken
+    for _ in range(2):  # once more: orthonormal to round-off
+        products = own.T @ pushed
+        kept, turn = scipy.linalg.eigh((products + products.T) / 2)
+        turn = turn[:, kept > DEPENDENT] / np.sqrt(kept[kept > DEPENDENT])
+        own, pushed = own @ turn, pushed @ turn
+    return own, pushed
+
+
+def _ritz(mass: Any, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues of A (k,) in the space of A-orthonormal shapes, and the rotation (k, k) to its M-normalised modes."""
+    inverse, rotation = scipy.linalg.eigh(shapes.T @ (mass @ shapes))
+    return 1 / inverse, rotation / np.sqrt(inverse)
+
+
+def _definite_factor(matrix: Any) -> Any | None:
+    """Sparse triangular factors of a symmetric matrix; None where it is not positive definite to round-off.
+
+    Pivots are taken from the diagonal, so that their signs are those of the eigenvalues (Sylvester).
+    """
+    try:
+        factor = scipy.sparse.linalg.splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:  # "Factor is exactly singular"
+        return None
+    pivots = factor.U.diagonal()[factor.perm_c]
+    definite = np.array_equal(factor.perm_r, factor.perm_c) and np.all(pivots > ROUND_OFF * matrix.diagonal())
+    return factor if definite else None
+
+
+def _check_mass(mass: Any) -> None:
+    diagonal = scipy.sparse.diags_array(mass.diagonal())
+    if (mass != diagonal).nnz and _definite_factor(mass) is None:
+        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix")
+
+
+def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
+
+    answer: to a force, A^-1, or what other modes leave of it.
+    """
+    n = stiffness.shape[0]
+    start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
+    operator = scipy.sparse.linalg.LinearOperator((n, n), answer, dtype=float)
+    try:
+        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count + 1, mass, sigma=-shift, OPinv=operator, v0=start)
+    except scipy.sparse.linalg.ArpackError as error:
+        raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
+    order = np.argsort(values)
+    apart = np.flatnonzero(np.diff(values[order]) > NEAR * np.abs(values[order][1:]))
+    kept = order[: apart[-1] + 1] if apart.size else order[:count]
+    return values[kept], vectors[:, kept]

@@ -1,0 +1,149 @@
+"""The small base of a large structure: its levels are the structure's own, and it grows by what it has not seen."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse
+from numpy.testing import assert_allclose
+from small_structures import stop
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.mathematics import lowest_modes
+
+SIDE = 27  # of a membrane of 27 x 26 masses, none of whose frequencies are equal
+MODES = 12
+ACCURATE = 1e-8  # of omega^2
+
+
+def membrane(held=1.0):
+    """Springs between neighbours; held: to the ground at the edge, in units of theirs; two patches are points."""
+    sides = [
+        scipy.sparse.diags_array([2 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1]).tolil()
+        for n in (SIDE, SIDE - 1)
+    ]
+    for side in sides:
+        side[0, 0] = side[-1, -1] = 1.0 + held
+    first, second = (scipy.sparse.csr_array(side) for side in sides)
+    stiffness = scipy.sparse.kron(first, scipy.sparse.eye_array(SIDE - 1)) + scipy.sparse.kron(
+        scipy.sparse.eye_array(SIDE), second
+    )
+    points = {name: patch(*at) for name, at in (("p", (5, 7)), ("q", (18, 12)))}
+    n = SIDE * (SIDE - 1)
+    return mp.LinearStructure(scipy.sparse.eye_array(n).tocsr(), 1e4 * stiffness.tocsr(), points=points)
+
+
+def patch(i, j):
+    """The mean over 4 x 4 masses."""
+    row = np.zeros((SIDE, SIDE - 1))
+    row[i : i + 4, j : j + 4] = 1 / 16
+    return row.ravel()
+
+
+def squares(structure, rows, stiffness, count):
+    """omega^2 of the full problem with rows held; the masses are one."""
+    matrix = structure.stiffness.toarray()
+    for row in rows:
+        if math.isinf(stiffness):
+            mirror = row / np.linalg.norm(row)
+            projected = matrix @ mirror
+            matrix = matrix - np.outer(mirror, projected) - np.outer(projected - (mirror @ projected) * mirror, mirror)
+            matrix += 1e9 * np.outer(mirror, mirror)  # the motion that it prevents, far above the others
+        else:
+            matrix = matrix + stiffness * np.outer(row, row)
+    return scipy.linalg.eigh(matrix, eigvals_only=True, subset_by_index=[0, count - 1])
+
+
+@pytest.mark.parametrize("held", [1.0, 0.0], ids=["held", "free"])
+@pytest.mark.parametrize("stiffness", [1e3, 1e5, math.inf])
+def test_levels_are_those_of_the_full_problem(held, stiffness):
+    structure = membrane(held)
+    stops = [stop(name, stiffness=stiffness, name=name) for name in ("p", "q")]
+    model = mp.MultiPhiModel(structure, stops, modes=MODES)
+    for closed in ((), ("p",), ("q",), ("p", "q")):
+        expected = squares(structure, [structure.row(name) for name in closed], stiffness, MODES)
+        found = model.level(closed).squares
+        assert np.max(np.abs(found - expected) / np.maximum(expected, expected[2])) < ACCURATE
+    assert model.base.exact == MODES + 8
+    assert model.base.modes.count <= 45
+    assert model.base.modes.rigid == (held == 0)
+    assert model.base.error < ACCURATE / 10
+
+
+@pytest.mark.parametrize("k", [1e4, math.inf])
+def test_its_error_is_that_of_its_levels(monkeypatch, k):
+    """Without Krylov vectors beside the static shapes a level is too stiff by what the samples say."""
+    monkeypatch.setattr(lowest_modes, "DEEPEST", 1)
+    structure = membrane()
+    model = mp.MultiPhiModel(structure, [stop("p", stiffness=k)], modes=MODES)
+    exact, found = squares(structure, [structure.row("p")], k, MODES), model.level(("stop",)).squares
+    error = np.max((found - exact) / exact)
+    assert error > ACCURATE
+    assert error / 3 < model.base.error < 3 * error
+    with pytest.warns(mp.MultiPhiWarning, match="base: omega.2 of levels may be off by"):
+        mp.simulate(model, 0.01, displacement=model.level(()).shapes[:, 0])
+
+
+def counted(monkeypatch):
+    """How many modes Lanczos iterations have been asked for, call by call."""
+    asked, lanczos = [], lowest_modes._lanczos
+    monkeypatch.setattr(lowest_modes, "_lanczos", lambda *given: asked.append(given[2]) or lanczos(*given))
+    return asked
+
+
+@pytest.mark.parametrize("held", [1.0, 0.0], ids=["held", "free"])
+def test_more_modes_and_other_contacts_take_the_modes_that_are_there(monkeypatch, held):
+    structure = membrane(held)
+    few = mp.MultiPhiModel(structure, [stop("p")], modes=MODES)
+    assert few.base.served == MODES
+    asked = counted(monkeypatch)
+    more = dataclasses.replace(few, modes=2 * MODES)
+    other = dataclasses.replace(few, contacts=[stop("q", stiffness=1e4)])
+    assert more.base.served == 2 * MODES
+    assert other.base.served == MODES
+    assert asked == [MODES]
+    anew = mp.MultiPhiModel(structure, [stop("p")], modes=2 * MODES)
+    for closed in ((), ("stop",)):
+        assert_allclose(more.level(closed).omega[1:], anew.level(closed).omega[1:], rtol=1e-9)
+        assert_allclose(more.level(closed).shapes[:, 1:], anew.level(closed).shapes[:, 1:], atol=1e-7)
+
+
+class TestRowsFirstSeenInARun:
+    ROW = patch(10, 3)
+
+    def run(self, model, **given):
+        load = mp.HarmonicLoad(self.ROW, 1.0, 1.0)
+        return mp.simulate(model, 0.5, displacement=0.01 * model.level(()).shapes[:, 0], loads=[load], **given)
+
+    def test_loads_extend_the_base_once(self, monkeypatch):
+        model = mp.MultiPhiModel(membrane(), [stop("p")], modes=MODES)
+        assert model.outside(self.ROW) > 1e-3
+        asked = counted(monkeypatch)
+        run = self.run(model)
+        assert run.model.outside(self.ROW) < 1e-12
+        assert run.warnings == ()
+        assert asked == []
+        assert self.run(model).model is run.model
+        assert mp.simulate(model, 0.5, displacement=run.displacement(0.0)).model is model
+        on = mp.simulate(model, 0.7, start=run)
+        assert on.model is run.model
+
+    def test_weight_bends_the_structure_as_much_as_it_does(self):
+        structure = membrane()
+        model = mp.MultiPhiModel(structure, modes=MODES)
+        rest = mp.simulate(model, 0.1, loads=[mp.Gravity(np.ones(structure.n))])
+        expected = scipy.sparse.linalg.spsolve(structure.stiffness.tocsc(), 9.81 * np.ones(structure.n))
+        level = rest.model.level(())
+        assert_allclose(rest.model.base.modes.shapes @ level.asymptotic(rest.load).configuration, expected, rtol=1e-9)
+
+    def test_a_start_and_a_row_that_lie_outside_are_told(self):
+        model = mp.MultiPhiModel(membrane(), [stop("p")], modes=MODES)
+        with pytest.warns(mp.MultiPhiWarning, match="base: .* % of the start's velocity lies outside"):
+            mp.simulate(model, 0.01, velocity=np.eye(model.structure.n)[300])
+        run = mp.simulate(model, 0.01, displacement=model.level(()).shapes[:, 0])
+        assert run.warnings == ()
+        with pytest.warns(mp.MultiPhiWarning, match="base: .* % of the static flexibility at a row lies outside"):
+            run.at(self.ROW, 0.0)
+        run.at({"p": 1.0, "q": -1.0}, 0.0)
