@@ -18,6 +18,7 @@ from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, ch
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
@@ -70,7 +71,7 @@ class MultiPhiModel:
         if len(set(names)) < len(names):
             raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
         for link in self.links:
-            if not np.any(self.structure.row(link.direction)):
+            if not np.any(_row(self.structure, link)):
                 raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
         self._check_modes()
         _check_overrides(self.overrides)
@@ -255,8 +256,7 @@ class MultiPhiModel:
         for i, contact in enumerate(self.contacts):
             if contact.name == name:
                 return i
-        known = ", ".join(contact.name for contact in self.contacts) or "none"
-        raise MultiPhiValueError(f"contact: got {name!r}, need one of: {known}")
+        raise MultiPhiValueError(f"contact: got {name!r}, need {one_of(name, (c.name for c in self.contacts))}")
 
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
         """The level with these contacts closed, or with elements in these states, built on first use.
@@ -378,6 +378,14 @@ class MultiPhiModel:
             raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
         if int(self.modes) < 1:
             raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
+
+
+def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
+    """The row (n,) of a link's direction; an error names the link."""
+    try:
+        return structure.row(link.direction)
+    except (MultiPhiValueError, MultiPhiTypeError) as error:
+        raise type(error)(f"contact {link.name!r}: {error}") from error
 
 
 def _contacts(given: Any) -> tuple[Contact, ...]:

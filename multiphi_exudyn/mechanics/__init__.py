@@ -3,6 +3,6 @@
 A structure is M, C, K and named points, given as matrices, read from files, built as a beam, or assembled from others.
 Nothing is reduced or solved here.
 
-Order: arguments, damping, structure, assembly, matrix_files, section, beam, element, contact,
+Order: arguments, dofs, damping, structure, assembly, matrix_files, section, beam, element, contact,
 friction, force_law, time_functions, loads.
 """

@@ -26,7 +26,7 @@ class TestMultiPhiModel:
             (ValueError, {"modes": 0}, "modes: got 0"),
             (ValueError, {"modes": -1}, "modes: got -1"),
             (ValueError, {"contacts": [stop(), stop("m1")]}, "contacts: got the names"),
-            (ValueError, {"contacts": [stop("m9")]}, "point: got 'm9'"),
+            (ValueError, {"contacts": [stop("m9")]}, "contact 'stop': point: got 'm9', need one of: m0, m1, m2, m3"),
             (ValueError, {"contacts": [stop({"m0": 0.0})]}, "contact 'stop' direction: got a zero row"),
             (ValueError, {"overrides": {("elsewhere",): LevelOverride()}}, "contact: got 'elsewhere'"),
         ],
