@@ -3,6 +3,6 @@
 A structure is M, C, K and named points, given as matrices, read from files, built as a beam, or assembled from others.
 Nothing is reduced or solved here.
 
-Order: arguments, dofs, damping, structure, assembly, matrix_files, section, beam, element, contact,
-friction, force_law, time_functions, loads.
+Order: arguments, dofs, damping, structure, assembly, text_matrices, array_files, matrix_files, section, beam, element,
+contact, friction, force_law, time_functions, loads.
 """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -17,7 +17,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real, one_of
 
-__all__ = ["DofTable", "Place", "dof_table", "fixed_dofs", "known"]
+__all__ = ["DofTable", "Place", "dof_table", "fixed_dofs", "known", "node_component"]
 
 Place: TypeAlias = "int | tuple[int, int | str]"  # a DoF index, or (node, component)
 
@@ -31,6 +31,11 @@ class DofTable:
     """rows: (node, name of the component) of every row of the matrices, each once."""
 
     rows: tuple[tuple[int, str], ...]
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[int, str]]) -> DofTable:
+        """A table of these rows by node, and of a node by component."""
+        return cls(tuple(sorted(rows, key=lambda row: (row[0], COMPONENTS.index(row[1])))))
 
     @functools.cached_property
     def _places(self) -> dict[int, dict[str, int]]:
@@ -69,12 +74,14 @@ class DofTable:
 
 def dof_table(given: Any, n: int) -> DofTable:
     """A table of n rows from (node, component) of each."""
-    if isinstance(given, (str, dict)) or not isinstance(given, (Iterable, DofTable)):
+    if isinstance(given, (str, Mapping)) or not isinstance(given, (Iterable, DofTable)):
         raise MultiPhiTypeError(f"dofs: got {type(given).__name__}, {NEEDED}")
     pairs = given.rows if isinstance(given, DofTable) else tuple(given)
     if len(pairs) != n:
         raise MultiPhiValueError(f"dofs: got {len(pairs)} rows, need {n} as the mass has")
-    rows = pairs if isinstance(given, DofTable) else tuple(_pair(i, pair) for i, pair in enumerate(pairs))
+    if isinstance(given, DofTable):
+        return given
+    rows = tuple(node_component(f"dofs[{i}]", pair) for i, pair in enumerate(pairs))
     if len(set(rows)) < n:
         twice = Counter(rows).most_common(1)[0][0]
         raise MultiPhiValueError(f"dofs: got {twice} twice, need each node's component once")
@@ -84,7 +91,7 @@ def dof_table(given: Any, n: int) -> DofTable:
 def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
     """Which of n degrees of freedom are held, (k,) ascending, from DoF indices, (node, component) or (node, "all")."""
     needed = 'need a list of DoF indices, (node, component) or (node, "all")'
-    if isinstance(given, (str, bytes, dict)) or not isinstance(given, Iterable):
+    if isinstance(given, (str, bytes, Mapping)) or not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"fixed: got {given!r}, {needed}")
     held: set[int] = set()
     for item in given:
@@ -119,8 +126,8 @@ def _component(name: str, given: Any) -> str:
     raise MultiPhiValueError(f"{name}: got component {given!r}, need 1 to 6 or one of: {', '.join(COMPONENTS)}")
 
 
-def _pair(i: int, given: Any) -> tuple[int, str]:
-    name = f"dofs[{i}]"
+def node_component(name: str, given: Any) -> tuple[int, str]:
+    """A node's number and the name of its component; ``name`` is what an error calls the pair."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"{name}: got {given!r}, need (node number, component)")
     pair = tuple(given)

@@ -24,6 +24,8 @@ HEAVY = {
     "numba": COMPILERS,
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
+    "h5py": ("multiphi_exudyn/mechanics/array_files.py",),
+    "pyyeti": ("multiphi_exudyn/mechanics/array_files.py",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compilation",
