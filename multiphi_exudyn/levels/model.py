@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import BASE_MARGIN, ModalBase, build_base, direction_indices
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -309,32 +309,40 @@ class MultiPhiModel:
             further *= 2
         return found
 
-    def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
+    def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
 
         The configuration that the contacts admit nearest to the one without them, in the energy of structure and
         contact springs: those that press make the level whose state of rest it is. With force laws or friction it is
         the equilibrium that is reached when the forces are applied slowly (static_equilibrium.py); a run that starts
-        there with stretched springs of friction starts from ``equilibrium``. Needs a structure without rigid-body
-        modes. Raises NumericalFailure where the structure snaps through on the way, or friction lets go with a jump.
-        """
-        return self.equilibrium(forces).displacement
+        there with stretched springs of friction starts from ``equilibrium``. Raises NumericalFailure where the
+        structure snaps through on the way, or friction lets go with a jump.
 
-    def equilibrium(self, forces: Mapping[str, float]) -> Equilibrium:
+        Of a structure with rigid-body modes it is its deformation, M-orthogonal to them, under forces that balance each
+        other; with ``inertia_relief`` under any, while they accelerate it. Contacts then have to stay open, and there
+        may be neither force laws nor friction.
+        """
+        return self.equilibrium(forces, inertia_relief).displacement
+
+    def equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> Equilibrium:
         """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``."""
-        y, stretches = self._at_rest(forces)
+        y, stretches = self._at_rest(forces, inertia_relief)
         named = {c.name: float(stretch) for c, stretch in zip(self.contacts, stretches, strict=True) if c.held}
         return Equilibrium(self.base.modes.shapes @ y, named)
 
-    def _at_rest(self, forces: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    def _at_rest(self, forces: Mapping[str, float], inertia_relief: bool) -> tuple[np.ndarray, np.ndarray]:
         """y (m,) and stretches (c,) [m] at rest under forces [N] at points."""
         base = self.base
-        if base.modes.rigid:
-            raise MultiPhiValueError(
-                f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
-            )
         self.need_smooth_contacts("static equilibrium")
         load = self.base_load(forces)
+        if base.modes.rigid:
+            if self.force_laws or self.general:
+                raise MultiPhiValueError(
+                    f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes beside force laws "
+                    "or friction, need none"
+                )
+            size = np.abs(base.modes.shapes.T) @ np.abs(self._force_row(forces))
+            return floating(base, load, size, inertia_relief), np.zeros(len(base.contacts))
         if self.force_laws or self.general:
             return equilibrium(base, load)
         compliance = base.modes.omega**-2.0
@@ -346,10 +354,13 @@ class MultiPhiModel:
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Forces [N] at points as a load (m,) in base coordinates."""
+        return self.base.modes.shapes.T @ self._force_row(forces)
+
+    def _force_row(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Forces [N] at points as a load (n,)."""
         if not isinstance(forces, Mapping):
             raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
-        row = self.structure.row(forces) if forces else np.zeros(self.structure.n)
-        return self.base.modes.shapes.T @ row
+        return self.structure.row(forces) if forces else np.zeros(self.structure.n)
 
     def _can_share(self) -> bool:
         """Whether the levels built for another number of modes serve this model too."""
