@@ -17,7 +17,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import is_real, one_of
 
-__all__ = ["DofTable", "Place", "dof_table", "fixed_dofs", "known", "node_component"]
+__all__ = ["COMPONENTS", "DofTable", "Place", "dof_table", "fixed_dofs", "known", "node_component"]
 
 Place: TypeAlias = "int | tuple[int, int | str]"  # a DoF index, or (node, component)
 
