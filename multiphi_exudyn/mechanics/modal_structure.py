@@ -5,9 +5,9 @@
 
 q are the modal coordinates, x_p the displacement of a point. Modes that are not given would add to the flexibility of a
 point, and nothing in those that are tells by how much. Without it a contact acts on too stiff a structure, and a rigid
-stop stops the given modes alone: its forces are too large and too short. Three modes of a
-cantilever with a stop of 1e6 N/m at half its length (examples/structures_from_files.py) make its largest force 47 % too
-large; completed, as follows, it is 2 % off. On a stop ten times as stiff both are off by more.
+stop stops the given modes alone: its forces are too large and too short. Three modes of a cantilever with a stop of
+1e6 N/m at half its length (examples/structures_from_files.py) make its largest force 47 % too large; completed, as
+follows, it is 2 % off. On a stop ten times as stiff both are off by more.
 
 Where the static flexibility of a point is known (its displacement under 1 N, from one static load case; of a free
 structure less its motion as a rigid body), rho_p completes it, by a coordinate z_p of its own with a frequency above
