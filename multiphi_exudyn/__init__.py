@@ -38,6 +38,7 @@ from multiphi_exudyn.mechanics.loads import (
     SweepLoad,
 )
 from multiphi_exudyn.mechanics.matrix_files import read_structure
+from multiphi_exudyn.mechanics.modal_structure import ModalStructure, structure_from_modes
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
@@ -70,6 +71,7 @@ __all__ = [
     "LevelOverride",
     "LinearStructure",
     "ModalDamping",
+    "ModalStructure",
     "MultiPhiError",
     "MultiPhiModel",
     "MultiPhiTypeError",
@@ -99,5 +101,6 @@ __all__ = [
     "read_structure",
     "simulate",
     "steady_state",
+    "structure_from_modes",
     "truncation_indicator",
 ]

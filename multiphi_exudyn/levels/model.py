@@ -18,9 +18,10 @@ from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, pressing
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.lowest_modes import left_out
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
@@ -74,7 +75,7 @@ class MultiPhiModel(Shown):
         if len(set(names)) < len(names):
             raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
         for link in self.links:
-            if not np.any(self.structure.row(link.direction)):
+            if not np.any(_row(self.structure, link)):
                 raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
         self._check_modes()
         _check_overrides(self.overrides)
@@ -301,8 +302,7 @@ class MultiPhiModel(Shown):
         for i, contact in enumerate(self.contacts):
             if contact.name == name:
                 return i
-        known = ", ".join(contact.name for contact in self.contacts) or "none"
-        raise MultiPhiValueError(f"contact: got {name!r}, need one of: {known}")
+        raise MultiPhiValueError(f"contact: got {name!r}, need {one_of(name, (c.name for c in self.contacts))}")
 
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
         """The level with these contacts closed, or with elements in these states, built on first use.
@@ -355,31 +355,39 @@ class MultiPhiModel(Shown):
             further *= 2
         return found
 
-    def static_equilibrium(self, forces: Mapping[str, float]) -> np.ndarray:
+    def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
         """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
 
         The configuration that the contacts admit nearest to the one without them, in the energy of structure and
         contact springs: those that press make the level whose state of rest it is. With force laws or friction it is
         the equilibrium that is reached when the forces are applied slowly (static_equilibrium.py); a run that starts
-        there with stretched springs of friction starts from ``equilibrium``. Needs a structure without rigid-body
-        modes. Raises NumericalFailure where the structure snaps through on the way, or friction lets go with a jump.
-        """
-        return self.equilibrium(forces).displacement
+        there with stretched springs of friction starts from ``equilibrium``. Raises NumericalFailure where the
+        structure snaps through on the way, or friction lets go with a jump.
 
-    def equilibrium(self, forces: Mapping[str, float]) -> Equilibrium:
+        Of a structure with rigid-body modes it is its deformation, M-orthogonal to them, under forces that balance each
+        other; with ``inertia_relief`` under any, while they accelerate it. Contacts then have to stay open, and there
+        may be neither force laws nor friction.
+        """
+        return self.equilibrium(forces, inertia_relief).displacement
+
+    def equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> Equilibrium:
         """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``."""
-        y, stretches = self._at_rest(forces)
+        y, stretches = self._at_rest(forces, inertia_relief)
         named = {self.links[k].name: float(stretches[k]) for k in self.held}
         return Equilibrium(self.base.modes.shapes @ y, named)
 
-    def _at_rest(self, forces: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    def _at_rest(self, forces: Mapping[str, float], inertia_relief: bool) -> tuple[np.ndarray, np.ndarray]:
         """y (m,) and stretches (l,) [m] of links at rest under forces [N] at points."""
         base = self.base
-        if base.modes.rigid:
-            raise MultiPhiValueError(
-                f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes, need none"
-            )
         load = self.base_load(forces)
+        if base.modes.rigid:
+            if self.force_laws or self.general:
+                raise MultiPhiValueError(
+                    f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes beside force laws "
+                    "or friction, need none"
+                )
+            size = np.abs(base.modes.shapes.T) @ np.abs(self._force_row(forces))
+            return floating(base, load, size, inertia_relief), np.zeros(len(base.contacts))
         if self.force_laws or self.general:
             return equilibrium(base, load)
         compliance = base.modes.omega**-2.0
@@ -391,10 +399,13 @@ class MultiPhiModel(Shown):
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Forces [N] at points as a load (m,) in base coordinates."""
+        return self.base.modes.shapes.T @ self._force_row(forces)
+
+    def _force_row(self, forces: Mapping[str, float]) -> np.ndarray:
+        """Forces [N] at points as a load (n,)."""
         if not isinstance(forces, Mapping):
             raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
-        row = self.structure.row(forces) if forces else np.zeros(self.structure.n)
-        return self.base.modes.shapes.T @ row
+        return self.structure.row(forces) if forces else np.zeros(self.structure.n)
 
     def _can_share(self) -> bool:
         """Whether the levels built for another number of modes serve this model too."""
@@ -423,6 +434,14 @@ class MultiPhiModel(Shown):
             raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
         if int(self.modes) < 1:
             raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
+
+
+def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
+    """The row (n,) of a link's direction; an error names the link."""
+    try:
+        return structure.row(link.direction)
+    except (MultiPhiValueError, MultiPhiTypeError) as error:
+        raise type(error)(f"contact {link.name!r}: {error}") from error
 
 
 def _contacts(given: Any) -> tuple[Contact, ...]:

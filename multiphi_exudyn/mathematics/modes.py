@@ -152,7 +152,10 @@ def _first_moved(moved: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:
     """Modes by way of K + shift M; None where that is not positive definite."""
-    lower = scipy.linalg.cholesky(mass, lower=True)
+    try:
+        lower = scipy.linalg.cholesky(mass, lower=True)
+    except scipy.linalg.LinAlgError as error:
+        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
     try:
         upper = scipy.linalg.cholesky(stiffness + shift * mass)
     except scipy.linalg.LinAlgError:

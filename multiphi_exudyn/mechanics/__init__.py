@@ -1,8 +1,8 @@
 """Mechanics: what a user describes: a structure, its contacts, friction and force laws, and the loads on it.
 
-A structure is M, C, K and named points, given as matrices, read from files, built as a beam, or assembled from others.
-Nothing is reduced or solved here.
+A structure is M, C, K and named points, given as matrices or by its modes, read from files, built as a beam, or
+assembled from others. Nothing is reduced or solved here.
 
-Order: arguments, damping, structure, assembly, matrix_files, section, beam, element, contact,
-friction, force_law, time_functions, loads.
+Order: arguments, dofs, damping, structure, assembly, text_matrices, array_files, matrix_files, modal_structure,
+section, beam, element, contact, friction, force_law, time_functions, loads.
 """

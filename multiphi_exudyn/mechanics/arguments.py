@@ -1,8 +1,10 @@
-"""Arguments: what counts as a real number, and arrays of real numbers from what a user gives."""
+"""Arguments: what counts as a real number, arrays of real numbers from what a user gives, and names there are."""
 
 from __future__ import annotations
 
+import difflib
 import sys
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -10,11 +12,12 @@ import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Matrix", "is_real", "real_array"]
+__all__ = ["Matrix", "is_real", "one_of", "real_array"]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 
 REAL_KINDS = "biufO"  # numpy's codes of what may be converted: numbers, and objects that know how
+SHOWN = 12  # names that an error lists
 
 
 def is_real(value: Any) -> bool:
@@ -35,3 +38,12 @@ def real_array(name: str, given: Any, needed: str) -> Matrix:
     except (TypeError, ValueError, OverflowError) as error:
         raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need {needed}") from error
     raise MultiPhiTypeError(f"{name}: got {type(given).__name__} of {array.dtype}, need {needed}")
+
+
+def one_of(given: object, known: Iterable[object]) -> str:
+    """What an error needs in place of an unknown name: "one of: ...", and the name that may have been meant."""
+    names = [str(name) for name in known]
+    listed = ", ".join(names[:SHOWN]) or "none"
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    close = difflib.get_close_matches(str(given), names, n=1)
+    return f"one of: {listed}{more}" + (f"; did you mean {close[0]!r}?" if close else "")

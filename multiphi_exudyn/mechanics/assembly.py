@@ -9,7 +9,7 @@ displacements that are left. The point "tip" of the part "a" is "a.tip" of the a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ import scipy.sparse
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import Matrix, real_array
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import Place
 from multiphi_exudyn.mechanics.structure import LinearStructure, damping_matrix
 
 __all__ = ["Assembly", "Tie", "assemble"]
@@ -40,7 +41,11 @@ class Assembly(LinearStructure):
     parts: Mapping[str, tuple[int, int]]
     ties: np.ndarray
     transformation: Matrix
-    free: np.ndarray
+
+    def __post_init__(self, fixed: Iterable[Place]) -> None:
+        if tuple(fixed):
+            raise MultiPhiValueError('fixed: got some of an assembly, need ties to the ground, {"a.tip": 1.0}')
+        super().__post_init__(())
 
     def part(self, name: str, displacement: np.ndarray) -> np.ndarray:
         """Displacements (or velocities) of one part, (n_a,) or (n_a, k), from those of the assembly, (n,) or (n, k)."""

@@ -81,6 +81,11 @@ class Gravity:
     acceleration: float = 9.81
 
     def __post_init__(self) -> None:
+        if np.isscalar(self.direction) and not isinstance(self.direction, str):
+            raise MultiPhiTypeError(
+                f"gravity direction: got {self.direction!r}, need a point's name, {{point: coefficient}} or a row (n,) "
+                "that moves every degree of freedom along gravity, as in Gravity(e, 9.81)"
+            )
         check_numbers("gravity", acceleration=self.acceleration)
 
     def row(self, structure: LinearStructure) -> np.ndarray:

@@ -1,9 +1,14 @@
 """Matrices from files: what a finite element program writes becomes a linear structure.
 
-.mtx, .mtx.gz   Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
-                (R. F. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935, 1996)
-.npz            one sparse matrix, as ``scipy.sparse.save_npz`` writes it
-.npy            one dense array, as ``numpy.save`` writes it
+.mtx, .mtx.gz            Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
+                         (R. F. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935, 1996)
+.mtx, .mtx.gz            Abaqus *MATRIX GENERATE and *MATRIX OUTPUT, with or without nodes (text_matrices.py)
+.sti, .mas               CalculiX, its *FREQUENCY, SOLVER=MATRIXSTORAGE
+.rsa, .rua, .hb, .rb     Harwell-Boeing and Rutherford-Boeing; Ansys HBMAT writes .matrix
+.mat                     MATLAB (array_files.py)
+.op4                     Nastran OUTPUT4
+.npz                     NumPy arrays with names, or one sparse matrix as ``scipy.sparse.save_npz`` writes it
+.npy                     one dense array, as ``numpy.save`` writes it
 """
 
 from __future__ import annotations
@@ -11,20 +16,24 @@ from __future__ import annotations
 import gzip
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.io
-import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.array_files import ARRAY_READERS, chosen, npz_arrays
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import DofTable, Place
 from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.text_matrices import NodalMatrix, harwell_boeing, lines_of, same_rows, triplets
 
-__all__ = ["read_array", "read_arrays", "read_structure"]
+__all__ = ["MatrixFile", "read_array", "read_arrays", "read_structure"]
+
+MatrixFile: TypeAlias = "str | os.PathLike[str] | tuple[str | os.PathLike[str], str]"  # a path, or (path, array's name)
 
 T = TypeVar("T")
 
@@ -33,41 +42,106 @@ NUMBERS = {  # of a Matrix Market file, by its field
     "real": rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?",
 }
 SHOWN = 40  # bytes of a wrong line that an error shows
+BANNER = b"%%MatrixMarket"
+FIRST_BYTES = {  # of files, and the endings that they go by
+    BANNER: "Matrix Market, .mtx",
+    b"\x93NUMPY": "a NumPy array, .npy",
+    b"PK\x03\x04": "NumPy arrays, .npz",
+    b"MATLAB": "MATLAB, .mat",
+    b"\x89HDF": "HDF5, of MATLAB 7.3, .mat",
+    b"\x1f\x8b": "a packed file, .mtx.gz",
+}
+ELSEWHERE = {  # what else programs write, and what to write in its place
+    ".full": "an Ansys .full file: write its matrices by HBMAT",
+    ".op2": "Nastran results: write the matrices by OUTPUT4, .op4",
+    ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4",
+    ".bdf": "a Nastran model: write its matrices by OUTPUT4, .op4",
+    ".inp": "an Abaqus or CalculiX model: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
+    ".odb": "Abaqus results: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
+    ".sim": "an Abaqus database: *MATRIX OUTPUT writes .mtx",
+}
 
 
 def read_structure(
-    mass: str | os.PathLike[str],
-    stiffness: str | os.PathLike[str],
-    damping: str | os.PathLike[str] | Matrix | ModalDamping | RayleighDamping | None = None,
-    points: Mapping[str, int | np.ndarray] | None = None,
+    mass: MatrixFile,
+    stiffness: MatrixFile,
+    damping: MatrixFile | Matrix | ModalDamping | RayleighDamping | None = None,
+    points: Mapping[str, Place | np.ndarray] | None = None,
+    dofs: str | os.PathLike[str] | DofTable | Sequence[tuple[int, int | str]] | None = None,
+    fixed: Iterable[Place] = (),
 ) -> LinearStructure:
     """A linear structure of matrices in files; see the module's docstring for their kinds.
 
-    mass [kg, kg m2], stiffness [N/m, N m]: paths, (n, n) each; sparse ones stay sparse.
-    damping [N s/m, N m s]: a path, or what ``LinearStructure`` takes. points: as there, DoFs counted from 0.
+    mass [kg, kg m2], stiffness [N/m, N m]: paths, (n, n) each; (path, name) of one array in a file of several. Sparse
+        ones stay sparse. Units are those of the files: lengths in mm need mass in t and stiffness in N/mm.
+    damping [N s/m, N m s]: a file, or what ``LinearStructure`` takes.
+    points: as ``LinearStructure`` takes them; DoFs count from 0.
+    dofs: (node, component) of every row, or a text file with both in each line ("17 3", "17,uz", CalculiX's "17.3").
+        Abaqus files with nodes (FORMAT=MATRIX INPUT) know it themselves; rows are then by node and component.
+    fixed: what the supports hold, in the numbering of the files, as ``LinearStructure`` takes it.
 
     Raises MultiPhiValueError naming the file that cannot be read, and what ``LinearStructure`` raises.
     """
-    if isinstance(damping, (str, os.PathLike)):
-        damping = read_array("damping", damping)
+    files = {"mass": mass, "stiffness": stiffness}
+    if isinstance(damping, (str, os.PathLike, tuple)):
+        files["damping"] = damping
+    matrices, table = _in_same_rows({name: _matrix(name, file) for name, file in files.items()})
+    if table is not None and dofs is not None:
+        raise MultiPhiValueError("dofs: got a table beside files that name their nodes, need none")
+    if isinstance(dofs, (str, os.PathLike)):
+        dofs = _read("dofs", Path(dofs), "a readable table of nodes and components", _dof_rows)
     places = {} if points is None else points
-    return LinearStructure(read_array("mass", mass), read_array("stiffness", stiffness), damping, places)
+    return LinearStructure(
+        matrices["mass"],
+        matrices["stiffness"],
+        matrices.get("damping", damping),
+        places,
+        dofs=dofs if table is None else table,
+        fixed=fixed,
+    )
 
 
-def read_array(name: str, path: str | os.PathLike[str]) -> Matrix:
-    """The one array in a file, sparse or dense of any shape; ``name`` is what an error calls it."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise MultiPhiTypeError(f"{name}: got {type(path).__name__}, need the path of a file")
-    file = Path(path)
-    reader = next((read for ending, read in READERS.items() if file.name.endswith(ending)), None)
-    if reader is None:
-        raise MultiPhiValueError(f"{name}: got {str(file)!r}, need a file that ends in {', '.join(READERS)}")
-    return _read(name, file, "a readable matrix", reader)
+def read_array(name: str, file: MatrixFile) -> Matrix:
+    """One array in a file, sparse or dense of any shape; ``name`` is what an error calls it."""
+    found = _matrix(name, file)
+    return found.matrix if isinstance(found, NodalMatrix) else found
 
 
 def read_arrays(name: str, path: Path) -> dict[str, np.ndarray]:
     """All arrays by name of an .npz file that ``numpy.savez`` wrote."""
-    return _read(name, path, "an .npz file of arrays", _named_arrays)
+    return _read(name, path, "an .npz file of arrays", npz_arrays)
+
+
+def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
+    wanted: str | None = None
+    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str):
+        given, wanted = given
+    if not isinstance(given, (str, os.PathLike)):
+        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need the path of a file, or (path, array's name)")
+    path = Path(given)
+    several = ARRAY_READERS.get(path.suffix.lower())
+    if several is not None:
+        return _read(name, path, "a readable matrix", lambda p: chosen(name, several(p), wanted))
+    reader = next((read for ending, read in READERS.items() if path.name.lower().endswith(ending)), None)
+    if reader is None:
+        instead = ELSEWHERE.get(path.suffix.lower())
+        beside = f" ({instead})" if instead else ""
+        raise MultiPhiValueError(f"{name}: got {str(path)!r}{beside}, need a file that ends in {', '.join(ENDINGS)}")
+    if wanted is not None:
+        raise MultiPhiValueError(f"{name}: got an array {wanted!r} of {str(path)!r}, need a file of several arrays")
+    return _read(name, path, "a readable matrix", reader)
+
+
+def _in_same_rows(found: Mapping[str, Matrix | NodalMatrix]) -> tuple[dict[str, Matrix], DofTable | None]:
+    """The matrices in the same rows, and what these are where files name their nodes."""
+    nodal = {name: matrix for name, matrix in found.items() if isinstance(matrix, NodalMatrix)}
+    if not nodal:
+        return dict(found), None
+    if len(nodal) < len(found):
+        without = ", ".join(name for name in found if name not in nodal)
+        raise MultiPhiValueError(f"{without}: got a file without nodes beside others with nodes, need all of one kind")
+    table = same_rows(nodal.values())
+    return {name: matrix.in_rows(table) for name, matrix in nodal.items()}, table
 
 
 def _read(name: str, path: Path, needed: str, read: Callable[[Path], T]) -> T:
@@ -75,7 +149,35 @@ def _read(name: str, path: Path, needed: str, read: Callable[[Path], T]) -> T:
         return read(path)
     except Exception as error:  # readers raise whatever a file that is cut short or changed leads them to
         cause = " ".join(str(error).split()) or type(error).__name__
-        raise MultiPhiValueError(f"{name}: got {str(path)!r}, need {needed}: {cause}") from error
+        raise MultiPhiValueError(f"{name}: got {str(path)!r}{_looks_like(path)}, need {needed}: {cause}") from error
+
+
+def _looks_like(path: Path) -> str:
+    """What the first bytes of a file say that it is, where its name says something else."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(SHOWN)
+    except OSError:
+        return ""
+    said = next((kind for first, kind in FIRST_BYTES.items() if head.startswith(first)), None)
+    return "" if said is None or path.name.lower().endswith(said.rpartition(" ")[2]) else f" (it looks like {said})"
+
+
+def _dof_rows(path: Path) -> list[tuple[int, int | str]]:
+    """(node, component) of every line; "17.3" is component 3 of node 17."""
+    rows: list[tuple[int, int | str]] = []
+    for line in lines_of(path):
+        if line[0] not in "#*%":
+            node, component = re.split(r"[\s,;.]+", line.strip(",; "))
+            rows.append((int(node), int(component) if component.isdigit() else component))
+    return rows
+
+
+def _mtx(path: Path) -> Matrix | NodalMatrix:
+    """Abaqus gives its matrices the ending of Matrix Market; their content tells."""
+    with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        banner = file.read(len(BANNER))
+    return _matrix_market(path) if banner == BANNER else triplets(path)
 
 
 def _matrix_market(path: Path) -> Any:
@@ -97,29 +199,21 @@ def _check_entries(path: Path, entry: re.Pattern[bytes]) -> None:
         raise ValueError(f"an entry reads {wrong[:SHOWN]!r}")
 
 
-def _sparse(path: Path) -> Any:
-    arrays = _named_arrays(path)
-    if "format" not in arrays:
-        raise ValueError(f"it holds the arrays {', '.join(arrays) or 'none'}, not one sparse matrix")
-    matrix = scipy.sparse.load_npz(path)
-    if hasattr(matrix, "check_format"):
-        matrix.check_format(full_check=True)  # indices outside of the shape are read as addresses
-    return matrix
-
-
-def _named_arrays(path: Path) -> dict[str, np.ndarray]:
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return dict(stored)
-
-
 def _dense(path: Path) -> np.ndarray:
     with path.open("rb") as file:
         return np.lib.format.read_array(file, allow_pickle=False)
 
 
 READERS: Mapping[str, Callable[[Path], Any]] = {
-    ".mtx": _matrix_market,
-    ".mtx.gz": _matrix_market,
-    ".npz": _sparse,
+    ".mtx": _mtx,
+    ".mtx.gz": _mtx,
+    ".sti": triplets,
+    ".mas": triplets,
+    ".rsa": harwell_boeing,
+    ".rua": harwell_boeing,
+    ".hb": harwell_boeing,
+    ".rb": harwell_boeing,
+    ".matrix": harwell_boeing,
     ".npy": _dense,
 }
+ENDINGS = (*READERS, *ARRAY_READERS)

@@ -9,8 +9,8 @@ numbers: its value is p.x, and a force F at it acts as p F.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import InitVar, dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,8 +20,9 @@ import scipy.sparse
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import complete_modes
-from multiphi_exudyn.mechanics.arguments import Matrix, is_real, real_array
+from multiphi_exudyn.mechanics.arguments import Matrix, is_real, one_of, real_array
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import DofTable, Place, dof_table, fixed_dofs, known
 
 __all__ = ["At", "LinearStructure", "damping_matrix"]
 
@@ -36,7 +37,13 @@ class LinearStructure(Shown):
 
     mass, stiffness: (n, n), dense or scipy.sparse, symmetric; kept as given, never modified.
     damping: None | (n, n) | ModalDamping | RayleighDamping.
-    points: name -> DoF index or (n,) row; afterwards name -> row, of which only what is not zero is kept.
+    points: name -> DoF index, (node, component) or (n,) row; afterwards name -> row, of which only what is not zero is
+        kept.
+    dofs: what the rows of the matrices are, (node, component) of each: "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6;
+        None: not known. Afterwards a DofTable.
+    fixed: what the supports hold, DoF indices, (node, component) or (node, "all"). Matrices, points, dofs and fixed
+        itself are given in the numbering without supports; these rows and columns are then left out.
+    free: (n,) the degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
 
     Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
     of its modes and static shapes, 4 r + 40 + contacts + points, a few times while it is computed, and once the factors
@@ -50,17 +57,31 @@ class LinearStructure(Shown):
     mass: Matrix
     stiffness: Matrix
     damping: Matrix | ModalDamping | RayleighDamping | None = None
-    points: Mapping[str, int | np.ndarray] = field(default_factory=dict)
+    points: Mapping[str, Place | np.ndarray] = field(default_factory=dict)
+    dofs: DofTable | Sequence[tuple[int, int | str]] | None = None
+    fixed: InitVar[Iterable[Place]] = ()
+    free: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, fixed: Iterable[Place]) -> None:
         mass = _symmetric("mass", self.mass, None)
-        _check_positive_definite(mass)
-        stiffness = _semidefinite_diagonal("stiffness", self.stiffness, mass.shape[0])
+        total = mass.shape[0]
+        dofs = None if self.dofs is None else dof_table(self.dofs, total)
+        held = fixed_dofs(fixed, total, dofs)
+        moving = np.setdiff1d(np.arange(total), held)
+        mass = _check_positive_definite(_without(held, moving, mass), moving, dofs)
+        stiffness = _semidefinite_diagonal("stiffness", self.stiffness, held, moving)
         damping = self.damping
         if not (damping is None or isinstance(damping, (ModalDamping, RayleighDamping))):
-            damping = _semidefinite_diagonal("damping", damping, mass.shape[0])
-        rows = _point_rows(self.points, mass.shape[0])
-        checked = {"mass": mass, "stiffness": stiffness, "damping": damping, "points": rows}
+            damping = _semidefinite_diagonal("damping", damping, held, moving)
+        rows = _point_rows(self.points, total, dofs)
+        checked = {
+            "mass": mass,
+            "stiffness": stiffness,
+            "damping": damping,
+            "points": rows.taken(moving) if len(held) else rows,
+            "dofs": dofs if dofs is None or not len(held) else dofs.taken(moving),
+            "free": self.free[moving] if len(self.free) else moving,
+        }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -79,8 +100,7 @@ class LinearStructure(Shown):
         """The row p, (n,), of a point name, of {point: coefficient}, or of a row given as such."""
         if isinstance(at, str):
             if at not in self.points:
-                known = ", ".join(sorted(self.points)) or "none"
-                raise MultiPhiValueError(f"point: got {at!r}, need one of: {known}")
+                raise MultiPhiValueError(f"point: got {at!r}, need {one_of(at, sorted(self.points))}")
             return np.asarray(self.points[at])
         if isinstance(at, Mapping):
             if not at:
@@ -121,40 +141,61 @@ def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
         raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need {(n, n)} as the mass has")
     if not np.all(np.isfinite(values)):
         raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
-    asymmetry = _largest(matrix - matrix.T)
-    if asymmetry > ROUND_OFF * _largest(matrix):
-        raise MultiPhiValueError(f"{name}: asymmetric by {asymmetry:g}, need a symmetric matrix")
+    if _largest(matrix - matrix.T) > ROUND_OFF * _largest(matrix):
+        raise MultiPhiValueError(f"{name}: {_asymmetry(matrix)}, need a symmetric matrix")
     symmetric = (matrix + matrix.T) / 2
     if not scipy.sparse.issparse(symmetric):
         symmetric.flags.writeable = False
     return symmetric
 
 
+def _asymmetry(matrix: Matrix) -> str:
+    """Which two entries differ most, and by how much."""
+    apart = scipy.sparse.coo_array(matrix - matrix.T)
+    worst = int(np.argmax(np.abs(apart.data)))
+    i, j = int(apart.row[worst]), int(apart.col[worst])
+    share = abs(apart.data[worst]) / _largest(matrix)
+    return f"got {matrix[i, j]:g} at {i, j} and {matrix[j, i]:g} at {j, i}, {share:.2g} of its largest entry apart"
+
+
 def _largest(matrix: Matrix) -> float:
     return float(np.max(np.abs(matrix.data if scipy.sparse.issparse(matrix) else matrix), initial=0.0))
 
 
-def _semidefinite_diagonal(name: str, given: Matrix, n: int) -> Matrix:
-    matrix = _symmetric(name, given, n)
+def _without(held: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matrix:
+    """A matrix without the rows and columns that are held."""
+    if not len(held):
+        return matrix
+    kept = matrix[moving][:, moving]
+    if not scipy.sparse.issparse(kept):
+        kept.flags.writeable = False
+    return kept
+
+
+def _semidefinite_diagonal(name: str, given: Matrix, held: np.ndarray, moving: np.ndarray) -> Matrix:
+    matrix = _without(held, moving, _symmetric(name, given, len(held) + len(moving)))
     diagonal = matrix.diagonal()
     if np.any(diagonal < -ROUND_OFF * _largest(matrix)):
         worst = int(np.argmin(diagonal))
-        raise MultiPhiValueError(f"{name}: diagonal entry {worst} is {diagonal[worst]:g}, need values >= 0")
+        raise MultiPhiValueError(f"{name}: diagonal entry {moving[worst]} is {diagonal[worst]:g}, need values >= 0")
     return matrix
 
 
-def _check_positive_definite(mass: Matrix) -> None:
+def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | None) -> Matrix:
     if np.any(mass.diagonal() <= 0):
         worst = int(np.argmin(mass.diagonal()))
+        of = "" if dofs is None else " ({1} of node {0})".format(*dofs.rows[moving[worst]])
         raise MultiPhiValueError(
-            f"mass: diagonal entry {worst} is {mass.diagonal()[worst]:g}, need a positive definite matrix"
+            f"mass: diagonal entry {moving[worst]}{of} is {mass.diagonal()[worst]:g}, need a positive definite matrix; "
+            "what has no inertia is condensed by the program that wrote it, or held by fixed="
         )
     if scipy.sparse.issparse(mass):
-        return  # a factorisation would cost what the modes cost; they are checked when they are computed
+        return mass  # a factorisation would cost what the modes cost; they are checked when they are computed
     try:
         scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
+    return mass
 
 
 class _PointRows(Mapping[str, np.ndarray]):
@@ -180,18 +221,33 @@ class _PointRows(Mapping[str, np.ndarray]):
     def __contains__(self, name: object) -> bool:
         return name in self._entries
 
+    def taken(self, moving: np.ndarray) -> _PointRows:
+        """The rows of these degrees of freedom alone; refused of a point that cannot move without the others."""
+        entries = {}
+        for name in self:
+            row = self[name]
+            if np.any(row) and not np.any(row[moving]):
+                raise MultiPhiValueError(f"points[{name!r}]: got a place that is fixed, need one that can move")
+            places = np.flatnonzero(row[moving])
+            entries[name] = places, row[moving][places]
+        return _PointRows(len(moving), entries)
 
-def _point_rows(given: Any, n: int) -> _PointRows:
+
+def _point_rows(given: Any, n: int, dofs: DofTable | None) -> _PointRows:
     if isinstance(given, _PointRows) and given.n == n:
         return given
     if not isinstance(given, Mapping):
-        raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {{name: DoF index or ({n},) row}}")
-    return _PointRows(n, {name: _point_entries(name, place, n) for name, place in given.items()})
+        needed = f"{{name: DoF index, (node, component) or ({n},) row}}"
+        raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {needed}")
+    return _PointRows(n, {name: _point_entries(name, place, n, dofs) for name, place in given.items()})
 
 
-def _point_entries(name: str, given: int | np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(name, str) or not name:
         raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
+    if isinstance(given, tuple) and len(given) == 2 and (n != 2 or dofs is not None or isinstance(given[1], str)):
+        called = f"points[{name!r}]"
+        return np.array([known(called, dofs).place(called, *given)]), np.ones(1)
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
         if not 0 <= given < n:
             raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")

@@ -9,6 +9,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
     "undamped modes: ..."     modes for which a list of modal ratios has none
     "damping ratios: ..."     ratios that look like per cent
+    "missing modes: ..."      contacts of a structure of modes alone, where its static flexibility is not known
     "linear range: ..."       what the model's own validity check says
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               what the base of a large structure does not hold (base_share.py)
@@ -31,6 +32,8 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.damping import ModalDamping
+from multiphi_exudyn.mechanics.force_law import LawSpring
+from multiphi_exudyn.mechanics.modal_structure import ModalStructure
 from multiphi_exudyn.time.defects import Samples, indicator, total_defect
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -54,7 +57,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if not trajectory.segments:
         return ()
     model = trajectory.model
-    found = list(damping_warnings(model))
+    found = [*damping_warnings(model), *_missing_modes(model)]
     if not model.whole:
         segments = listed(trajectory.segments)
         samples = Samples(segments, trajectory.t_end)
@@ -83,7 +86,7 @@ class RunSummary:
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     """What a user must not miss of a run in Exudyn, as far as levels and losses tell."""
-    found = list(damping_warnings(model))
+    found = [*damping_warnings(model), *_missing_modes(model)]
     if not model.whole:
         found.extend(static_warnings(run.levels))
         found.extend(_energy_warning(abs(run.truncated), run.energy))
@@ -139,6 +142,22 @@ def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
         yield (
             f"damping ratios: {largest:g} is {100 * largest:g} % of critical damping, which looks like a "
             "ratio in per cent; write 0.01 for 1 %"
+        )
+
+
+def _missing_modes(model: MultiPhiModel) -> Iterator[str]:
+    """Of what acts on a structure of modes at points of which no static flexibility is known."""
+    structure = model.structure
+    if not isinstance(structure, ModalStructure):
+        return
+    names = [link.law.name if isinstance(link, LawSpring) else link.name for link in model.contacts]
+    places = [{at} if isinstance(at, str) else {*at} for at in (link.direction for link in model.contacts)]
+    told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
+    if told:
+        yield (
+            f"missing modes: the structure has its modes up to {structure.highest:g} Hz alone, so "
+            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted; "
+            "give structure_from_modes the static flexibility of the points there"
         )
 
 

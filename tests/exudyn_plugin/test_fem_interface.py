@@ -62,6 +62,12 @@ def test_a_point_is_the_displacement_of_its_node_and_of_its_set_the_mean(fem, ba
     assert structure.row("axial") @ x == pytest.approx(strain * LENGTH, rel=1e-13)
 
 
+def test_components_have_names_as_well(fem):
+    structure = linear_structure_from_fem(fem, "clamp", {"named": (60, "uz"), "counted": (60, 2)})
+    np.testing.assert_array_equal(structure.row("named"), structure.row("counted"))
+    assert structure.dofs.rows[int(np.flatnonzero(structure.row("named"))[0])] == (60, "uz")
+
+
 def test_it_strikes_a_stop_with_its_energy_kept(fem):
     structure = linear_structure_from_fem(fem, "clamp", {"end": ("end", 2)})
     model = MultiPhiModel(structure, [UnilateralContact("stop", "end", 1e-4, 1e6)], modes=8)
@@ -72,7 +78,7 @@ def test_it_strikes_a_stop_with_its_energy_kept(fem):
 
 
 BAD = {
-    "no such set": ({"fixed": "clmp"}, "fixed: got 'clmp', need one of the node sets: clamp, end"),
+    "no such set": ({"fixed": "clmp"}, "fixed: got node set 'clmp', need one of: clamp, end; did you mean 'clamp'"),
     "no such node": ({"fixed": [10**6]}, "fixed: got 1000000, need 0 <= number < 63"),
     "no node": ({"fixed": [1.5]}, "fixed: got 1.5, need a number from 0 to 62"),
     "no nodes": ({"fixed": 3}, "fixed: got int, need node numbers"),

@@ -32,6 +32,8 @@ HEAVY = {
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
+    "h5py": ("multiphi_exudyn/mechanics/array_files.py",),
+    "pyyeti": ("multiphi_exudyn/mechanics/array_files.py",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compilation",

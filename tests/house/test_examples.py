@@ -30,6 +30,18 @@ def test_own_matrices(capsys):
     assert "levels built: 3 of 4" in capsys.readouterr().out
 
 
+def test_structures_from_files(capsys):
+    example = load("structures_from_files")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        (tip, force), *files, alone, completed = example.main().values()
+    assert tip == 0
+    assert [own for own, _ in files] == pytest.approx([0, 0], abs=1e-8)
+    assert abs(completed[1] / force - 1) < 0.05 < 0.4 < alone[1] / force - 1
+    assert completed[0] < alone[0] / 2
+    assert capsys.readouterr().out.count("missing modes") == 1
+
+
 def test_paper_rig(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr("sys.argv", ["paper_rig.py", str(tmp_path / "rig.png")])
     trajectories = load("paper_rig").main()

@@ -26,7 +26,7 @@ class TestMultiPhiModel:
             (ValueError, {"modes": 0}, "modes: got 0"),
             (ValueError, {"modes": -1}, "modes: got -1"),
             (ValueError, {"contacts": [stop(), stop("m1")]}, "contacts: got the names"),
-            (ValueError, {"contacts": [stop("m9")]}, "point: got 'm9'"),
+            (ValueError, {"contacts": [stop("m9")]}, "contact 'stop': point: got 'm9', need one of: m0, m1, m2, m3"),
             (ValueError, {"contacts": [stop({"m0": 0.0})]}, "contact 'stop' direction: got a zero row"),
             (ValueError, {"overrides": {("elsewhere",): LevelOverride()}}, "contact: got 'elsewhere'"),
         ],
@@ -134,6 +134,6 @@ class TestStaticEquilibrium:
     def test_refuses(self, refused, kind, forces, begins):
         refused(kind, begins, MultiPhiModel(chain(4), [stop()], modes=2).static_equilibrium, forces)
 
-    def test_needs_a_structure_that_is_held(self, refused):
+    def test_needs_balanced_forces_where_nothing_holds_the_structure(self, refused):
         m = MultiPhiModel(chain(4, ends=0), [stop()], modes=2)
-        refused(ValueError, "static equilibrium: the open structure has 1", m.static_equilibrium, {"m0": 1.0})
+        refused(ValueError, "static equilibrium: the structure is free (1", m.static_equilibrium, {"m0": 1.0})

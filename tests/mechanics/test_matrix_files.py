@@ -1,6 +1,7 @@
 """Matrices from files are those that were written, whatever the kind of file; a broken one is told in one line."""
 
 import gzip
+import sys
 
 import numpy as np
 import pytest
@@ -16,6 +17,12 @@ MASS = scipy.sparse.csc_array(np.diag(np.arange(1.0, N + 1)))
 STIFFNESS = scipy.sparse.csc_array(3 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1))
 HEADER = b"%%MatrixMarket matrix coordinate "
 ENDINGS = (".mtx", ".mtx.gz", ".npz", ".npy")
+KINDS = {
+    ".mtx": "Matrix Market, .mtx",
+    ".mtx.gz": "a packed file, .mtx.gz",
+    ".npz": "NumPy arrays, .npz",
+    ".npy": "a NumPy array, .npy",
+}
 
 
 def write(file, matrix):
@@ -24,6 +31,13 @@ def write(file, matrix):
         scipy.sparse.save_npz(file, matrix)
     elif file.name.endswith(".npy"):
         np.save(file, matrix.toarray())
+    elif file.name.endswith(".mat"):
+        scipy.io.savemat(file, {"k": matrix})
+    elif file.name.endswith(".rsa"):
+        scipy.io.hb_write(file, scipy.sparse.csc_matrix(matrix))
+    elif file.name.endswith(".sti"):
+        found = matrix.tocoo()
+        np.savetxt(file, np.column_stack([found.row + 1, found.col + 1, found.data]), fmt="%d %d %.15e")
     else:
         plain = file.with_name("plain.mtx")
         scipy.io.mmwrite(plain, matrix, symmetry="symmetric")
@@ -81,10 +95,104 @@ def test_a_broken_file_is_one_line(tmp_path, mass, name, content):
     assert "\n" not in str(caught.value)
 
 
-def test_named_arrays_are_no_sparse_matrix(tmp_path, mass):
-    np.savez(tmp_path / "two.npz", mass=np.eye(N), stiffness=np.eye(N))
-    with pytest.raises(MultiPhiValueError, match="it holds the arrays mass, stiffness, not one sparse matrix"):
-        read_structure(mass, tmp_path / "two.npz")
+SEVERAL = (".npz", ".mat", ".op4")
+
+
+def write_several(file, arrays):
+    """Arrays by name in the kind of file that its name says."""
+    if file.suffix == ".npz":
+        np.savez(file, **arrays)
+    elif file.suffix == ".mat":
+        scipy.io.savemat(file, {**arrays, "title": "a structure"})
+    else:
+        pytest.importorskip("pyyeti.nastran.op4").write(str(file), arrays)
+    return file
+
+
+def write_mat_73(file, arrays):
+    """As MATLAB writes them: 512 bytes of its own, dense matrices by columns, sparse ones in three arrays."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(file, "w", userblock_size=512) as stored:
+        for name, array in arrays.items():
+            if not scipy.sparse.issparse(array):
+                stored[name] = array.T
+                continue
+            group = stored.create_group(name)
+            group.attrs["MATLAB_sparse"] = array.shape[0]
+            group["data"], group["ir"], group["jc"] = array.data, array.indices, array.indptr
+        stored.create_group("#refs#")
+        stored.create_group("results")["stiffness"] = np.eye(N)
+    with file.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+    return file
+
+
+class TestSeveralArrays:
+    @pytest.mark.parametrize("ending", SEVERAL)
+    def test_are_told_by_the_names_of_the_field(self, tmp_path, ending):
+        arrays = {"MAA": MASS.toarray(), "KAA": STIFFNESS, "bgg": 2 * STIFFNESS.toarray(), "modes": np.eye(2)}
+        if ending == ".npz":
+            arrays["KAA"] = STIFFNESS.toarray()
+        file = write_several(tmp_path / f"model{ending}", arrays)
+        found = read_structure(file, file, damping=file)
+        for got, need in ((found.mass, MASS), (found.stiffness, STIFFNESS), (found.damping, 2 * STIFFNESS)):
+            np.testing.assert_array_equal(got.toarray() if scipy.sparse.issparse(got) else got, need.toarray())
+        assert scipy.sparse.issparse(found.stiffness) == (ending != ".npz")
+
+    @pytest.mark.parametrize("ending", SEVERAL)
+    def test_are_taken_by_name(self, tmp_path, ending):
+        file = write_several(tmp_path / f"model{ending}", {"k1": STIFFNESS.toarray(), "k2": MASS.toarray()})
+        found = read_structure((file, "k2"), (file, "k1"))
+        np.testing.assert_array_equal(found.stiffness, STIFFNESS.toarray())
+        with pytest.raises(MultiPhiValueError, match="it holds the arrays k1, k2: say which, \\(file, name\\)"):
+            read_structure((file, "k2"), file)
+        with pytest.raises(MultiPhiValueError, match=r"no array 'k3', need one of: k1, k2$"):
+            read_structure((file, "k2"), (file, "k3"))
+
+    def test_of_matlab_7_3(self, tmp_path):
+        file = write_mat_73(tmp_path / "model.mat", {"M": MASS.toarray(), "K": STIFFNESS})
+        found = read_structure(file, file)
+        np.testing.assert_array_equal(found.mass, MASS.toarray())
+        np.testing.assert_array_equal(found.stiffness.toarray(), STIFFNESS.toarray())
+
+    @pytest.mark.parametrize(
+        ("package", "ending", "told"),
+        [("h5py", ".mat", "pip install 'multiphi-exudyn.matlab.'"), ("pyyeti", ".op4", "multiphi-exudyn.nastran.'")],
+    )
+    def test_say_which_extra_is_missing(self, tmp_path, monkeypatch, mass, package, ending, told):
+        (tmp_path / f"k{ending}").write_bytes(b"\x89HDF\r\n\x1a\n")
+        for name in [name for name in sys.modules if name.split(".")[0] == package]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.setitem(sys.modules, package, None)
+        with pytest.raises(MultiPhiValueError, match=told):
+            read_structure(mass, tmp_path / f"k{ending}")
+
+    def test_a_name_of_a_file_with_one_array_is_refused(self, mass):
+        assert refusal((mass, "matrix"), mass) == ""
+        assert "need a file of several arrays" in refusal(mass, ("k.mtx", "K"))
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("k.full", "an Ansys .full file: write its matrices by HBMAT"),
+        ("k.OP2", "Nastran results: write the matrices by OUTPUT4"),
+        ("k.inp", r"\*MATRIX OUTPUT write .mtx\), need a file that ends in .mtx, "),
+    ],
+)
+def test_files_of_programs_that_hold_no_matrix_are_named_with_what_to_write(mass, name, told):
+    with pytest.raises(MultiPhiValueError, match=told):
+        read_structure(mass, name)
+
+
+def test_content_of_another_kind_than_the_name_says_is_named(tmp_path, mass):
+    for ending in ENDINGS:
+        written = write(tmp_path / f"k{ending}", STIFFNESS)
+        for other in (".npy", ".npz", ".rsa", ".mat", ".mtx"):
+            if other != ending and not ending.startswith(other):
+                line = refusal(mass, written.rename(tmp_path / f"wrong{other}"))
+                written = tmp_path / f"wrong{other}"
+                assert f"looks like {KINDS[ending]}" in line
 
 
 def test_places_outside_of_a_sparse_matrix_are_refused(tmp_path, mass):
@@ -99,7 +207,7 @@ def test_what_is_no_path_is_refused(mass):
         read_structure(mass, 3)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", [*ENDINGS, ".mat", ".rsa", ".sti"])
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_change_of_bytes_is_read_or_refused_in_one_line(tmp_path, ending, data):

@@ -63,6 +63,12 @@ class TestMatrices:
     def test_refuses_another_size_than_the_mass(self, refused, which):
         refused(ValueError, f"{which}: got shape (3, 3), need (2, 2)", structure, **{which: np.eye(3)})
 
+    @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
+    def test_says_which_entries_are_asymmetric_and_by_how_much(self, refused, kind):
+        matrix = kind(changed(STIFFNESS, 0, 1, -1.3))
+        begins = "stiffness: got -1.3 at (0, 1) and -1 at (1, 0), 0.1 of its largest entry apart"
+        refused(ValueError, begins, structure, stiffness=matrix)
+
     @pytest.mark.parametrize(("diagonal", "beside"), [(1.0, 2.0), (1.0, 1.0), (0.0, 0.0)])
     def test_refuses_a_mass_that_is_not_positive_definite(self, refused, diagonal, beside):
         refused(ValueError, "mass: ", structure, mass=[[diagonal, beside], [beside, 1.0]])
@@ -181,6 +187,15 @@ class TestRow:
     )
     def test_refuses(self, refused, kind, at, begins):
         refused(kind, begins, structure().row, at)
+
+    def test_of_a_misspelt_name_says_what_may_be_meant(self):
+        with pytest.raises(MultiPhiError, match="got 'tpi', need one of: root, tip; did you mean 'tip'"):
+            structure().row("tpi")
+
+    def test_of_an_unknown_name_lists_a_dozen_of_many(self):
+        built = LinearStructure(np.eye(40), np.eye(40), points={f"p{i:02d}": i for i in range(40)})
+        with pytest.raises(MultiPhiError, match=r"need one of: p00, .*p11 and 28 more$"):
+            built.row("elsewhere")
 
     def test_of_a_structure_without_points_says_so(self, refused):
         refused(ValueError, "point: got 'tip', need one of: none", structure(points={}).row, "tip")

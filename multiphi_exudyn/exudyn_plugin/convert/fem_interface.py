@@ -3,7 +3,8 @@
     M_free x'' + C x' + K_free x = f,   x the displacements [m] of the nodes that are not fixed
 
 The matrices of a FEMinterface have no supports; degree of freedom 3 i + c is component c (0, 1, 2 for x, y, z) of
-node i, nodes counted from 0. Fixed nodes are left out; the matrices stay sparse.
+node i, nodes counted from 0; "ux", "uy", "uz" name the components too. Fixed nodes are left out; the matrices stay
+sparse.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.arguments import Matrix, one_of
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import COMPONENTS as NAMES
+from multiphi_exudyn.mechanics.dofs import DofTable
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["linear_structure_from_fem"]
@@ -29,14 +32,14 @@ COMPONENTS = 3  # of the displacement of a node
 def linear_structure_from_fem(
     fem: Any,
     fixed: Iterable[int] | str = (),
-    points: Mapping[str, tuple[Nodes, int]] | None = None,
+    points: Mapping[str, tuple[Nodes, int | str]] | None = None,
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
 ) -> LinearStructure:
     """The structure of an ``exudyn.FEM.FEMinterface``, which is left as it was.
 
-    fixed: node numbers, or the name of a node set. points: name -> (node number, component); with the name of a node
-    set the mean of its nodes by their weights, as a contact or load over a face needs it. damping: as
-    ``LinearStructure`` takes it, in the free degrees of freedom.
+    fixed: node numbers, or the name of a node set. points: name -> (node number, component), 0 to 2 or "ux", "uy" and
+    "uz"; with the name of a node set the mean of its nodes by their weights, as a contact or load over a face needs it.
+    damping: as ``LinearStructure`` takes it, in the free degrees of freedom; ``dofs`` says which these are.
 
     Raises MultiPhiValueError or MultiPhiTypeError for matrices that are missing or do not fit the nodes, for nodes,
     sets and components that do not exist, and for a point that is fixed.
@@ -47,7 +50,8 @@ def linear_structure_from_fem(
     moving[held] = False
     free = np.flatnonzero(moving)
     rows = {name: _row(fem, name, given, moving) for name, given in ({} if points is None else points).items()}
-    return LinearStructure(mass[free][:, free], stiffness[free][:, free], damping, rows)
+    dofs = DofTable(tuple((int(dof) // COMPONENTS, NAMES[dof % COMPONENTS]) for dof in free))
+    return LinearStructure(mass[free][:, free], stiffness[free][:, free], damping, rows, dofs=dofs)
 
 
 def _matrices(fem: Any) -> tuple[Any, Any]:
@@ -83,8 +87,8 @@ def _node_set(fem: Any, name: str, wanted: str) -> tuple[np.ndarray, np.ndarray]
             if weights.shape != (len(nodes),) or not np.sum(weights) > 0:
                 raise MultiPhiValueError(f"node set {wanted!r}: got weights {weights}, need {len(nodes)} of sum > 0")
             return np.array(nodes, int), weights / np.sum(weights)
-    known = ", ".join(given["Name"] for given in fem.nodeSets) or "none"
-    raise MultiPhiValueError(f"{name}: got {wanted!r}, need one of the node sets: {known}")
+    known = one_of(wanted, [given["Name"] for given in fem.nodeSets])
+    raise MultiPhiValueError(f"{name}: got node set {wanted!r}, need {known}")
 
 
 def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
@@ -92,7 +96,8 @@ def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
     called = f"points[{name!r}]"
     if not (isinstance(given, tuple) and len(given) == 2):
         raise MultiPhiTypeError(f"{called}: got {given!r}, need (node number or node set, component)")
-    component = _number(f"{called} component", given[1], COMPONENTS)
+    named = isinstance(given[1], str) and given[1] in NAMES
+    component = _number(f"{called} component", NAMES.index(given[1]) if named else given[1], COMPONENTS)
     row = np.zeros(moving.shape)
     if isinstance(given[0], str):
         nodes, weights = _node_set(fem, called, given[0])

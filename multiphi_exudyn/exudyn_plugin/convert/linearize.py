@@ -12,7 +12,7 @@ their geometric stiffness (geometric_stiffness.py).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +33,7 @@ from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, def
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import Place
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["LinearizedStructure", "linear_structure_from"]
@@ -51,8 +52,8 @@ class LinearizedStructure(LinearStructure):
 
     coordinates: np.ndarray
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def __post_init__(self, fixed: Iterable[Place]) -> None:
+        super().__post_init__(fixed)
         coordinates = np.array(self.coordinates, dtype=float)
         if coordinates.ndim != 2 or coordinates.shape[1] != self.n:
             raise MultiPhiValueError(f"coordinates: got shape {coordinates.shape}, need (n_full, {self.n})")

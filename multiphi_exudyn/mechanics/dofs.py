@@ -1,0 +1,142 @@
+"""Degrees of freedom by node and component: which row of the matrices is (5, "uz").
+
+Components are ux, uy, uz [m] and rx, ry, rz [rad], or their numbers 1 to 6 as finite element programs count them.
+Nodes have the numbers that the program gave them.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import is_real, one_of
+
+__all__ = ["COMPONENTS", "DofTable", "Place", "dof_table", "fixed_dofs", "known", "node_component"]
+
+Place: TypeAlias = "int | tuple[int, int | str]"  # a DoF index, or (node, component)
+
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+EVERY = "all"  # components of a node
+NEEDED = "need (node number, component) for every row of the matrices"
+
+
+@dataclass(frozen=True)
+class DofTable:
+    """rows: (node, name of the component) of every row of the matrices, each once."""
+
+    rows: tuple[tuple[int, str], ...]
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[int, str]]) -> DofTable:
+        """A table of these rows by node, and of a node by component."""
+        return cls(tuple(sorted(rows, key=lambda row: (row[0], COMPONENTS.index(row[1])))))
+
+    @functools.cached_property
+    def _places(self) -> dict[int, dict[str, int]]:
+        found: dict[int, dict[str, int]] = {}
+        for place, (node, component) in enumerate(self.rows):
+            found.setdefault(node, {})[component] = place
+        return found
+
+    def place(self, name: str, node: Any, component: Any) -> int:
+        """The row of a node's component; ``name`` is what an error calls what is asked for."""
+        own = self._node(name, node)
+        wanted = _component(name, component)
+        if wanted not in own:
+            raise MultiPhiValueError(f"{name}: got {wanted!r} of node {node}, need {one_of(wanted, own)}")
+        return own[wanted]
+
+    def places(self, name: str, node: Any, component: Any) -> list[int]:
+        """The rows of a node's component, or of "all" that it has."""
+        if isinstance(component, str) and component == EVERY:
+            return list(self._node(name, node).values())
+        return [self.place(name, node, component)]
+
+    def taken(self, places: np.ndarray) -> DofTable:
+        """The table of these rows alone."""
+        return DofTable(tuple(self.rows[place] for place in places.tolist()))
+
+    def _node(self, name: str, node: Any) -> dict[str, int]:
+        number = _node_number(name, node)
+        if number not in self._places:
+            nodes = self._places
+            nearest = min(nodes, key=lambda other: abs(other - number))
+            needed = f"one of {len(nodes)} nodes from {min(nodes)} to {max(nodes)}; did you mean {nearest}?"
+            raise MultiPhiValueError(f"{name}: got node {node}, need {needed}")
+        return self._places[number]
+
+
+def dof_table(given: Any, n: int) -> DofTable:
+    """A table of n rows from (node, component) of each."""
+    if isinstance(given, (str, Mapping)) or not isinstance(given, (Iterable, DofTable)):
+        raise MultiPhiTypeError(f"dofs: got {type(given).__name__}, {NEEDED}")
+    pairs = given.rows if isinstance(given, DofTable) else tuple(given)
+    if len(pairs) != n:
+        raise MultiPhiValueError(f"dofs: got {len(pairs)} rows, need {n} as the mass has")
+    if isinstance(given, DofTable):
+        return given
+    rows = tuple(node_component(f"dofs[{i}]", pair) for i, pair in enumerate(pairs))
+    if len(set(rows)) < n:
+        twice = Counter(rows).most_common(1)[0][0]
+        raise MultiPhiValueError(f"dofs: got {twice} twice, need each node's component once")
+    return DofTable(rows)
+
+
+def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
+    """Which of n degrees of freedom are held, (k,) ascending, from DoF indices, (node, component) or (node, "all")."""
+    needed = 'need a list of DoF indices, (node, component) or (node, "all")'
+    if isinstance(given, (str, bytes, Mapping)) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"fixed: got {given!r}, {needed}")
+    held: set[int] = set()
+    for item in given:
+        if isinstance(item, tuple) and len(item) == 2:
+            held.update(known(f"fixed {item!r}", dofs).places("fixed", *item))
+        elif isinstance(item, (int, np.integer)) and not isinstance(item, bool):
+            if not 0 <= item < n:
+                raise MultiPhiValueError(f"fixed: got DoF {item}, need 0 <= DoF < {n}")
+            held.add(int(item))
+        else:
+            raise MultiPhiTypeError(f"fixed: got {item!r}, {needed}")
+    if len(held) == n:
+        raise MultiPhiValueError(f"fixed: got all {n} degrees of freedom, need some that can move")
+    return np.array(sorted(held), int)
+
+
+def known(name: str, dofs: DofTable | None) -> DofTable:
+    """The table, refused where there is none."""
+    if dofs is None:
+        raise MultiPhiValueError(f"{name}: got a node where no row's node is known, need dofs=, or DoF indices")
+    return dofs
+
+
+def _component(name: str, given: Any) -> str:
+    """The name of a component that is given by its name or its number from 1."""
+    if isinstance(given, str):
+        if given.lower() in COMPONENTS:
+            return given.lower()
+        raise MultiPhiValueError(f"{name}: got component {given!r}, need 1 to 6 or {one_of(given, COMPONENTS)}")
+    if is_real(given) and given in range(1, len(COMPONENTS) + 1):
+        return COMPONENTS[int(given) - 1]
+    raise MultiPhiValueError(f"{name}: got component {given!r}, need 1 to 6 or one of: {', '.join(COMPONENTS)}")
+
+
+def node_component(name: str, given: Any) -> tuple[int, str]:
+    """A node's number and the name of its component; ``name`` is what an error calls the pair."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"{name}: got {given!r}, need (node number, component)")
+    pair = tuple(given)
+    if len(pair) != 2:
+        raise MultiPhiValueError(f"{name}: got {given!r}, need (node number, component)")
+    return _node_number(name, pair[0]), _component(name, pair[1])
+
+
+def _node_number(name: str, given: Any) -> int:
+    if not is_real(given) or given != int(given):
+        raise MultiPhiTypeError(f"{name}: got node {given!r}, need a node number")
+    return int(given)
