@@ -84,7 +84,7 @@ class InterfaceNode:
             )
         kind: Any = _KINDS[len(self.position), self.angles]
         found = kind(name=name, referenceCoordinates=places, initialCoordinates=start, initialVelocities=start_t)
-        found.visualization.show = show
+        found.visualization = {**found.visualization, "show": show}
         return found
 
 
