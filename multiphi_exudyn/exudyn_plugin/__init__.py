@@ -18,6 +18,7 @@ from multiphi_exudyn.exudyn_plugin.convert.fem_interface import linear_structure
 from multiphi_exudyn.exudyn_plugin.convert.linear_range import RangeCheck
 from multiphi_exudyn.exudyn_plugin.convert.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.convert.reduce import Item, Reduction, reduce
+from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import PositionInterface, RigidInterface
 
 __all__ = [
     "BodyHistories",
@@ -26,8 +27,10 @@ __all__ = [
     "Item",
     "LinearizedStructure",
     "MultiPhiBody",
+    "PositionInterface",
     "RangeCheck",
     "Reduction",
+    "RigidInterface",
     "body_histories",
     "linear_structure_from",
     "linear_structure_from_fem",

@@ -162,6 +162,23 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
     assert capsys.readouterr().out.count("apart") == 2
 
 
+def test_jointed_body(capsys, monkeypatch, tmp_path):
+    example, picture = load("jointed_body"), tmp_path / "jointed.png"
+    monkeypatch.setattr(example, "CASES", example.CASES[:2])
+    monkeypatch.setattr(example, "T_END", 0.12)
+    monkeypatch.setattr(example, "STEPS", example.STEPS[::2])
+    monkeypatch.setattr(example, "FINE", 2.5e-5)
+    found = example.main([str(picture)])
+    for runs in found.values():
+        assert runs.errors[-1] < 1e-4
+        assert example.order(runs.errors) == pytest.approx(2.1, abs=0.35)
+        assert runs.apart < 2e-5
+        assert runs.small_error < 3e-3
+        assert len(runs.small.histories.events) >= 2
+    assert picture.stat().st_size > 10_000
+    assert capsys.readouterr().out.count("apart") == 2
+
+
 def test_reduce_your_model(capsys, tmp_path):
     picture = tmp_path / "reduced.png"
     found = load("reduce_your_model").main([str(picture)])

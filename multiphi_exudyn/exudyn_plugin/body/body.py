@@ -112,6 +112,9 @@ class MultiPhiBody:
     @property
     def clear(self) -> Callable[[float], int] | None:
         """Says at the end of every step whether there is nothing to do, None where the time says it."""
+        interface = self.coordinates.interface
+        if self._test is not None and interface is not None and interface.turns:
+            return self._seen_clear
         return None if self._test is None else self._test.clear
 
     @property
@@ -133,7 +136,9 @@ class MultiPhiBody:
     def warnings(self) -> tuple[str, ...]:
         """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
-        return warnings_of_body(self.model, self._record.of(self._events, truncated))
+        interface = self.coordinates.interface
+        turned = () if interface is None else interface.warnings
+        return (*warnings_of_body(self.model, self._record.of(self._events, truncated)), *turned)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The level of elements in these states as the solver has it."""
@@ -193,9 +198,18 @@ class MultiPhiBody:
                 f"PreStepUserFunction: got a function that replaced the loads of {self.name!r}, need it set before "
                 "CreateMultiPhiBody (it is then called after them)"
             )
+        if self.coordinates.interface is not None:
+            self.coordinates.interface.look()
         if not test.clear(t):
             self._repeat(mbs, test.time, t, test.start)
             self._begin_step(t, self.coordinates.read())
+
+    def _seen_clear(self, t: float) -> int:
+        """``clear`` of a body whose interface may turn."""
+        assert self._test is not None
+        assert self.coordinates.interface is not None
+        self.coordinates.interface.look()
+        return self._test.clear(t)
 
     def _repeat(self, mbs: Any, begun: float, t: float, before: np.ndarray) -> None:
         """Do a step again exactly; before: x at its start."""

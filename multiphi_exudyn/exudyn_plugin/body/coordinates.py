@@ -71,7 +71,7 @@ class Coordinates:
     @property
     def points(self) -> int:
         """m, the number of interface coordinates."""
-        return 0 if self.interface is None else len(self.interface.nodes)
+        return 0 if self.interface is None else self.interface.count
 
     def attach(self, mbs: Any) -> None:
         """Take the views of the system's current state; they hold for one run."""

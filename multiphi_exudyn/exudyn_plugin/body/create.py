@@ -17,13 +17,13 @@ from multiphi_exudyn.exudyn_plugin.body.coordinates import matrices
 from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
 from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
-from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface, interface_rows
+from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
+from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import InterfaceNode, InterfacePoint, interface_nodes
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
-from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.simulate import Run, started
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -41,7 +41,7 @@ def CreateMultiPhiBody(
     velocity: np.ndarray | None = None,
     loads: Sequence[Load] = (),
     matchedStepSize: float | None = None,
-    interface: Iterable[str] | Mapping[str, At] = (),
+    interface: Iterable[str] | Mapping[str, InterfacePoint] = (),
     show: bool = True,
     drawing: Drawing | None = None,
     start: Trajectory | Equilibrium | None = None,
@@ -53,16 +53,17 @@ def CreateMultiPhiBody(
     is a trajectory its final state is handed on whole, and time begins anew.
     matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
     with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
-    stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
-    (interface.py); needs TrapezoidalIndex2 and constant loads. Where an ObjectContactCoordinate acts on them, set
-    ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps than the others are no gain, and
-    with matchedStepSize an error. show: as in other Create functions. drawing: None, or
-    how the renderer shows the body.
+    stepped_level.py. interface: what connectors, loads and sensors act on: names of points or {name: point or row},
+    one coordinate each, or {name: PositionInterface or RigidInterface}, positions and frames to which markers of
+    positions and of rigid bodies attach (interface_nodes.py); needs TrapezoidalIndex2 and constant loads. Where an
+    ObjectContactCoordinate acts on them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``:
+    shorter steps than the others are no gain, and with matchedStepSize an error. show: as in other Create
+    functions. drawing: None, or how the renderer shows the body.
 
-    Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, one coordinate each, and
-    {name: SensorIndex}, the force on it), nGenericODE2, oGenericODE2, nGenericData (not without contacts),
-    sCoordinates, sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into
-    displacements and forces; ``mbs.variables['multiPhi'][name]`` has the ``events`` with times inside steps, and the
+    Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, and {name: SensorIndex},
+    the forces on its coordinates), nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
+    sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
+    and forces; ``mbs.variables['multiPhi'][name]`` has the ``events`` with times inside steps, and the
     ``warnings``: what to distrust in the run so far; at its end a MultiPhiWarning is issued for each of them.
     """
     if not isinstance(mbs, exu.MainSystem):
@@ -79,7 +80,7 @@ def CreateMultiPhiBody(
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
     check_drawing(drawing, model)
-    rows = interface_rows(model.structure, interface)
+    nodes = interface_nodes(model.structure, interface)
     body = MultiPhiBody(
         name,
         _motion(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True)),
@@ -88,21 +89,21 @@ def CreateMultiPhiBody(
         matchedStepSize,
     )
     moving = [link for link in model.links if link.velocity]
-    if rows and moving:
+    if nodes and moving:
         name, speed = moving[0].name, moving[0].velocity
         raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")
-    if rows and body.varies:
+    if nodes and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
             f"loads: got {', '.join(sorted(varying))} with an interface, need constant loads (a varying force can be a "
             "load of the system on an interface coordinate)"
         )
     body.items.update(_add_items(mbs, body, show, drawing))
-    if rows:
-        _add_interface(mbs, body, rows)
+    if nodes:
+        _add_interface(mbs, body, nodes, show)
     body.items.update(add_sensors(mbs, body))
     bodies.add(body)
-    if model.contacts or rows or matchedStepSize is not None or body.varies:
+    if model.contacts or nodes or matchedStepSize is not None or body.varies:
         bodies.install(mbs)
     if body.varies:
         bodies.install_before(mbs)
@@ -158,8 +159,8 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
     return items
 
 
-def _add_interface(mbs: Any, body: MultiPhiBody, rows: Mapping[str, np.ndarray]) -> None:
-    interface = body.coordinates.interface = Interface(mbs, body.name, rows, body.model.most_levels)
+def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], show: bool) -> None:
+    interface = body.coordinates.interface = Interface(mbs, body.name, nodes, body.model.most_levels)
     stepped = body.stepped_level(body.state.states)
-    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start)
+    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, show)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors

@@ -85,7 +85,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     points: names to rebuild, None for all of the structure.
     """
     body = _body_of(mbs, items)
-    on_points = [mbs.GetSensorStoredData(sensor)[:, 1] for sensor in items.get("sInterface", {}).values()]
+    on_points = [mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in items.get("sInterface", {}).values()]
     table = {key: mbs.GetSensorStoredData(items[key]) for key in (*RECORDED, "sLevel") if key in items}
     time = table["sCoordinates"][:, 0]
     if len(time) == 0:
@@ -95,7 +95,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in RECORDED])
-    values = rebuilt(body, rows, data, time, stored, np.reshape(on_points, (len(on_points), len(time))))
+    values = rebuilt(body, rows, data, time, stored, np.hstack([data[:, :0], *on_points]).T)
     moved, rates, gaps, forces, tensions, patches = values
     model = body.model
     contacts = {c.name: i for i, c in enumerate(model.contacts) if not c.held}

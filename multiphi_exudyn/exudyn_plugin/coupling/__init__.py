@@ -4,5 +4,5 @@ A level is matched to the solver's time step. Interface coordinates are points o
 constraints of the system act; masses and constraints there take part in impacts; the system's matrices say which those
 are.
 
-Order: stepped_level, modal_force, exact_motion, attached_inertia, interface, system_matrices.
+Order: stepped_level, modal_force, exact_motion, attached_inertia, interface_nodes, interface, system_matrices.
 """

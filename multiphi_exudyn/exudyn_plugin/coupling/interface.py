@@ -2,12 +2,11 @@
 
     y = R q + c,   0 = f + reaction of the tie,   p = R^T f
 
-y displacements (or rotations) of the points, each the coordinate of a massless NodeGenericODE2, so that
-MarkerNodeCoordinate(node, 0) works as for any other item. R (m, s) rows of the points in the modes of the present
-level, c (m,) its asymptotic configuration there [m]; f (m,) what acts on y [N], p its modal force. One
-ObjectConnectorCoordinateVector per point holds the equation. At a transition R and c are exchanged and y, y', y'' are
-written, so y is the displacement of the body at every step. With modes matched to the step, y' = R q' is the solver's
-velocity (stepped_level.py).
+y displacements and rotations of the points, the coordinates of massless nodes (interface_nodes.py). R (m, s) rows of
+the points in the modes of the present level, c (m,) its asymptotic configuration there [m, rad]; f (m,) what acts on y
+[N, N m], p its modal force. One ObjectConnectorCoordinateVector per node holds the equation. At a transition R and c
+are exchanged and y, y', y'' are written, so y is the displacement of the body at every step. With modes matched to the
+step, y' = R q' is the solver's velocity (stepped_level.py).
 
 f comes from the multipliers of the ties, so points may depend on each other, and a rigid contact may hold one. Within
 the step of an event the f of its mean acts before the event, and after it with what the event changes in reactions,
@@ -24,39 +23,24 @@ contact holds may carry anything but a further constraint: Exudyn then has two f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
 import numpy as np
-from exudyn.itemInterface import MarkerNodeCoordinates, NodeGenericODE2, ObjectConnectorCoordinateVector, SensorObject
+from exudyn.itemInterface import MarkerNodeCoordinates, ObjectConnectorCoordinateVector, SensorObject
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import TURN, InterfaceNode
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import shift
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
-from multiphi_exudyn.mechanics.structure import At, LinearStructure
 
-__all__ = ["Interface", "interface_rows"]
-
-
-def interface_rows(structure: LinearStructure, given: Iterable[str] | Mapping[str, At]) -> dict[str, np.ndarray]:
-    """Rows (n,) by the names of interface coordinates, from names of points or {name: point or row}."""
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
-    points = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
-    for name in points:
-        if not isinstance(name, str):
-            raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
-    rows = {name: structure.row(at) for name, at in points.items()}
-    for name, row in rows.items():
-        if not np.any(row):
-            raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
-    return rows
+__all__ = ["Interface"]
 
 
 @dataclass(frozen=True)
@@ -79,47 +63,45 @@ class _Reading:
 class Interface:
     """The interface coordinates of one body in one system.
 
-    nodes: NodeIndex by name. sensors: of f, by name. ties: the objects that hold the equation. most: levels of which R
-    and c are kept.
+    count: m. nodes: NodeIndex by name. sensors: of f, by name. ties: the objects that hold the equation. turned: by how
+    much rigid nodes have turned at most [rad], by name. most: levels of which R and c are kept.
     """
 
-    def __init__(self, mbs: Any, name: str, rows: Mapping[str, np.ndarray], most: int) -> None:
+    def __init__(self, mbs: Any, name: str, given: Sequence[InterfaceNode], most: int) -> None:
         self.nodes: dict[str, Any] = {}
         self.sensors: dict[str, Any] = {}
+        self.turned: dict[str, float] = {}
         self._name = name
-        self._rows = np.array(list(rows.values()))
-        self._names = tuple(rows)
+        self._given = tuple(given)
+        self._rows = np.concatenate([node.rows for node in given])
+        self.count = len(self._rows)
+        ends = np.cumsum([len(node.rows) for node in given])
+        self._parts = [slice(int(end) - len(node.rows), int(end)) for node, end in zip(given, ends, strict=True)]
         self.ties: list[Any] = []
         self._known: BoundedCache[tuple[int, ...], _Reading] = BoundedCache(most)
         self._mbs = mbs
 
-    def add(self, node: Any, stepped: SteppedLevel, held: np.ndarray, q: np.ndarray, q_t: np.ndarray) -> None:
+    def add(
+        self, node: Any, stepped: SteppedLevel, held: np.ndarray, q: np.ndarray, q_t: np.ndarray, show: bool
+    ) -> None:
         """Add nodes and ties for a body whose node holds q, q' (s,) in a level, with places that links hold (h,)."""
         found, mbs = self.of(stepped), self._mbs
-        own = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node))
-        for name, row, constant in zip(self._names, found.rows, found.offset(held), strict=True):
-            point = mbs.AddNode(
-                NodeGenericODE2(
-                    name=f"Node:{self._name}.{name}",
-                    referenceCoordinates=[0.0],
-                    initialCoordinates=[row @ q + constant],
-                    initialCoordinates_t=[row @ q_t],
-                    numberOfODE2Coordinates=1,
-                )
-            )
-            marker = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=point))
+        own, offsets = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)), found.offset(held)
+        for given, part in zip(self._given, self._parts, strict=True):
+            rows, offset, called = found.rows[part], offsets[part], f"{self._name}.{given.name}"
+            point = mbs.AddNode(given.item(f"Node:{called}", rows @ q + offset, rows @ q_t, show))
             tie = ObjectConnectorCoordinateVector(
-                name=f"{self._name}.{name}",
-                markerNumbers=[own, marker],
-                scalingMarker0=row[None, :],
-                scalingMarker1=np.eye(1),
-                offset=[constant],
+                name=called,
+                markerNumbers=[own, mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=point))],
+                scalingMarker0=rows,
+                scalingMarker1=np.eye(len(rows)),
+                offset=offset,
             )
-            self.nodes[name] = point
+            self.nodes[given.name] = point
             self.ties.append(mbs.AddObject(tie))
-            self.sensors[name] = mbs.AddSensor(
+            self.sensors[given.name] = mbs.AddSensor(
                 SensorObject(
-                    name=f"Sensor:{self._name}.{name}",
+                    name=f"Sensor:{called}",
                     objectNumber=self.ties[-1],
                     outputVariableType=exu.OutputVariableType.Force,
                     storeInternal=True,
@@ -146,7 +128,15 @@ class Interface:
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
-        self.places = np.array([self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()])
+        first = [self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()]
+        sizes = [len(node.rows) for node in self._given]
+        self.places = np.concatenate([np.arange(k, k + size) for k, size in zip(first, sizes, strict=True)])
+        self._angles = {
+            node.name: self.places[part][-node.angles :]
+            for node, part in zip(self._given, self._parts, strict=True)
+            if node.angles
+        }
+        self.turned = dict.fromkeys(self._angles, 0.0)
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
         self.multipliers = [row for tie in self.ties for row in self._mbs.systemData.GetObjectLTGAE(tie)]
         self._forces = state["AECoords"]
@@ -156,12 +146,33 @@ class Interface:
         """f (m,) in the system's current state."""
         return np.asarray(self._forces[self.multipliers])
 
+    @property
+    def turns(self) -> bool:
+        """Whether it has rigid nodes."""
+        return any(node.angles for node in self._given)
+
+    def look(self) -> None:
+        """See how far rigid nodes are turned in the system's current state."""
+        for name, places in self._angles.items():
+            self.turned[name] = max(self.turned[name], float(np.linalg.norm(self._views[0][places])))
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """Of rigid nodes that turned further than a linear body can, a sentence each."""
+        for name, angle in self.turned.items():
+            if angle > TURN:
+                yield (
+                    f"rigid interface {name!r}: turned by {math.degrees(angle):.3g} degrees; the body is linear, do "
+                    f"not trust it beyond {math.degrees(TURN):g} degrees: make the motion smaller"
+                )
+
     def load(self, stepped: SteppedLevel, held: np.ndarray) -> None:
         """Give the ties R and c of a level, with places that links hold (h,)."""
         found = self.of(stepped)
-        for tie, row, constant in zip(self.ties, found.rows, found.offset(held), strict=True):
-            self._mbs.SetObjectParameter(tie, "scalingMarker0", row[None, :])
-            self._mbs.SetObjectParameter(tie, "offset", [constant])
+        offsets = found.offset(held)
+        for tie, part in zip(self.ties, self._parts, strict=True):
+            self._mbs.SetObjectParameter(tie, "scalingMarker0", found.rows[part])
+            self._mbs.SetObjectParameter(tie, "offset", offsets[part])
 
     def write(self, stepped: SteppedLevel, held: np.ndarray, coordinates: Iterable[np.ndarray]) -> None:
         """Write y, y', y'' of q, q', q'' (s,), with places that links hold (h,)."""

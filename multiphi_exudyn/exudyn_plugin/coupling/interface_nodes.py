@@ -1,0 +1,136 @@
+"""Interface nodes: the nodes of an Exudyn system by which points of a body are offered to it.
+
+    y = R q + c,   y the coordinates of the node: displacements [m] from its position, and angles [rad]
+
+One coordinate is a NodeGenericODE2. A position is a NodePoint2D or a NodePoint, whose coordinates are displacements in
+global directions; markers of positions, and with them springs, distance and spherical joints, attach. A rigid interface
+is a NodeRigidBody2D or a NodeRigidBodyRxyz; markers of rigid bodies, and with them every joint, attach. The nodes have
+no mass, and their coordinates are linear in q; what is large in the system around them is not.
+
+The angles of a NodeRigidBodyRxyz are turned by one after the other, about the node's x, y and z axis. As long as they
+are small they are the components of one rotation, which is what a linear structure knows; of 5 degrees that differs by
+0.4 %. The power of what acts on the node is that on the modes at any angle, for p = R^T f.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from exudyn.itemInterface import NodeGenericODE2, NodePoint, NodePoint2D, NodeRigidBody2D, NodeRigidBodyRxyz
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
+
+__all__ = ["InterfaceNode", "InterfacePoint", "PositionInterface", "RigidInterface", "interface_nodes"]
+
+TURN = math.radians(5.0)  # rad: from there on a rigid interface has turned further than a linear body can
+ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, about x, y and z in space
+
+
+@dataclass(frozen=True)
+class PositionInterface:
+    """A point of a body as a position of the system.
+
+    position: where it is without displacement [m], two numbers for a plane system and three for one in space.
+    displacements: what moves it in each of these directions, as ``LinearStructure.row`` takes it, or None in one in
+    which the structure does not move.
+    """
+
+    position: Sequence[float]
+    displacements: Sequence[At | None]
+
+
+@dataclass(frozen=True)
+class RigidInterface:
+    """A place of a body as a rigid frame of the system, which moves and turns.
+
+    position, displacements: as of a PositionInterface. rotations: what turns it [rad]: about z in a plane system, about
+    x, y and z in space, as rows or None. A body is linear: a run in which a rigid interface turns by more than 5
+    degrees issues a warning.
+    """
+
+    position: Sequence[float]
+    displacements: Sequence[At | None]
+    rotations: Sequence[At | None]
+
+
+InterfacePoint: TypeAlias = "At | PositionInterface | RigidInterface"
+
+
+@dataclass(frozen=True)
+class InterfaceNode:
+    """name; rows (k, n) of its coordinates; position (2 or 3,) [m], none of a single coordinate; angles: of the k."""
+
+    name: str
+    rows: np.ndarray
+    position: tuple[float, ...] = ()
+    angles: int = 0
+
+    def item(self, name: str, start: np.ndarray, start_t: np.ndarray, show: bool) -> Any:
+        """Exudyn's node with coordinates and velocities (k,) at the start."""
+        places = [*self.position, *[0.0] * self.angles]
+        if not places:
+            return NodeGenericODE2(
+                name=name,
+                referenceCoordinates=[0.0],
+                initialCoordinates=start,
+                initialCoordinates_t=start_t,
+                numberOfODE2Coordinates=1,
+            )
+        kind: Any = _KINDS[len(self.position), self.angles]
+        found = kind(name=name, referenceCoordinates=places, initialCoordinates=start, initialVelocities=start_t)
+        found.visualization = {**found.visualization, "show": show}
+        return found
+
+
+_KINDS = {(2, 0): NodePoint2D, (3, 0): NodePoint, (2, 1): NodeRigidBody2D, (3, 3): NodeRigidBodyRxyz}
+
+
+def interface_nodes(
+    structure: LinearStructure, given: Iterable[str] | Mapping[str, InterfacePoint]
+) -> tuple[InterfaceNode, ...]:
+    """Interface nodes from names of points, or {name: point, row, PositionInterface or RigidInterface}."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
+    points = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
+    for name in points:
+        if not isinstance(name, str):
+            raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
+    return tuple(_node(structure, name, point) for name, point in points.items())
+
+
+def _node(structure: LinearStructure, name: str, point: InterfacePoint) -> InterfaceNode:
+    if not isinstance(point, (PositionInterface, RigidInterface)):
+        row = structure.row(point)
+        if not np.any(row):
+            raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")
+        return InterfaceNode(name, row[None, :])
+    position = _position(name, point)
+    count = ROTATIONS[len(position)] if isinstance(point, RigidInterface) else 0
+    directions = _entries(f"interface {name!r}: displacements", point.displacements, len(position))
+    if isinstance(point, RigidInterface):
+        directions += _entries(f"interface {name!r}: rotations", point.rotations, count)
+    rows = np.array([np.zeros(structure.n) if at is None else structure.row(at) for at in directions])
+    if not np.any(rows):
+        raise MultiPhiValueError(f"interface: got rows of zeros for {name!r}, need one that moves")
+    return InterfaceNode(name, rows, position, count)
+
+
+def _position(name: str, point: PositionInterface | RigidInterface) -> tuple[float, ...]:
+    place = real_array(f"interface {name!r}: position", point.position, "two or three numbers in m")
+    if place.shape not in ((2,), (3,)) or not np.all(np.isfinite(place)):
+        raise MultiPhiValueError(f"interface {name!r}: position: got {place}, need two or three numbers in m")
+    return tuple(place.tolist())
+
+
+def _entries(name: str, given: Any, count: int) -> list[At | None]:
+    if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
+        raise MultiPhiTypeError(f"{name}: got {given!r}, need a sequence of points, rows or None")
+    if len(given) != count:
+        raise MultiPhiValueError(f"{name}: got {len(given)} entries, need {count} for its position")
+    return list(given)

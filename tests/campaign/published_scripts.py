@@ -1,0 +1,215 @@
+"""Exudyn scripts that others wrote, each reduced just before its first dynamic run and compared with that run.
+
+    python tests/campaign/published_scripts.py FOLDER ... [--only NAME ...] [--out TABLE.csv] [--seconds 60]
+
+A FOLDER is what a copy of Exudyn's own repository has as ``main/pythonDev/TestModels`` or ``Examples``. Every script
+runs in a process of its own, without windows, and ends after the comparison. NRMSE = |q_reduced - q| / |q - q_0| over
+all coordinates and instants of the run, of ``reduce(mbs)`` as it is called without further arguments. Verdicts:
+
+    agrees     at most 1 %, without a warning      warned      a warning, whatever the error
+    WRONG      more than 1 %, without a warning    refused     by an error of multiphi_exudyn, or no end of the run
+    exception  by any other error                  no run      no dynamic run of Exudyn's own to compare with
+"""
+
+from __future__ import annotations
+
+import argparse
+import builtins
+import collections
+import csv
+import importlib
+import json
+import os
+import runpy
+import subprocess
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+AGREEMENT = 0.01
+SAMPLES = 200  # of a run
+FIELDS = ("script", "verdict", "error", "named", "told")
+NO_RUN = "no run"
+SHAPES = ("Rectangle", "OrthoCubePoint", "OrthoCubeLines", "CheckerBoard", "Cylinder", "Sphere", "Basis")
+
+
+def main(arguments: list[str]) -> int:
+    """Run the scripts of folders one after the other; a line for each, and the numbers of verdicts."""
+    given = _arguments(arguments)
+    rows = []
+    for script in sorted(script for folder in given.folders for script in Path(folder).resolve().glob("*.py")):
+        if given.only and script.stem not in given.only:
+            continue
+        rows.append({"script": script.stem, **_judged(script, given.seconds)})
+        print("{script:42} {verdict:10} {error:>9} {told}".format(**rows[-1])[:200], flush=True)
+    if given.out:
+        with Path(given.out).open("w", newline="") as file:
+            table = csv.DictWriter(file, FIELDS)
+            table.writeheader()
+            table.writerows(rows)
+    print(dict(collections.Counter(row["verdict"] for row in rows)))
+    return int(any(row["verdict"] == "WRONG" for row in rows))
+
+
+def _arguments(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", metavar="FOLDER")
+    parser.add_argument("--only", nargs="*", help="names of scripts, all of the folders without it")
+    parser.add_argument("--out", help="table of verdicts")
+    parser.add_argument("--seconds", type=float, default=60.0, help="that a script may take")
+    return parser.parse_args(arguments)
+
+
+def _judged(script: Path, seconds: float) -> dict[str, str]:
+    """Verdict, error, whether an item is named, and what was told, by a process of its own."""
+    with tempfile.TemporaryDirectory() as place:
+        found = Path(place, "found.json")
+        call = [sys.executable, __file__, "--one", str(script), str(found)]
+        try:
+            ended = subprocess.run(call, cwd=script.parent, capture_output=True, text=True, timeout=seconds)
+            told = (ended.stderr.strip().splitlines() or ["no dynamic run"])[-1]
+        except subprocess.TimeoutExpired:
+            told = f"not done within {seconds:g} s"
+        if found.exists():
+            return dict(json.loads(found.read_text()))
+    return {"verdict": NO_RUN, "error": "", "named": "", "told": told}
+
+
+# ---------------------------------------------------------------------- in the process of one script
+
+
+def run_script(script: str, found: str) -> None:
+    """Run a script with SolveDynamic replaced by the comparison, after which the process ends."""
+    warnings.simplefilter("ignore")
+    os.environ["MPLBACKEND"] = "Agg"
+    import exudyn as exu
+
+    importlib.import_module("multiphi_exudyn.exudyn_plugin")  # it replaces SolveDynamic too
+    _without_windows(exu)
+    _with_old_names()
+
+    def compared(mbs: Any, simulationSettings: Any = None, solverType: Any = None, **named: Any) -> None:
+        settings = exu.SimulationSettings() if simulationSettings is None else simulationSettings
+        kind = {} if solverType is None else {"solverType": solverType}
+        Path(found).write_text(json.dumps(_compared(mbs, settings, lambda: solve(mbs, settings, **kind, **named))))
+        sys.stdout.flush()
+        os._exit(0)  # whatever the script would do next
+
+    solve = exu.MainSystem.SolveDynamic
+    exu.MainSystem.SolveDynamic = exu.SolveDynamic = compared
+    sys.path.insert(0, str(Path(script).parent))
+    sys.argv = [script]
+    runpy.run_path(script, run_name="__main__")
+
+
+def _without_windows(exu: Any) -> None:
+    def nothing(*given: Any, **named: Any) -> bool:
+        return False
+
+    renderer = type(exu.SystemContainer().renderer)
+    for name in ("Start", "Stop", "DoIdleTasks", "SendRedrawSignal", "ZoomAll", "SetState"):
+        setattr(renderer, name, nothing)
+    for name in ("StartRenderer", "StopRenderer", "DoRendererIdleTasks"):
+        setattr(exu, name, nothing)
+    exu.SystemContainer.WaitForRenderEngineStopFlag = nothing
+    for name in ("WaitForUserToContinue", "SolutionViewer", "PlotSensor", "DrawSystemGraph"):
+        setattr(exu.MainSystem, name, nothing)
+    exu.config.printToConsole = False
+
+
+def _with_old_names() -> None:
+    """Names that scripts take from Exudyn and that are elsewhere since, and shapes that are drawn by others."""
+    elsewhere = {"exudyn": importlib.import_module("exudyn")}
+    elsewhere["graphics"] = importlib.import_module("exudyn.graphics")
+    beams = importlib.import_module("exudyn.beams")
+    elsewhere.update({name: getattr(beams, name) for name in dir(beams) if name.startswith(("Generate", "Points"))})
+    drawn = {f"GraphicsData{shape}": lambda *given, **named: {"type": "Line", "data": [0.0] * 6} for shape in SHAPES}
+    vars(builtins).update({**elsewhere, **drawn})
+
+
+def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
+    """The verdict on one dynamic run, which ``solve`` does."""
+    import exudyn as exu
+
+    from multiphi_exudyn.errors import MultiPhiError
+
+    data, kinds = mbs.systemData, exu.ConfigurationType
+    data.SetSystemState(data.GetSystemState(kinds.Initial), kinds.Current)
+    start = data.GetODE2Coordinates()
+    integration = settings.timeIntegration
+    began, until = integration.startTime, integration.endTime
+    data.SetTime(began, kinds.Current)
+    try:
+        shown, trajectory = _reduced(mbs, until - began)
+    except MultiPhiError as refusal:
+        return _verdict("refused", "", mbs, str(refusal))
+    except Exception as failure:
+        return _verdict("exception", "", mbs, f"{type(failure).__name__}: {failure}")
+    if trajectory.status != "ok":
+        return _verdict("refused", "", mbs, f"{trajectory.status}: {trajectory.message}")
+    try:
+        times, own = _own_run(settings, solve, len(start), until)
+    except Exception as failure:  # whatever the script's own run raises
+        return _verdict(NO_RUN, "", mbs, f"{type(failure).__name__}: {failure}")
+    if not len(times):
+        return _verdict(NO_RUN, "", mbs, "its own run has no end")
+    size = float(np.linalg.norm(own - start))
+    away = start + (shown @ trajectory.displacement(np.clip(times - began, 0.0, until - began))).T - own
+    error = float(np.linalg.norm(away)) / size if size else float(np.any(away))
+    told = trajectory.warnings
+    verdict = "warned" if told else "agrees" if error <= AGREEMENT else "WRONG"
+    return _verdict(verdict, f"{error:.2g}", mbs, "; ".join(told))
+
+
+def _reduced(mbs: Any, t_end: float) -> tuple[np.ndarray, Any]:
+    """S (n_full, n) and the reduced run of ``t_end`` [s]."""
+    import multiphi_exudyn as mp
+    from multiphi_exudyn.exudyn_plugin import reduce
+
+    found = reduce(mbs)
+    run = mp.simulate(found.model, t_end, velocity=found.velocity, loads=found.loads)
+    return found.structure.coordinates, run
+
+
+def _own_run(settings: Any, solve: Any, count: int, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) and coordinates (k, count) of Exudyn's run; none if it has no end."""
+    from exudyn.utilities import LoadSolutionFile
+
+    with tempfile.TemporaryDirectory() as place:
+        settings.solution.file.write = True
+        settings.solution.file.binary = False
+        settings.solution.file.append = False
+        settings.solution.file.writePeriod = (until - settings.timeIntegration.startTime) / SAMPLES
+        settings.solution.file.export.accelerations = settings.solution.file.export.velocities = False
+        settings.solution.file.name = f"{place}/coordinates.txt"
+        solve()
+        table = LoadSolutionFile(settings.solution.file.name, verbose=False)["data"]
+    ended = abs(table[-1, 0] - until) <= 2 * settings.solution.file.writePeriod and np.all(np.isfinite(table))
+    return (table[:, 0], table[:, 1 : 1 + count]) if ended else (np.zeros(0), np.zeros((0, count)))
+
+
+def _verdict(verdict: str, error: str, mbs: Any, told: str) -> dict[str, str]:
+    return {"verdict": verdict, "error": error, "named": str(_names_an_item(mbs, told)), "told": " ".join(told.split())}
+
+
+def _names_an_item(mbs: Any, told: str) -> bool:
+    import exudyn as exu
+
+    data, kinds = mbs.systemData, ("Node", "Object", "Marker", "Load")
+    items = (
+        getattr(mbs, f"Get{kind}")(getattr(exu, f"{kind}Index")(i))
+        for kind in kinds
+        for i in range(getattr(data, f"NumberOf{kind}s")())
+    )
+    return any(item["name"] in told for item in items if item["name"])
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--one"]:
+        run_script(*sys.argv[2:])
+    else:
+        sys.exit(main(sys.argv[1:]))
