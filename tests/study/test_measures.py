@@ -18,7 +18,7 @@ from multiphi_exudyn.study.scene.workbench import prepare
 
 KEYS = [
     "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "first_contact",
-    "contact_count", "closed_time", "intervals", "impulse", "inner_losses", "energy_end", "ledger", "frequencies",
+    "contact_count", "closed_time", "intervals", "impulse", "inner_losses", "energy_end", "ledger",
     "horizon_s", "warnings",
 ]  # fmt: skip
 RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
@@ -72,7 +72,6 @@ def test_every_measure_is_defined(bench, reference):
     assert set(metrics.METRICS) - set(KEYS) == {
         "pointwise_until",
         "stiff_nrmse",
-        "repetition_rate",
     }  # of two runs, of a study
 
 
@@ -104,20 +103,6 @@ def test_contacts_energy_and_ledger(bench, reference):
     assert (found["label"], found["kind"], found["dofs"], found["steps"]) == ("drawn by hand", "full", 40, 100)
 
 
-def test_frequencies_by_level(bench, reference):
-    """The drawn run moves at one frequency whatever is closed."""
-    found = measures(bench, reference, None)["frequencies"]
-    assert list(found) == ["open", "stop"]
-    assert found["open"] == pytest.approx([300 / (2 * math.pi)], rel=1e-6)
-
-
-def test_a_simulated_run_has_the_frequencies_of_its_model(bench, simulated):
-    found = measures(bench, simulated, None)["frequencies"]["open"]
-    exact = bench.model(bench.scene.models["r6"]).level(()).frequencies
-    assert len(found) >= 3
-    assert np.all(np.min(np.abs(np.subtract.outer(found, exact)) / exact, axis=1) < 1e-6)
-
-
 def test_without_a_reference_there_are_no_differences(bench, reference):
     failed = ModelRun("full", "full", "full", status="failed", message="no convergence")
     for missing in (None, failed):
@@ -141,7 +126,6 @@ def test_a_run_that_never_touches_has_no_first_contact(bench, reference):
     assert found["first_contact"] == {"stop": None}
     assert found["intervals"] == {"stop": []}
     assert found["contact_count"] == {"stop": 0} == found["inner_losses"]
-    assert list(found["frequencies"]) == ["open"]
 
 
 def test_measures_are_json_without_numbers_that_do_not_exist(bench, reference, simulated):

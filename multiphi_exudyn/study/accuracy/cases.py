@@ -65,12 +65,6 @@ class Study:
         return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()]
 
     @property
-    def _frequencies(self) -> dict[str, Any] | None:
-        """What a run is asked for beyond its measures."""
-        asked = self.file.frequencies
-        return None if asked is None else asked.model_dump(include={"point", "windows"})
-
-    @property
     def points(self) -> list[dict[str, Any]]:
         """Every combination of the values on the scene's axes."""
         return grid(self.file.axes | (self.file.quick.axes if self.quick else {}))
@@ -125,9 +119,7 @@ class Study:
         model = next((given.model for given in self.file.methods if given.name == method), {})
         return {
             "scene": self.file.scene,
-            "content": _hash(
-                [self.scene, model, self.file.time_limit_s, self._matrices, _versions(), self._frequencies]
-            ),
+            "content": _hash([self.scene, model, self.file.time_limit_s, self._matrices, _versions()]),
             "at": dict(at),
             "method": method,
             "setting": dict(setting),
@@ -198,28 +190,6 @@ def _check(study: Study) -> None:
         except MultiPhiValueError as error:
             told = str(error).removeprefix(f"{study.scene_path}: ")
             raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
-    _check_frequencies(study)
-
-
-def _check_frequencies(study: Study) -> None:
-    """One axis, an ideal that is among the runs, windows in order, a point that the scene has."""
-    asked = study.file.frequencies
-    if asked is None:
-        return
-    if len(study.file.axes) != 1 or not study.file.methods:
-        _refuse(study, "frequencies", f"{len(study.file.axes)} axes", "one axis, and a method")
-    if any(len(study._settings(method)) > 1 for method in study.file.methods):
-        _refuse(study, "frequencies", "a method with several settings", "one setting of each method")
-    if asked.ideal is not None and all(asked.ideal not in at.values() for at in study.points):
-        _refuse(study, "frequencies.ideal", asked.ideal, "one of the axis' values")
-    if asked.ideal_method is not None and asked.ideal_method not in [method.name for method in study.file.methods]:
-        _refuse(study, "frequencies.ideal_method", asked.ideal_method, "the name of a method")
-    if list(asked.windows) != sorted(set(asked.windows)):
-        _refuse(study, "frequencies.windows", list(asked.windows), "ends that ascend")
-    scene = study.scene_for(study.reference(study.points[0]))
-    known = scene.file.outputs.points or mechanics_of(scene).points
-    if asked.point not in known:
-        _refuse(study, "frequencies.point", asked.point, f"one of the points: {', '.join(known)}")
 
 
 def _check_size(study: Study) -> None:

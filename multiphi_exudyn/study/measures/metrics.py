@@ -118,18 +118,6 @@ METRICS = {
         "J",
         "where the initial energy went, row by row; the residual is what the rows leave unaccounted for.",
     ),
-    "frequencies": Metric(
-        "frequencies from the response",
-        "Hz",
-        "undamped natural frequencies identified from the points' histories alone, in the longest interval that each "
-        "level holds; only those whose standard deviation is below a third of a percent.",
-    ),
-    "repetition_rate": Metric(
-        "repetition rate",
-        "Hz",
-        "how often in a second a point's motion comes round, from the times between its passages through zero in the "
-        "same direction, weighted by how much of a window each cycle fills; contacts count in it.",
-    ),
 }
 
 
