@@ -1,10 +1,11 @@
 """Command line.
 
-    multiphi-exudyn compare | animate | budget | needs | study | stability | compile | scenes | studies
+    multiphi-exudyn compare | animate | budget | needs | study | stability | new | validate | schema | compile | scenes
+        | studies
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
-Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
+Of validate: 0 if the file is valid. Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from multiphi_exudyn.cli.animate_command import run_animate
 from multiphi_exudyn.cli.budget_command import run_budget
 from multiphi_exudyn.cli.compare_command import run_compare
 from multiphi_exudyn.cli.compile_command import run_compile
+from multiphi_exudyn.cli.file_commands import KINDS, run_new, run_schema, run_validate
 from multiphi_exudyn.cli.needs_command import run_needs
 from multiphi_exudyn.cli.stability_command import run_stability
 from multiphi_exudyn.cli.study_command import run_study_file
@@ -72,6 +74,12 @@ def _run(given: argparse.Namespace) -> bool:
         return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
     if given.command == "stability":
         return run_stability(given.case, given.quick, given.out)
+    if given.command == "new":
+        return run_new(given.kind, given.file)
+    if given.command == "validate":
+        return run_validate(given.file)
+    if given.command == "schema":
+        return run_schema(given.kind)
     if given.command == "compile":
         return run_compile()
     return _listed(shipped_scenes() if given.command == "scenes" else shipped_studies())
@@ -88,7 +96,9 @@ class _OneLineParser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser("multiphi-exudyn", description="Structures with contacts, reduced and full, side by side.")
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,compile,scenes,studies}"
+        dest="command",
+        required=True,
+        metavar="{compare,animate,budget,needs,study,stability,new,validate,schema,compile,scenes,studies}",
     )
     compare = commands.add_parser("compare", help="run all models of a scene and write a report")
     _scene_options(compare, "the reduced models that have the scene's own; those with a number of theirs keep it")
@@ -99,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")
     _study_options(commands.add_parser("study", help="run a study, or go on with one, and write its report"))
     _stability_options(commands.add_parser("stability", help="run every model through a catalogue of extreme cases"))
+    _file_options(commands)
     commands.add_parser(
         "compile", help="compile the loop ahead: a container, the workers of a cluster (NUMBA_CPU_NAME)"
     )
@@ -145,6 +156,16 @@ def _stability_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", metavar="NAME", help="this case alone")
     parser.add_argument("--quick", action="store_true", help="fewer cases, shorter ones")
     _folder_option(parser, "stability")
+
+
+def _file_options(commands: Any) -> None:
+    new = commands.add_parser("new", help="write a scene or a study to start from, with remarks on its fields")
+    new.add_argument("kind", choices=list(KINDS))
+    new.add_argument("file", metavar="FILE", type=Path, nargs="?", help="its name (default: scene.toml, study.toml)")
+    validate = commands.add_parser("validate", help="check a scene or a study without a run")
+    validate.add_argument("file", metavar="FILE", type=Path)
+    schema = commands.add_parser("schema", help="print the JSON schema of a scene or a study, for editors")
+    schema.add_argument("kind", choices=list(KINDS))
 
 
 def _folder_option(parser: argparse.ArgumentParser, default: str) -> None:

@@ -17,9 +17,9 @@ from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
 KEYS = [
-    "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "first_contact",
-    "contact_count", "closed_time", "intervals", "impulse", "inner_losses", "energy_end", "ledger",
-    "horizon_s", "warnings",
+    "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "largest",
+    "first_contact", "contact_count", "closed_time", "intervals", "largest_force", "impulse", "inner_losses",
+    "energy_end", "ledger", "horizon_s", "warnings",
 ]  # fmt: skip
 RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
 
@@ -96,6 +96,8 @@ def test_contacts_energy_and_ledger(bench, reference):
     assert found["contact_count"] == {"stop": 2}
     assert found["closed_time"] == {"stop": pytest.approx(0.008)}
     assert found["intervals"] == {"stop": [[0.03, 0.032], [0.034, 0.04]]}
+    assert found["largest"] == {"tip": 1e-2, "middle": pytest.approx(4e-3)}
+    assert found["largest_force"] == {"stop": pytest.approx(1e-2, rel=1e-3)}
     assert found["impulse"] == {"stop": 0.5}
     assert found["inner_losses"] == {"stop": 1}
     assert found["energy_end"] == math.exp(-0.2)

@@ -134,7 +134,7 @@ class TestCases:
             (["methods", 0, "axes"], {"nodes": [1]}, "models[2].nodes: got 1, need no field of this name"),
             (["methods", 0, "axes"], {"modes": []}, "methods[0].axes.modes"),
             (["axes"], {"start.displacment": [0.01]}, "need no field of this name"),
-            (["axes"], {"title.words": [1]}, "title, which is no table"),
+            (["axes"], {"title.words": [1]}, "title.words: got 'words' inside 'a small beam over a stop'"),
             (["methods", 1, "nearby"], {"method": [0.9]}, "nearby of stepwise: got 'method'"),
             (["methods", 1, "name"], "levels", "methods: got 'levels', need a name of its own"),
             (["methods", 1, "name"], "reference", "methods: got 'reference', need a name of its own"),

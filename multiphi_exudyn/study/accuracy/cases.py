@@ -26,6 +26,7 @@ from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, is_numbe
 from multiphi_exudyn.study.accuracy.study_file import MethodSpec, StudyFile
 from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.places import with_value
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
@@ -235,27 +236,8 @@ def _put_reference(data: dict[str, Any], file: StudyFile) -> None:
 
 
 def _put(data: dict[str, Any], field: str, value: Any) -> None:
-    """Set a field "a.b.c" of nested tables, one of several tables by its name; a table that is not there is made."""
-    data.update(_changed(data, field.split("."), value, field))
-
-
-def _changed(given: dict[str, Any], path: list[str], value: Any, field: str) -> dict[str, Any]:
-    """A table with one field set."""
-    name, *rest = path
-    if not rest:
-        return given | {name: value}
-    inner = given.get(name, {})
-    if isinstance(inner, dict):
-        return given | {name: _changed(inner, rest, value, field)}
-    given_tables = inner if isinstance(inner, list) else []
-    named = [isinstance(table, dict) and table.get("name") == rest[0] for table in given_tables]
-    if not any(named):
-        raise MultiPhiValueError(f"{field}: got a place inside {name}, which is no table; need a scene's field")
-    if not rest[1:]:
-        raise MultiPhiValueError(f"{field}: got a whole table, need one of its fields")
-    pairs = zip(given_tables, named, strict=True)
-    tables = [_changed(table, rest[1:], value, field) if is_it else table for table, is_it in pairs]
-    return given | {name: tables}
+    """Set a field of the scene."""
+    data.update(with_value(data, field, value))
 
 
 def _hash(content: Any) -> str:

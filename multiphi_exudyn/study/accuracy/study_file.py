@@ -1,6 +1,7 @@
 """The format of a study file: a scene, what is varied in it, the methods to judge, and how.
 
-A *field* is a place in a scene file, written with dots ("start.displacement"). A *setting* is one choice of a method's
+A *field* is a place in a scene file, written with dots ("start.displacement", "contacts.*.gap", "loads.0.frequency_hz";
+:mod:`multiphi_exudyn.study.scene.places`); its values may be whole tables. A *setting* is one choice of a method's
 own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
 be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
 Errors of mesh and step can cancel for a whole range of steps: a setting *lasts* where every finer one holds as well.
@@ -16,7 +17,7 @@ from multiphi_exudyn.study.scene.scene_file import Finite, Positive, Table
 
 __all__ = ["BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile"]
 
-Value = Annotated[int, Field(strict=True)] | Finite | str | bool
+Value = Annotated[int, Field(strict=True)] | Finite | str | bool | dict[str, Any] | list[Any]
 Values = Annotated[tuple[Value, ...], Field(min_length=1)]
 Factors = Annotated[tuple[Positive, ...], Field(min_length=1)]
 

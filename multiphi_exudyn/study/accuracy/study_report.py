@@ -113,7 +113,10 @@ def cell_words(value: float | None, quantity: str) -> str:
         return percent(value)
     if quantity == "first_contact":
         return f"{1e3 * value:.3f} ms"
-    return f"{value:.4g} N s" if quantity == "impulse" else f"{value:g}"
+    if quantity == "largest":
+        return f"{1e3 * value:.4g} mm"
+    units = {"impulse": " N s", "largest_force": " N"}
+    return f"{value:.4g}{units.get(quantity, '')}"
 
 
 def _point(result: StudyResult, at: Mapping[str, Any]) -> Point:

@@ -93,6 +93,12 @@ METRICS = {
         "the agreement horizon between the reference and its own coarser or minutely disturbed copy: from here on a "
         "pointwise difference of the size of the tolerance says nothing about a model.",
     ),
+    "largest": Metric("largest displacement", "m", "largest |y| of one point over all samples of the run."),
+    "largest_force": Metric(
+        "largest contact force",
+        "N",
+        "over all samples of the run; an impact has an impulse, no force.",
+    ),
     "first_contact": Metric("first contact", "s", "start of the first contact interval after the release."),
     "intervals": Metric(
         "contact intervals",

@@ -27,7 +27,7 @@ from multiphi_exudyn.mechanics.loads import BaseMotion, Gravity, StopMotion
 from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.scene.fields import numbered
+from multiphi_exudyn.study.scene.fields import numbered, one_of
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
     CraigBamptonModel,
@@ -249,9 +249,10 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
         for part in ("at", "direction"):
             place = getattr(load, part, None) or ()
             named |= {f"loads[{i}].{part}": name for name in ([place] if isinstance(place, str) else place)}
-    for field_name, name in named.items():
-        if name not in mechanics.points:
-            refuse(scene, field_name, name, f"one of the points: {', '.join(mechanics.points)}")
+    unknown = {field_name: name for field_name, name in named.items() if name not in mechanics.points}
+    faults = [f"{at}: got {name!r}, need {one_of('points', name, mechanics.points)}" for at, name in unknown.items()]
+    if faults:
+        raise MultiPhiValueError(f"{scene.path}: {'; '.join(faults)}")
 
 
 def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
@@ -263,7 +264,7 @@ def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
         moved += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
         for part, name in moved:
             if name not in names:
-                refuse(scene, f"loads[{i}].{part}", name, f"one of the contacts: {', '.join(names) or 'none'}")
+                refuse(scene, f"loads[{i}].{part}", name, one_of("contacts", name, names))
     for i, model in enumerate(scene.file.models):
         if loads and isinstance(model, (CraigBamptonModel, StepwiseModel)):
             refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has no loads")

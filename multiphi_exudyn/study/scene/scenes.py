@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.study.scene.fields import one_of
 from multiphi_exudyn.study.scene.scene_file import (
     CraigBamptonModel,
     FullModel,
@@ -124,7 +125,7 @@ def _check(scene: Scene) -> None:
     for part, given in parts.items():
         for name in given:
             if name not in names:
-                refuse(scene, f"comparison.{part}", name, f"one of the models: {', '.join(names)}")
+                refuse(scene, f"comparison.{part}", name, one_of("models", name, names))
     first: dict[str, ModelSpec] = {}
     for i, model in enumerate(map(scene.filled, file.models)):
         if first.setdefault(model.name, model) != model:
