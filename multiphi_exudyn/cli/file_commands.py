@@ -6,6 +6,8 @@ import json
 from importlib import resources
 from pathlib import Path
 
+from pydantic import BaseModel
+
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.accuracy.cases import Study, load_study
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
@@ -18,7 +20,10 @@ from multiphi_exudyn.study.scene.workbench import prepare
 
 __all__ = ["KINDS", "run_new", "run_schema", "run_validate"]
 
-KINDS = {"scene": ("multiphi_exudyn.study.scene", SceneFile), "study": ("multiphi_exudyn.study.accuracy", StudyFile)}
+KINDS: dict[str, tuple[str, type[BaseModel]]] = {
+    "scene": ("multiphi_exudyn.study.scene", SceneFile),
+    "study": ("multiphi_exudyn.study.accuracy", StudyFile),
+}
 
 
 def run_new(kind: str, path: Path | None) -> bool:

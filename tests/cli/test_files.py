@@ -3,8 +3,11 @@
 import json
 
 import pytest
+from small_study import result_of, row
 
 from multiphi_exudyn import MultiPhiValueError, cli
+from multiphi_exudyn.study import load
+from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.scene.places import with_value
 
 
@@ -91,6 +94,37 @@ def test_schemas_name_every_field_and_what_may_stand_for_infinity(capsys):
     contact = json.loads(out)["$defs"]["ContactSpec"]["properties"]
     assert {"const": "rigid"} in contact["stiffness"]["anyOf"]
     assert contact["tangential_stiffness"]["default"] == "rigid"
+
+
+def test_a_study_of_gap_stiffness_and_frequency_from_the_templates_alone(folder, capsys):
+    """What `new` writes runs, gives its pictures, and its table pivots; rows and physics are as they must be."""
+    told(capsys, "new", "study")
+    text = (folder / "study.toml").read_text()
+    (folder / "study.toml").write_text(text.replace("timing = true", "timing = false").replace("[4, 8, 16]", "[8]"))
+    code, _, _ = told(capsys, "study", "study.toml", "--quick", "--on", "serial")
+    assert code == 0
+    report = (folder / "multiphi-study-quick" / "report.html").read_text()
+    assert all(f"<h2>Along {axis}</h2>" in report for axis in ("contacts.*.gap", "contacts.*.stiffness"))
+    runs = load("multiphi-study-quick")
+    ours = runs[runs.method == "Multi-Phi"]
+    assert len(ours) == 8
+    assert set(runs.status) == {"ok"}
+    assert (ours.error < 0.5).all()
+    assert isinstance(ours["intervals.stop"].iloc[0], list)
+    forces = ours.pivot_table("largest_force.stop", "at.contacts.*.gap", "at.contacts.*.stiffness")
+    assert forces.shape == (2, 2)
+    assert (forces[1e6] > forces[1e4]).all()
+    exact = runs[runs.method == "reference"].set_index(ours.index)
+    assert (ours["largest.tip"] / exact["largest.tip"]).to_numpy() == pytest.approx(1.0, abs=0.1)
+
+
+def test_numbers_stay_numbers_beside_words(folder):
+    rows = [row("a", 0.1, {"structure.clamp_rotation": value}) for value in (30.0, "rigid")]
+    (folder / "runs.csv").write_text(csv_text(result_of(rows)))
+    assert list(load(folder)["at.structure.clamp_rotation"]) == [30.0, "rigid"]
+    assert list(load(folder).error) == [0.1, 0.1]
+    with pytest.raises(MultiPhiValueError, match="need the folder of a finished study"):
+        load(folder / "nothing")
 
 
 DATA = {

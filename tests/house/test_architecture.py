@@ -24,6 +24,7 @@ HEAVY = {
     "numba": COMPILERS,
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
+    "pandas": ("multiphi_exudyn/study",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compilation",

@@ -20,6 +20,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from PIL import Image
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.beam import Beam
@@ -39,6 +40,7 @@ PERIOD_SHOWN = 10.0  # s, for the longest period of the open structure: bounces 
 LONGEST = 40.0  # s, of an animation whose slow motion nobody has chosen
 MOST_FRAMES = 3000  # two minutes: beyond that a typing error is likelier than a wish
 RESOLUTION = 76  # dots per inch: 700 pixels wide
+COLOUR_COUNT = 48
 MARGIN = 0.12  # of the range of the heights, above and below
 CLOSED, OPEN = "#D55E00", "#BBBBBB"
 WIDTHS = (2.0, 4.5)  # points, of the reduced model and of the reference below it
@@ -93,6 +95,22 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     return Stage(replace(bench, repeats=1), models, tuple(judged), nodes, factor)
 
 
+class _FewColours(PillowWriter):
+    """Frames with one palette of few colours: a file a tenth as large."""
+
+    _frames: list[Image.Image]
+
+    def finish(self) -> None:
+        """Write all frames."""
+        sample = self._frames[0].convert("RGB")
+        sample.paste(CLOSED, (0, 0, 60, 60))  # a colour that the first frame need not have
+        palette = sample.quantize(COLOUR_COUNT, dither=Image.Dither.NONE)
+        self._frames = [
+            frame.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for frame in self._frames
+        ]
+        super().finish()
+
+
 def animation(stage: Stage, runs: Mapping[str, ModelRun]) -> FuncAnimation:
     """The animation of two finished runs, by the names of their models."""
     reduced, reference = (runs[name] for name in stage.models)
@@ -123,7 +141,7 @@ def gif(moving: FuncAnimation, progress: Callable[[int, int], object] | None = N
     """The animation as a GIF that starts again at its end; progress: called with a frame's number and their count."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
-        moving.save(path, PillowWriter(fps=int(FRAME_RATE)), dpi=RESOLUTION, progress_callback=progress)
+        moving.save(path, _FewColours(fps=int(FRAME_RATE)), dpi=RESOLUTION, progress_callback=progress)
         return path.read_bytes()
 
 
@@ -173,8 +191,8 @@ def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: lis
         z = 1e3 * np.array([_at(stage, run, node) for run in runs.values() for node in nodes])
         room = MARGIN * np.ptp(z) or 1.0
         panel.set_ylim(np.min(z) - room, np.max(z) + room)
-        panel.set(xlabel="x [m]", ylabel=f"{beam} w [mm]".strip())
-        panel.label_outer()
+        panel.set_ylabel(f"{beam} w [mm]".strip())
+    axes[-2].set_xlabel("x [m]")
     for intervals in reference.contact_intervals.values():
         for start, end in intervals:
             axes[-1].axvspan(start, end, color=CONTACT, lw=0, zorder=-1)
