@@ -212,7 +212,7 @@ def _in_contact(run: ModelRun) -> list[list[float]]:
 def _level_frequencies(bench: Workbench) -> dict[str, list[float]]:
     """Natural frequencies [Hz] of the case's levels, within the map: the open one, each contact closed alone."""
     lowest, highest = FREQUENCIES[0], FREQUENCIES[-1]
-    contacts = bench.contacts(getattr(bench.scene.models[CASE], "contact", "as-given") == "rigid")
+    contacts = bench.contacts(bench.scene.models[CASE].rigid)
     model = MultiPhiModel(bench.structure, contacts, modes="all", overrides=bench.overrides)
     levels = {"open": model.level(())} | {f"{c.name} closed": model.level((c.name,)) for c in model.contacts}
     return {name: [float(f) for f in level.frequencies if lowest <= f <= highest] for name, level in levels.items()}
