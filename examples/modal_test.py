@@ -19,8 +19,7 @@ import matplotlib.figure
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.measures.response_frequencies import ResponseModes
-from multiphi_exudyn.study.measures.shaker_test import frequency_response_functions, identified_modes
+from multiphi_exudyn.study.measures.shaker_test import ResponseModes, frequency_response_functions, identified_modes
 from reference_models.rig import published_frequencies, rig_beam, rig_damping
 
 POINTS = ("node1", "node2", "node3")

@@ -9,8 +9,7 @@ from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.comparison.animation import frame_count, frames, gif
-from multiphi_exudyn.study.comparison.film import film_of, run_stage, stage_of
+from multiphi_exudyn.study.comparison.animation import animation, gif, stage_of
 from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.time.warning_groups import grouped
@@ -27,7 +26,7 @@ def run_animate(
     scene = load_scene(source, t_end=t_end)
     stage = stage_of(scene, model, reference, slow)
     file = _file(out or Path(f"multiphi-{scene.name}") / "animation.gif")
-    runs = run_stage(stage, progress=sys.stderr.isatty())
+    runs = stage.runs(progress=sys.stderr.isatty())
     failed = {name: run.message for name, run in runs.items() if not run.ok}
     for name, message in failed.items():
         print(f"{name}: failed, {message}")
@@ -35,11 +34,10 @@ def run_animate(
         return False
     for group in grouped((name, run.warnings) for name, run in runs.items()):
         print(f"warning: {group.told(len(runs))}")
-    film = film_of(stage, runs)
-    count = frame_count(film)
-    with tqdm(frames(film), total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as images:
-        write_whole(file, gif(images, count))
-    print(f"{count} frames, {film.slow:g} times slower\n{file}")
+    count = len(stage.time)
+    with tqdm(total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as bar:
+        write_whole(file, gif(animation(stage, runs), lambda frame, total: bar.update()))
+    print(f"{count} frames, {stage.slow:g} times slower\n{file}")
     return True
 
 

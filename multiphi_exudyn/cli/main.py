@@ -1,10 +1,11 @@
 """Command line.
 
-    multiphi-exudyn compare | animate | budget | needs | study | stability | compile | scenes | studies
+    multiphi-exudyn compare | animate | budget | needs | study | stability | new | validate | schema | compile | scenes
+                    | studies
 
 Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
 all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
-Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
+Of validate: 0 if the file is valid. Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
 
 A command's own module is loaded when the command is run, so that ``--help`` answers at once.
 """
@@ -29,6 +30,8 @@ __all__ = ["command", "main", "parser"]
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Run: TypeAlias = "Callable[[argparse.Namespace], bool]"
+
+KINDS = ("scene", "study")  # of files
 
 OK, FAILED, BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 141
 
@@ -80,7 +83,9 @@ def parser() -> argparse.ArgumentParser:
     )
     whole.add_argument("--version", action="version", version=f"multiphi-exudyn {__version__}")
     commands = whole.add_subparsers(
-        dest="command", required=True, metavar="{compare,animate,budget,needs,study,stability,compile,scenes,studies}"
+        dest="command",
+        required=True,
+        metavar="{compare,animate,budget,needs,study,stability,new,validate,schema,compile,scenes,studies}",
     )
 
     def add(
@@ -143,6 +148,31 @@ def parser() -> argparse.ArgumentParser:
         "stability --quick",
     )
     _stability_options(stability)
+    new = add(
+        "new",
+        _new,
+        "write a scene or a study to start from, with remarks on its fields",
+        "A study comes with the scene it names.",
+        "new study my-study.toml",
+    )
+    new.add_argument("kind", choices=KINDS)
+    new.add_argument("file", metavar="FILE", type=Path, nargs="?", help="its name (default: scene.toml, study.toml)")
+    validate = add(
+        "validate",
+        _validate,
+        "check a scene or a study without a run",
+        "Names all faults at once, each with its place in the file.",
+        "validate my-study.toml",
+    )
+    validate.add_argument("file", metavar="FILE", type=Path)
+    schema = add(
+        "schema",
+        _schema,
+        "print the JSON schema of a scene or a study, with which editors complete files",
+        "",
+        "schema scene",
+    )
+    schema.add_argument("kind", choices=KINDS)
     add(
         "compile",
         _compile,
@@ -259,6 +289,24 @@ def _stability(given: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.stability_command import run_stability
 
     return run_stability(given.case, given.quick, given.out)
+
+
+def _new(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.file_commands import run_new
+
+    return run_new(given.kind, given.file)
+
+
+def _validate(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.file_commands import run_validate
+
+    return run_validate(given.file)
+
+
+def _schema(given: argparse.Namespace) -> bool:
+    from multiphi_exudyn.cli.file_commands import run_schema
+
+    return run_schema(given.kind)
 
 
 def _compile(given: argparse.Namespace) -> bool:

@@ -10,10 +10,11 @@ from multiphi_exudyn.study.accuracy.analysis import StudyResult, cheapest, point
 from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
-from multiphi_exudyn.study.accuracy.study_csv import csv_text
 from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.results import TABLE
 from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
@@ -29,7 +30,7 @@ def run_study_file(source: str, out: Path | None, quick: bool, where: str, worke
     folder = results_folder(out or Path(f"multiphi-{study.name}{'-quick' if quick else ''}"))
     with Store(folder / STORE) as store, open_executor(where, workers) as executor:
         result = run_study(study, store, executor, progress=sys.stderr.isatty())
-    write_whole(folder / "runs.csv", csv_text(result).encode())
+    write_whole(folder / TABLE, csv_text(result).encode())
     write_whole(folder / "report.html", render_study(result).encode())
     _tell(result, folder)
     return _complete(result)

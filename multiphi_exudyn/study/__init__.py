@@ -1,4 +1,8 @@
-"""Scenes, runs of their models, and what comes out of comparing them.
+"""Scenes, runs of their models, and what comes out of comparing them; ``load`` gives a study's results as a table.
 
-Order: scene, running, measures, sweep, comparison, accuracy, stability.
+Order: results, scene, running, measures, sweep, comparison, accuracy, stability.
 """
+
+from multiphi_exudyn.study.results import load
+
+__all__ = ["load"]

@@ -209,7 +209,9 @@ def test_version_and_module_entry():
     assert (told.returncode, told.stdout) == (0, f"multiphi-exudyn {mp.__version__}\n")
 
 
-@pytest.mark.parametrize("name", ["compare", "animate", "budget", "needs", "study", "stability", "compile"])
+@pytest.mark.parametrize(
+    "name", ["compare", "animate", "budget", "needs", "study", "stability", "new", "validate", "schema", "compile"]
+)
 def test_the_help_of_a_command_has_a_description_and_an_example_that_is_understood(name, capsys):
     with pytest.raises(SystemExit):
         cli.main([name, "--help"])

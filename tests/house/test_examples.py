@@ -109,6 +109,22 @@ def test_modal_test(capsys, tmp_path):
     assert picture.stat().st_size > 10_000
 
 
+def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
+    """Cycles are counted as they are; with contact the rate lies between the free frequency and its limit."""
+    example, picture = load("first_second_frequencies"), tmp_path / "rates.png"
+    time = np.arange(0.0, 2.0005, 1e-3)
+    slower = np.sin(2 * np.pi * 6.0 * time) + 0.1 * np.sin(2 * np.pi * 37.0 * time)
+    assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
+    monkeypatch.setattr(example, "STUDIES", ("clamp",))
+    found = example.main(["--quick", str(picture)])["clamp"]
+    for free, limit, rise in found.values():
+        assert free < 4.01
+        assert 0.2 < rise[0] < limit
+        assert rise[-1] < rise[0]
+    assert capsys.readouterr().out.count("free ") == 2
+    assert picture.stat().st_size > 10_000
+
+
 def test_frequency_response(capsys, tmp_path):
     picture = tmp_path / "response.png"
     found = load("frequency_response").main([str(picture)])

@@ -23,7 +23,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
-from multiphi_exudyn.study.accuracy.study_csv import csv_text
+from multiphi_exudyn.study.accuracy.study_table import csv_text
 
 STEP = {"step": 1e-4}
 

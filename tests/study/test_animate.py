@@ -9,20 +9,35 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
-from multiphi_exudyn.cli import animate_command
-from multiphi_exudyn.mechanics.beam import Beam, Section
-from multiphi_exudyn.study.comparison.animation import CLOSED, frame_count, frames, gif
-from multiphi_exudyn.study.comparison.film import LONGEST, MOST_FRAMES, PERIOD_SHOWN, film_of, run_stage, stage_of
-from multiphi_exudyn.study.comparison.placement import Placement, placements
+from multiphi_exudyn.study.comparison.animation import (
+    CLOSED,
+    LONGEST,
+    MOST_FRAMES,
+    PERIOD_SHOWN,
+    Stage,
+    _closed,
+    animation,
+    gif,
+    stage_of,
+)
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
-from reference_models.beams import Beams
 
 FULL = {"kind": "full", "name": "full", "elements": 4, "step": 1e-4}
 PLAIN = changed(["outputs", "interval"], 1e-4)  # closures between two samples of 1 ms would be averaged
 WITH_FULL = changed(["models"], [*BEAM["models"], FULL], PLAIN) | {"comparison": {"reference": "full"}}
+PART = BEAM["structure"]["beam"]
+CLAP = {"name": "clap", "direction": {"a.tip": 2.0, "b.middle": -2.0}, "gap": 1e-3, "stiffness": 1e5}
+PAIR = {
+    "structure": {"beams": {"a": PART, "b": PART, "far": PART}},
+    "contacts": [CLAP, CLAP | {"name": "stop", "direction": {"b.tip": -1.0}}],
+    "start": {"load_at": "a.tip", "measured_at": "a.tip", "displacement": 0.01},
+    "models": [{"kind": "reduced", "name": "r", "modes": 30}],
+    "comparison": {"reference": "r"},
+    "outputs": {"t_end": 0.1, "interval": 1e-4, "points": ["a.tip"]},
+}
 SAME = 1e-9  # m: the same matrices, by the same routes
 
 
@@ -33,16 +48,6 @@ def scene(tmp_path, monkeypatch):
     return write(tmp_path / "small.toml", WITH_FULL)
 
 
-def filmed(path, **chosen):
-    stage = stage_of(load_scene(path), **chosen)
-    return film_of(stage, run_stage(stage, progress=False))
-
-
-def has(image, colour):
-    wanted = tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return bool(np.any(np.all(np.asarray(image.convert("RGB"))[: image.height * 2 // 3] == wanted, axis=-1)))
-
-
 def refused(capsys, *arguments):
     assert cli.main(["animate", *arguments]) == 2
     out, err = capsys.readouterr()
@@ -51,69 +56,87 @@ def refused(capsys, *arguments):
     return err
 
 
+def drawn(path, frame, **chosen):
+    """The stage, both runs, and the axes of one frame."""
+    stage = stage_of(load_scene(path), **chosen)
+    runs = stage.runs(progress=False)
+    moving = animation(stage, runs)
+    moving._func(frame)
+    moving._draw_was_started = True  # it is looked at here, not saved
+    return stage, runs, moving._fig.axes
+
+
 def test_points_at_every_node_leave_both_models_as_they_are(scene):
-    film = filmed(scene, slow=20.0)
+    stage, runs, (axes, _) = drawn(scene, 7, slow=20.0)
     loaded = load_scene(scene)
     bench = prepare(loaded, mechanics_of(loaded))
-    for take in film.takes:
-        alone = run_model(bench, take.run.name, progress=False)
-        (line,) = take.lines
-        assert np.max(np.abs(take.run.points["tip"] - alone.points["tip"])) < SAME
-        assert np.array_equal(line.deflection[-1], take.history)
-        assert take.history == pytest.approx(np.interp(film.time, alone.time, alone.points["tip"]), abs=SAME)
-        assert np.max(np.abs(line.deflection[0])) < 1e-15
+    for name, run in runs.items():
+        alone = run_model(bench, name, progress=False)
+        assert np.max(np.abs(run.points["tip"] - alone.points["tip"])) < SAME
+        line = next(each for each in axes.lines if each.get_label() == name)
+        now = np.interp(stage.time[7], alone.time, alone.points["tip"])
+        assert line.get_ydata()[-1] == pytest.approx(1e3 * now, abs=1e3 * SAME)
+        assert line.get_xdata()[[0, -1]] == pytest.approx([0.0, 0.5])
+        assert abs(line.get_ydata()[0]) < 1e-12
 
 
 def test_the_shape_between_the_points_is_the_trajectory_of_the_linear_elements(tmp_path):
-    film = filmed(write(tmp_path / "linear.toml", PLAIN), slow=5.0)
+    stage, _, (axes, _) = drawn(write(tmp_path / "linear.toml", PLAIN), 4, slow=5.0)
     loaded = load_scene(str(tmp_path / "linear.toml"))
     bench = prepare(loaded, mechanics_of(loaded))
     model = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts)
     start = model.static_equilibrium({"tip": 1.0})
     trajectory = mp.simulate(model, 0.1, displacement=start * 0.01 / (bench.structure.row("tip") @ start))
-    assert film.takes[0].run.name == film.takes[1].run.name == "all"
-    (line,) = film.takes[0].lines
-    frame = len(film.time) // 3
-    expected = trajectory.displacement(film.time[frame])[::2]
-    assert line.deflection[1:, frame] == pytest.approx(expected, abs=1e-7)
+    expected = trajectory.displacement(stage.time[4])[::2]
+    assert axes.lines[0].get_ydata()[1:] == pytest.approx(1e3 * expected, abs=1e-4)
 
 
-def test_a_stop_stands_where_the_gap_is_closed_and_tells_when_it_is(scene):
-    film = filmed(scene, slow=20.0)
-    for take in film.takes:
-        (stop,) = take.stops
-        (line,) = take.lines
-        struck = line.deflection[np.argmin(np.abs(line.x - stop.x))]
-        assert stop.z == pytest.approx(-1e-3, abs=1e-9)
-        assert (stop.x, stop.side) == (0.3, "below")
-        assert 0 < np.sum(stop.closed) < len(film.time)
-        assert np.all(struck[stop.closed] < -1e-3 + 1e-9)
-        assert np.all(struck[~stop.closed] > -1e-3 - 1e-9)
+def test_a_stop_stands_where_the_gap_is_closed_and_has_the_colour_of_closed_only_then(scene):
+    stage, runs, _ = drawn(scene, 0, slow=20.0)
+    run = runs["full"]
+    moving = animation(stage, runs)
+    moving._draw_was_started = True
+    closed = _closed(run.contact_intervals["stop"], stage.time)
+    assert 0 < np.sum(closed) < len(closed)
+    for frame in (0, int(np.argmax(closed))):
+        moving._func(frame)
+        mark = moving._fig.axes[0].lines[1]
+        assert (mark.get_xdata()[0], mark.get_marker()) == (0.3, "^")
+        assert mark.get_ydata()[0] == pytest.approx(-1.0, abs=1e-6)
+        assert (mark.get_color() == CLOSED) == closed[frame]
 
 
 def test_a_stop_above_and_one_that_moves(tmp_path):
     course = {"kind": "harmonic", "amplitude": 2e-4, "frequency_hz": 30.0}
     loads = [{"kind": "stop-motion", "contact": "stop", "course": course}]
     data = changed(["contacts", 0, "direction"], {"middle": -1.0}, PLAIN) | {"loads": loads}
-    film = filmed(write(tmp_path / "above.toml", data), model="r6", reference="r6", slow=5.0)
-    (stop,) = film.takes[0].stops
-    assert stop.side == "above"
-    assert stop.z == pytest.approx(1e-3 - 2e-4 * np.cos(2 * np.pi * 30.0 * film.time), abs=1e-6)
+    stage, _, (axes, _) = drawn(write(tmp_path / "above.toml", data), 5, model="r6", reference="r6", slow=5.0)
+    mark = axes.lines[1]
+    assert mark.get_marker() == "v"
+    assert mark.get_ydata()[0] == pytest.approx(1 - 0.2 * np.cos(2 * np.pi * 30.0 * stage.time[5]), abs=1e-3)
 
 
-def test_the_gif_has_every_frame_and_the_colour_of_closed_stops_only_where_one_is_closed(scene):
-    film = filmed(scene, slow=8.0)
-    closed = [any(stop.closed[k] for take in film.takes for stop in take.stops) for k in range(len(film.time))]
-    images = list(frames(film))
-    assert [has(image, CLOSED) for image in images] == closed
-    assert len(set(closed)) == 2
-    with Image.open(io.BytesIO(gif(images, frame_count(film)))) as written:
-        assert written.n_frames == frame_count(film) == 20
-        assert written.size == images[0].size
+def test_beams_that_meet_are_each_shown_with_the_other_where_it_would_touch(tmp_path):
+    stage, runs, axes = drawn(write(tmp_path / "pair.toml", PLAIN | PAIR), 20, slow=32.0)
+    run = runs["r"]
+    now = stage.time[20]
+    at = {name: 1e3 * np.interp(now, run.time, run.points[name]) for name in ("a.tip", "b.middle")}
+    assert len(axes) == 4  # three beams, a history
+    of_a, of_b = axes[0].lines[1], axes[1].lines[1]
+    assert (of_a.get_marker(), of_b.get_marker()) == ("^", "v")
+    assert of_a.get_ydata()[0] == pytest.approx(at["b.middle"] - 0.5, abs=1e-3)
+    assert of_b.get_ydata()[0] == pytest.approx(at["a.tip"] + 0.5, abs=1e-3)
+    assert len(axes[2].lines) == 2  # nothing touches the third
+
+
+def test_the_gif_has_every_frame_and_its_rate(scene):
+    stage = stage_of(load_scene(scene), slow=4.0)
+    told = []
+    content = gif(animation(stage, stage.runs(progress=False)), lambda frame, total: told.append((frame, total)))
+    with Image.open(io.BytesIO(content)) as written:
+        assert written.n_frames == len(stage.time) == len(told) == 10
         assert written.info["duration"] == 40
-        for k in (0, 19):
-            written.seek(k)
-            assert np.array_equal(np.asarray(written.convert("RGB")), np.asarray(images[k].convert("RGB")))
+        assert written.info["loop"] == 0
 
 
 def test_animate_writes_one_file_and_says_where(scene, tmp_path, capsys):
@@ -132,7 +155,7 @@ def test_without_a_factor_a_period_is_shown_at_length_in_a_film_that_ends(scene)
 
 def test_a_model_that_fails_is_exit_code_1_with_its_cause_and_no_file(scene, tmp_path, capsys, monkeypatch):
     data = changed(["models", 2, "newton_tolerance"], 1e-30, WITH_FULL)
-    monkeypatch.setattr(animate_command, "run_stage", lambda stage, progress: _failing(stage))
+    monkeypatch.setattr(Stage, "runs", lambda stage, progress: _failing(stage))
     assert cli.main(["animate", write(tmp_path / "failing.toml", data)]) == 1
     assert capsys.readouterr().out.startswith("full: failed, ")
     assert list((tmp_path / "multiphi-failing").iterdir()) == []
@@ -166,67 +189,3 @@ def test_matrices_and_scenes_without_a_reduced_model_are_refused(tmp_path, capsy
     assert refused(capsys, path) == f"{path}: structure: got matrices, need beams, whose shapes are drawn along x\n"
     alone = write(tmp_path / "full.toml", changed(["models"], [FULL], WITH_FULL))
     assert "models: got none that is reduced" in refused(capsys, alone)
-
-
-PART = BEAM["structure"]["beam"]
-CLAP = {"name": "clap", "direction": {"a.tip": 2.0, "b.middle": -2.0}, "gap": 1e-3, "stiffness": 1e5}
-PAIR = {
-    "structure": {"beams": {"a": PART, "b": PART, "far": PART}},
-    "contacts": [CLAP, CLAP | {"name": "stop", "direction": {"b.tip": -1.0}}],
-    "start": {"load_at": "a.tip", "measured_at": "a.tip", "displacement": 0.01},
-    "models": [{"kind": "reduced", "name": "r", "modes": 30}],
-    "comparison": {"reference": "r"},
-    "outputs": {"t_end": 0.1, "interval": 1e-4, "points": ["a.tip"]},
-}
-
-
-@pytest.fixture(scope="module")
-def pair(tmp_path_factory):
-    """A film of beams a over b, that clap; b under a stop; a third beam that nothing touches."""
-    return filmed(write(tmp_path_factory.mktemp("pair") / "pair.toml", PLAIN | PAIR), slow=32.0)  # contacts last 1 ms
-
-
-def line_at(line, x):
-    return line.height + line.deflection[np.argmin(np.abs(line.x - x))]
-
-
-def test_two_beams_are_drawn_touching_where_and_when_their_contact_is_closed(pair):
-    take = pair.takes[0]
-    clap, _ = take.stops
-    a, b, _ = take.lines
-    assert clap.side == "between"
-    assert 0 < np.sum(clap.closed) < len(pair.time)
-    distance = line_at(a, clap.x) - line_at(b, clap.x)
-    assert distance[0] == pytest.approx(1e-3 / 2 + 0.01, abs=1e-6)
-    assert np.all(distance[clap.closed] < 1e-9)
-    assert np.all(distance[~clap.closed] > -1e-9)
-    assert clap.z == pytest.approx((line_at(a, clap.x) + line_at(b, clap.x)) / 2)
-
-
-def test_a_stop_of_a_beam_that_is_drawn_lower_is_drawn_lower(pair):
-    take = pair.takes[0]
-    _, stop = take.stops
-    assert stop.side == "above"
-    assert stop.z - take.lines[1].height == pytest.approx(1e-3)
-
-
-def test_a_beam_that_nothing_touches_is_drawn_below_all_others(pair):
-    *others, far = pair.takes[0].lines
-    assert far.name == "far"
-    assert far.height < min(np.min(line.height + line.deflection) for line in others)
-
-
-def test_beams_in_contact_have_the_colour_of_it_and_open_ones_have_no_mark(pair):
-    closed = [any(stop.closed[k] for stop in pair.takes[0].stops) for k in range(len(pair.time))]
-    assert [has(image, CLOSED) for image in frames(pair)] == closed
-    assert len(set(closed)) == 2
-
-
-def test_beams_tied_to_each_other_have_one_height_and_the_tie_one_place():
-    section = Section.rectangle(0, 0.5, width=0.03, height=0.004, youngs_modulus=7e10, density=2700)
-    part = Beam([section], {"tip": 0.5, "middle": 0.3})
-    beams = Beams({"a": part, "b": part, "c": part}, ({"b.tip": 1.0, "a.middle": -1.0}, {"c.tip": 1.0}))
-    found = placements(beams, [mp.UnilateralContact("below", {"c.tip": -1.0, "b.middle": 1.0}, 2e-3, 1e5)])
-    assert found["a"] == Placement(0.0, 0.0, 0)
-    assert (found["b"].shift, found["b"].height, found["b"].group) == pytest.approx((-0.2, 0.0, 0))
-    assert (found["c"].shift, found["c"].height, found["c"].group) == pytest.approx((-0.4, -2e-3, 0))

@@ -11,6 +11,7 @@ from multiphi_exudyn.mechanics.beam import Beam, planar_beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.study.running.full_runner import run_full
 from multiphi_exudyn.study.running.reduced_runner import run_reduced
+from multiphi_exudyn.study.running.runs import How
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
@@ -116,8 +117,8 @@ class TestScenes:
         scene = load_scene(name, t_end=t_end)
         bench = prepare(scene, mechanics_of(scene))
         specs = list(scene.models.values())
-        reduced = run_reduced(bench, next(spec for spec in specs if spec.kind == "reduced"), "reduced")
-        full = run_full(bench, scene.models["full-cheapest"], "full", progress=False)
+        reduced = run_reduced(bench, next(spec for spec in specs if spec.kind == "reduced"), "reduced", How())
+        full = run_full(bench, scene.models["full-cheapest"], "full", How())
         assert sum(len(given) for given in full.contact_intervals.values()) >= 1
         for point in bench.judged_points:
             difference = np.linalg.norm(reduced.points[point] - full.points[point])

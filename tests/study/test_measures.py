@@ -17,9 +17,9 @@ from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
 KEYS = [
-    "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "first_contact",
-    "contact_count", "closed_time", "intervals", "impulse", "inner_losses", "energy_end", "ledger", "frequencies",
-    "horizon_s", "warnings",
+    "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "largest",
+    "first_contact", "contact_count", "closed_time", "intervals", "largest_force", "impulse", "inner_losses",
+    "energy_end", "ledger", "horizon_s", "warnings",
 ]  # fmt: skip
 RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
 
@@ -72,7 +72,6 @@ def test_every_measure_is_defined(bench, reference):
     assert set(metrics.METRICS) - set(KEYS) == {
         "pointwise_until",
         "stiff_nrmse",
-        "repetition_rate",
     }  # of two runs, of a study
 
 
@@ -97,25 +96,13 @@ def test_contacts_energy_and_ledger(bench, reference):
     assert found["contact_count"] == {"stop": 2}
     assert found["closed_time"] == {"stop": pytest.approx(0.008)}
     assert found["intervals"] == {"stop": [[0.03, 0.032], [0.034, 0.04]]}
+    assert found["largest"] == {"tip": 1e-2, "middle": pytest.approx(4e-3)}
+    assert found["largest_force"] == {"stop": pytest.approx(1e-2, rel=1e-3)}
     assert found["impulse"] == {"stop": 0.5}
     assert found["inner_losses"] == {"stop": 1}
     assert found["energy_end"] == math.exp(-0.2)
     assert found["ledger"] == {"initial": 1.0, "damping": 0.2, "final": 0.8}
     assert (found["label"], found["kind"], found["dofs"], found["steps"]) == ("drawn by hand", "full", 40, 100)
-
-
-def test_frequencies_by_level(bench, reference):
-    """The drawn run moves at one frequency whatever is closed."""
-    found = measures(bench, reference, None)["frequencies"]
-    assert list(found) == ["open", "stop"]
-    assert found["open"] == pytest.approx([300 / (2 * math.pi)], rel=1e-6)
-
-
-def test_a_simulated_run_has_the_frequencies_of_its_model(bench, simulated):
-    found = measures(bench, simulated, None)["frequencies"]["open"]
-    exact = bench.model(bench.scene.models["r6"]).level(()).frequencies
-    assert len(found) >= 3
-    assert np.all(np.min(np.abs(np.subtract.outer(found, exact)) / exact, axis=1) < 1e-6)
 
 
 def test_without_a_reference_there_are_no_differences(bench, reference):
@@ -141,7 +128,6 @@ def test_a_run_that_never_touches_has_no_first_contact(bench, reference):
     assert found["first_contact"] == {"stop": None}
     assert found["intervals"] == {"stop": []}
     assert found["contact_count"] == {"stop": 0} == found["inner_losses"]
-    assert list(found["frequencies"]) == ["open"]
 
 
 def test_measures_are_json_without_numbers_that_do_not_exist(bench, reference, simulated):

@@ -127,6 +127,9 @@ def test_the_limit_of_a_friction_is_an_axis_of_a_study(tmp_path):
     found = load_study(write(tmp_path / "study.toml", study))
     limits = [found.scene_for(found.reference(at)).file.friction[0].limit for at in found.points]
     assert sorted(limits) == [0.5, 0.8]
-    for path, said in (("friction.belt.limit", "friction, which is no table"), ("friction.ring", "a whole table")):
+    for path, said in (
+        ("friction.belt.limit", "friction.belt.limit: got 'belt', need one of the entries: "),
+        ("friction.ring", r"friction\[0\]: got 0.5"),
+    ):
         with pytest.raises(mp.MultiPhiValueError, match=said):
             load_study(write(tmp_path / "study.toml", study | {"axes": {path: [0.5]}}))

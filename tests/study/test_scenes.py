@@ -12,7 +12,7 @@ from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError, RayleighDamping
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scene_file import FullModel
+from multiphi_exudyn.study.scene.model_kinds import FullModel
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
 from multiphi_exudyn.study.scene.structure_tables import RigStructure
 from multiphi_exudyn.study.scene.workbench import prepare

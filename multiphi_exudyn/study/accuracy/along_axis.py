@@ -38,6 +38,9 @@ FINEST: Mapping[str, Callable[[Iterable[float]], float]] = {
 }
 
 
+QUANTITIES = ("largest", "first_contact", "inner_losses", "largest_force", "impulse")  # of a point or a contact
+
+
 @dataclass(frozen=True)
 class Series:
     """A method's settings along one numeric axis, values ascending, all other fields fixed."""
@@ -72,7 +75,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Table:
-    """One quantity along a scene's axis: method -> one cell for each value; contact "" where there is none to name."""
+    """One quantity along a scene's axis: method -> one cell for each value; contact: or point, "" for none."""
 
     quantity: str
     contact: str
@@ -108,12 +111,13 @@ def numeric_axes(settings: Sequence[Setting], of_scene: bool) -> list[str]:
 
 
 def tables_along(result: StudyResult, axis: str) -> list[Table]:
-    """Error, first contact, losses inside the first phase and impulse along a scene's axis, by method."""
+    """Error, and what each point and contact does, along a scene's axis, by method."""
     everything = [*references(result), *settings(result)]
     lines = [line for name in names_of(everything) if (line := series(everything, name, axis))]
     values = tuple(sorted({value for line in lines for value in line.values}))
-    contacts = dict.fromkeys(c for line in lines for s in line.settings for c in s.values.get("first_contact", {}))
-    wanted = [("error", ""), *((q, c) for q in ("first_contact", "inner_losses", "impulse") for c in contacts)]
+    found = [setting.values for line in lines for setting in line.settings]
+    named = {q: dict.fromkeys(name for values in found for name in values.get(q, {})) for q in QUANTITIES}
+    wanted = [("error", ""), *((quantity, name) for quantity, names in named.items() for name in names)]
     return [
         Table(quantity, contact, axis, values, _columns(lines, values, quantity, contact))
         for quantity, contact in wanted

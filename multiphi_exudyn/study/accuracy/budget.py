@@ -25,8 +25,8 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel, LoadedStart, ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scene.scenes import ModelSpec
+from multiphi_exudyn.study.scene.model_kinds import FullModel, ModelSpec, ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart, LoadedStart
 from multiphi_exudyn.study.scene.workbench import Workbench
 
 __all__ = ["CAUSES", "Budget", "Rung", "budget", "decomposition"]

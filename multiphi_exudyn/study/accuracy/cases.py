@@ -26,6 +26,7 @@ from multiphi_exudyn.study.accuracy.analysis import COARSER, REFERENCE, is_numbe
 from multiphi_exudyn.study.accuracy.study_file import MethodSpec, StudyFile
 from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.places import with_value
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
@@ -63,12 +64,6 @@ class Study:
         names = [given] if isinstance(given, str) else [*given.values(), *structure.get("points", {}).values()]
         files = [self.scene_path.parent / name for name in names if isinstance(name, str)]
         return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()]
-
-    @property
-    def _frequencies(self) -> dict[str, Any] | None:
-        """What a run is asked for beyond its measures."""
-        asked = self.file.frequencies
-        return None if asked is None else asked.model_dump(include={"point", "windows"})
 
     @property
     def points(self) -> list[dict[str, Any]]:
@@ -125,9 +120,7 @@ class Study:
         model = next((given.model for given in self.file.methods if given.name == method), {})
         return {
             "scene": self.file.scene,
-            "content": _hash(
-                [self.scene, model, self.file.time_limit_s, self._matrices, _versions(), self._frequencies]
-            ),
+            "content": _hash([self.scene, model, self.file.time_limit_s, self._matrices, _versions()]),
             "at": dict(at),
             "method": method,
             "setting": dict(setting),
@@ -198,28 +191,6 @@ def _check(study: Study) -> None:
         except MultiPhiValueError as error:
             told = str(error).removeprefix(f"{study.scene_path}: ")
             raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
-    _check_frequencies(study)
-
-
-def _check_frequencies(study: Study) -> None:
-    """One axis, an ideal that is among the runs, windows in order, a point that the scene has."""
-    asked = study.file.frequencies
-    if asked is None:
-        return
-    if len(study.file.axes) != 1 or not study.file.methods:
-        _refuse(study, "frequencies", f"{len(study.file.axes)} axes", "one axis, and a method")
-    if any(len(study._settings(method)) > 1 for method in study.file.methods):
-        _refuse(study, "frequencies", "a method with several settings", "one setting of each method")
-    if asked.ideal is not None and all(asked.ideal not in at.values() for at in study.points):
-        _refuse(study, "frequencies.ideal", asked.ideal, "one of the axis' values")
-    if asked.ideal_method is not None and asked.ideal_method not in [method.name for method in study.file.methods]:
-        _refuse(study, "frequencies.ideal_method", asked.ideal_method, "the name of a method")
-    if list(asked.windows) != sorted(set(asked.windows)):
-        _refuse(study, "frequencies.windows", list(asked.windows), "ends that ascend")
-    scene = study.scene_for(study.reference(study.points[0]))
-    known = scene.file.outputs.points or mechanics_of(scene).points
-    if asked.point not in known:
-        _refuse(study, "frequencies.point", asked.point, f"one of the points: {', '.join(known)}")
 
 
 def _check_size(study: Study) -> None:
@@ -265,27 +236,8 @@ def _put_reference(data: dict[str, Any], file: StudyFile) -> None:
 
 
 def _put(data: dict[str, Any], field: str, value: Any) -> None:
-    """Set a field "a.b.c" of nested tables, one of several tables by its name; a table that is not there is made."""
-    data.update(_changed(data, field.split("."), value, field))
-
-
-def _changed(given: dict[str, Any], path: list[str], value: Any, field: str) -> dict[str, Any]:
-    """A table with one field set."""
-    name, *rest = path
-    if not rest:
-        return given | {name: value}
-    inner = given.get(name, {})
-    if isinstance(inner, dict):
-        return given | {name: _changed(inner, rest, value, field)}
-    given_tables = inner if isinstance(inner, list) else []
-    named = [isinstance(table, dict) and table.get("name") == rest[0] for table in given_tables]
-    if not any(named):
-        raise MultiPhiValueError(f"{field}: got a place inside {name}, which is no table; need a scene's field")
-    if not rest[1:]:
-        raise MultiPhiValueError(f"{field}: got a whole table, need one of its fields")
-    pairs = zip(given_tables, named, strict=True)
-    tables = [_changed(table, rest[1:], value, field) if is_it else table for table, is_it in pairs]
-    return given | {name: tables}
+    """Set a field of the scene."""
+    data.update(with_value(data, field, value))
 
 
 def _hash(content: Any) -> str:

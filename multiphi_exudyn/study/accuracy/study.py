@@ -18,12 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.accuracy.analysis import MapPair, Setting, StudyResult, settings
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
-from multiphi_exudyn.study.measures.apparent_frequencies import apparent_frequencies, natural_frequencies
 from multiphi_exudyn.study.measures.measures import measures
-from multiphi_exudyn.study.measures.response_frequencies import level_name
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.environment import environment
@@ -38,7 +37,6 @@ from multiphi_exudyn.study.sweep.sweep import sweep
 __all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "run_study"]
 
 ERRORS, TIMING, BUDGETS = "error", "timing", "budget"  # names of the passes in the store
-KEPT = 4  # natural frequencies of a level that a row keeps: the tables of the published rig have as many
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class MeasuredRun:
         run = run_model(bench, self.study.model_name(parameters), progress=False, horizon=nudged)
         indicator = run.indicators.get(f"{_window(self.study, bench):g}")
         values = measures(bench, run, self.reference) | {"indicator": indicator}
-        values |= self._against_stiff(bench, run) | self._shown(bench, run)
+        values |= self._against_stiff(bench, run)
         return Outcome(values, to_arrays(run), run.status, run.message)
 
     def _against_stiff(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
@@ -67,17 +65,6 @@ class MeasuredRun:
             return {}
         found = self.stiff.values(bench, {run.name: run})
         return {"stiff_stops": found | {"errors": found["errors"].get(run.name, {})}}
-
-    def _shown(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
-        """The frequencies that the run shows by window, and its levels' own, where the study asks for them."""
-        asked = self.study.file.frequencies
-        if asked is None or not run.ok:
-            return {}
-        levels = natural_frequencies(bench, _rigid(bench, run.name))
-        return {
-            "shown": apparent_frequencies(bench, run, asked.point, asked.windows),
-            "natural": {name: frequencies[:KEPT] for name, frequencies in levels.items()},
-        }
 
 
 @dataclass(frozen=True)
@@ -225,12 +212,7 @@ def _in_contact(run: ModelRun) -> list[list[float]]:
 def _level_frequencies(bench: Workbench) -> dict[str, list[float]]:
     """Natural frequencies [Hz] of the case's levels, within the map: the open one, each contact closed alone."""
     lowest, highest = FREQUENCIES[0], FREQUENCIES[-1]
-    return {
-        name if name == level_name(()) else f"{name} closed": [f for f in frequencies if lowest <= f <= highest]
-        for name, frequencies in natural_frequencies(bench, _rigid(bench, CASE)).items()
-    }
-
-
-def _rigid(bench: Workbench, name: str) -> bool:
-    """Whether a model of the scene takes all contacts as rigid."""
-    return getattr(bench.scene.models[name], "contact", "as-given") == "rigid"
+    contacts = bench.contacts(bench.scene.models[CASE].rigid)
+    model = MultiPhiModel(bench.structure, contacts, modes="all", overrides=bench.overrides)
+    levels = {"open": model.level(())} | {f"{c.name} closed": model.level((c.name,)) for c in model.contacts}
+    return {name: [float(f) for f in level.frequencies if lowest <= f <= highest] for name, level in levels.items()}

@@ -51,6 +51,12 @@ __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_fig
 MOST_ORDERS = 5  # written one by one
 LABEL_LENGTH = 42  # characters of a legend's line
 NAME_LENGTH = 24  # characters of a line of a label beside its curve
+DRAWN = {  # along an axis of the scene: label and scale
+    "error": ("", 100.0),
+    "largest": ("largest displacement [mm]", 1e3),
+    "inner_losses": ("losses of contact\nin the first phase", 1.0),
+    "largest_force": ("largest contact force [N]", 1.0),
+}
 BETWEEN = 30  # points of a front's line that labels keep clear of, per segment
 
 
@@ -113,11 +119,11 @@ def indicator_figure(result: StudyResult) -> Figure | None:
 
 
 def along_figure(result: StudyResult, axis: str) -> Figure:
-    """Error, and losses of contact inside the first phase, along one of the scene's axes."""
-    tables = [table for table in tables_along(result, axis) if table.quantity in ("error", "inner_losses")]
+    """Error, largest displacements and forces, and losses of contact, along one of the scene's axes."""
+    tables = [table for table in tables_along(result, axis) if table.quantity in DRAWN]
     figure, panels = panels_of([3.2] * len(tables), sharex=True)
     for axes, table in zip(panels, tables, strict=True):
-        scale = 100 if table.quantity == "error" else 1
+        label, scale = DRAWN[table.quantity]
         for name, style in styles(result).items():
             cells = table.columns.get(name, ())
             heights = [np.nan if cell is None else scale * cell for cell in cells]
@@ -128,8 +134,8 @@ def along_figure(result: StudyResult, axis: str) -> Figure:
             axes.set_ylabel(error_label(result))
             percent_axis(axes)
         else:
-            axes.set_ylabel(f"losses of contact\nin the first phase, {table.contact}")
-            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+            axes.set_ylabel(f"{label}\n{table.contact}")
+            axes.yaxis.set_major_locator(MaxNLocator(integer=table.quantity == "inner_losses"))
     value_axis(panels[-1], axis, tables[-1].values)
     legend_below(figure, panels)
     return figure

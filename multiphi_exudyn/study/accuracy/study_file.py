@@ -1,6 +1,7 @@
 """The format of a study file: a scene, what is varied in it, the methods to judge, and how.
 
-A *field* is a place in a scene file, written with dots ("start.displacement"). A *setting* is one choice of a method's
+A *field* is a place in a scene file, written with dots ("start.displacement", "contacts.*.gap", "loads.0.frequency_hz";
+:mod:`multiphi_exudyn.study.scene.places`); its values may be whole tables. A *setting* is one choice of a method's
 own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
 be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
 Errors of mesh and step can cancel for a whole range of steps: a setting *lasts* where every finer one holds as well.
@@ -14,11 +15,10 @@ from pydantic import Field
 
 from multiphi_exudyn.study.scene.scene_file import Finite, Positive, Table
 
-__all__ = ["BudgetSpec", "FrequencySpec", "MethodSpec", "QuickSpec", "StudyFile"]
+__all__ = ["BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile"]
 
-Value = Annotated[int, Field(strict=True)] | Finite | str | bool
+Value = Annotated[int, Field(strict=True)] | Finite | str | bool | dict[str, Any] | list[Any]
 Values = Annotated[tuple[Value, ...], Field(min_length=1)]
-Ends = Annotated[tuple[Positive, ...], Field(min_length=1)]
 Factors = Annotated[tuple[Positive, ...], Field(min_length=1)]
 
 
@@ -37,22 +37,6 @@ class BudgetSpec(Table):
     """The ladder from the full model to the reduced one, one run a rung."""
 
     modes: Annotated[int, Field(ge=1)] = 6
-
-
-class FrequencySpec(Table):
-    """What the study's only axis does to the frequencies that the response shows, window by window.
-
-    question: what the findings answer. point: whose motion's repetition rate is taken. windows: their ends [s], the
-    first begins at 0. ideal: the axis' value, ideal_method: the method that changes are counted from; without them
-    each run's own. early [s]: a rise of frequencies is looked for in the windows up to here.
-    """
-
-    question: Annotated[str, Field(min_length=1)]
-    point: Annotated[str, Field(min_length=1)]
-    windows: Ends = (0.25, 0.5, 0.75, 1.0)
-    early: Positive = 1.0
-    ideal: Value | None = None
-    ideal_method: str | None = None
 
 
 class QuickSpec(Table):
@@ -82,7 +66,6 @@ class StudyFile(Table):
     coarser: dict[str, Any] | None = None
     methods: tuple[MethodSpec, ...] = ()
     budget: BudgetSpec | None = None
-    frequencies: FrequencySpec | None = None
     window: Positive | None = None
     tolerances: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.1, 0.05, 0.02, 0.01)
     time_limit_s: Positive = 300.0

@@ -26,7 +26,6 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
-from multiphi_exudyn.study.accuracy.frequency_findings import frequency_asked, frequency_outcome
 from multiphi_exudyn.study.accuracy.stiff_errors import stiff_words
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence, times
@@ -122,8 +121,6 @@ def timing_words(result: StudyResult) -> str:
 def _asked(result: StudyResult) -> str:
     if not result.study.methods:
         return budget_asked(result)
-    if result.study.frequencies is not None:
-        return f"{frequency_asked(result)} {_asked_of_errors(result)}"
     return _asked_of_errors(result)
 
 
@@ -140,8 +137,7 @@ def _asked_of_errors(result: StudyResult) -> str:
 
 
 def _outcome(result: StudyResult) -> Iterable[str]:
-    """What the response shows; one sentence per tolerance, or with several points one line per point; the budgets."""
-    yield from frequency_outcome(result)
+    """One sentence per tolerance, or with several points one line per point; the budgets."""
     shown = shown_points(result)
     for at in shown:
         found = list(_outcome_at(result, at))

@@ -26,9 +26,6 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-from multiphi_exudyn.study.accuracy.frequency_changes import shown_of
-from multiphi_exudyn.study.accuracy.frequency_figure import frequency_figure
-from multiphi_exudyn.study.accuracy.frequency_findings import signed, value_words
 from multiphi_exudyn.study.accuracy.indicator import Correlation, indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
 from multiphi_exudyn.study.accuracy.stiff_errors import StiffError, stiff_errors
@@ -84,8 +81,6 @@ def render_study(result: StudyResult) -> str:
         "words": words,
         "cell": cell_words,
         "share": share,
-        "signed": signed,
-        "value": value_words,
     }
     failed = [row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"]
     return environment.get_template(TEMPLATE).render(
@@ -99,8 +94,6 @@ def render_study(result: StudyResult) -> str:
         full=full_methods(result),
         error_words=error_words,
         timing=timing_words(result),
-        frequencies=_frequencies(result),
-        shown_frequencies=shown_of(result),
         along=[(axis, _along(result, axis), tables_along(result, axis)) for axis in _axes(result)],
         indicator=_indicator(result),
         correlations=_correlations(result),
@@ -120,7 +113,10 @@ def cell_words(value: float | None, quantity: str) -> str:
         return percent(value)
     if quantity == "first_contact":
         return f"{1e3 * value:.3f} ms"
-    return f"{value:.4g} N s" if quantity == "impulse" else f"{value:g}"
+    if quantity == "largest":
+        return f"{1e3 * value:.4g} mm"
+    units = {"impulse": " N s", "largest_force": " N"}
+    return f"{value:.4g}{units.get(quantity, '')}"
 
 
 def _point(result: StudyResult, at: Mapping[str, Any]) -> Point:
@@ -164,15 +160,6 @@ def _along(result: StudyResult, axis: str) -> Picture:
 
 def _references(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
     return [setting for setting in references(result) if setting.at == at]
-
-
-def _frequencies(result: StudyResult) -> Picture | None:
-    figure = frequency_figure(result)
-    caption = (
-        "Repetition rate: how often the point's motion comes round, contacts counted in. Natural frequencies: of the "
-        "levels themselves, which have no amplitude. Grey: no larger than the reference's own uncertainty."
-    )
-    return None if figure is None else _picture(figure, caption)
 
 
 def _indicator(result: StudyResult) -> Picture | None:

@@ -1,242 +1,256 @@
-"""A film as an animated GIF: the shapes of two models under each other, a point's history growing below.
+"""A reduced model and its reference moving over each other in slow motion, as a GIF by matplotlib's PillowWriter.
 
-What does not move is drawn once; of every frame only the lines, stops and texts that move. All frames share one
-palette: the few colours there are, in shades towards white for the edges of lines.
+One panel for each beam: the deflection w(x, t) of both models at the nodes of the mesh they are made from (every node
+is a point of the structure here, which leaves matrices and mesh as they are), and where each contact would touch it,
+z(t) = w(x_c, t) - g(t) / c with gap g and coefficient c, so a stop that moves, or the other beam, is seen to move. The
+last panel: the judged point that moves most.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+import math
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.path import Path
-from matplotlib.text import Text
 from PIL import Image
 
-from multiphi_exudyn.study.comparison.film import FRAME_RATE, Film, Line, Stop, Take
-from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, FULL, REFERENCE, panels
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.study.comparison.placement import meeting
+from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, REFERENCE, panels
 from multiphi_exudyn.study.comparison.wording import seconds
+from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scenes import Scene
+from multiphi_exudyn.study.scene.workbench import Workbench, mesh_nodes, prepare
 
-__all__ = ["frame_count", "frames", "gif"]
+__all__ = ["FRAME_RATE", "Stage", "animation", "gif", "stage_of"]
 
-HEIGHT = 7.4  # inches
-RATIOS = (1.0, 1.0, 1.1)  # heights of the panels
+FRAME_RATE = 25.0  # frames a second
+PERIOD_SHOWN = 10.0  # s, for the longest period of the open structure: bounces of a hundredth of it last several frames
+LONGEST = 40.0  # s, of an animation whose slow motion nobody has chosen
+MOST_FRAMES = 3000  # two minutes: beyond that a typing error is likelier than a wish
 RESOLUTION = 76  # dots per inch: 700 pixels wide
+COLOUR_COUNT = 48
 MARGIN = 0.12  # of the range of the heights, above and below
-HELD = 1500  # ms, of the last frame
-SHADES = 9  # of every colour, from itself to white
-CLOSED, AXIS, TEXT = "#D55E00", "#BBBBBB", "#555555"
-SHAPES: dict[str, Path | str] = {
-    "below": Path([(0, 0), (-1, -1.5), (1, -1.5)]),  # tips touch the beam
-    "above": Path([(0, 0), (-1, 1.5), (1, 1.5)]),
-    "between": "o",
-}
-STOP_SIZE, BEAM_WIDTH = 13.0, 3.0  # points
-ROW_WIDTH = 400.0  # points, that a row of stops may take: many stops are drawn smaller
-SMALLEST_STOP, BETWEEN_SIZE = 4.0, 9.0  # points
-LIGHTEST = 0.65  # share of white in the last of several beams' colour
-WALL = 14.0  # points, height of the mark where a beam is clamped
-HISTORY_WIDTHS = (1.2, 2.6)  # points, of the model and of the reference below it
+CLOSED, OPEN = "#D55E00", "#BBBBBB"
+WIDTHS = (2.0, 4.5)  # points, of the reduced model and of the reference below it
 
 
 @dataclass(frozen=True)
-class _Shape:
-    """Artists of a model: a line for each beam, a marker for each stop, its history and the history's last point."""
+class Stage:
+    """A scene whose beams' nodes are points of the bench; beams: name -> x (k,) [m] of its nodes, and their names.
 
-    take: Take
-    beams: tuple[tuple[Line, Line2D], ...]
-    stops: tuple[tuple[Stop, Line2D], ...]
-    history: Line2D
-    head: Line2D
+    models: names of the reduced model and of the reference; judged: points of which one is followed; slow: how many
+    times slower than it happens.
+    """
+
+    bench: Workbench
+    models: tuple[str, str]
+    judged: tuple[str, ...]
+    beams: Mapping[str, tuple[np.ndarray, tuple[str, ...]]]
+    slow: float
 
     @property
-    def artists(self) -> Iterator[Artist]:
-        """All that moves."""
-        yield from (artist for _, artist in (*self.beams, *self.stops))
-        yield from (self.history, self.head)
+    def time(self) -> np.ndarray:
+        """Of the frames [s]."""
+        return np.arange(0.0, self.bench.t_end, 1 / (FRAME_RATE * self.slow))
 
-    def show(self, frame: int, time: np.ndarray) -> None:
-        """Put everything where it is in a frame."""
-        for line, artist in self.beams:
-            artist.set_ydata(1e3 * (line.height + line.deflection[:, frame]))
-        for stop, artist in self.stops:
-            artist.set_ydata([1e3 * stop.z[frame]])
-            artist.set_color(CLOSED if stop.closed[frame] else FULL)
-            artist.set_visible(bool(stop.closed[frame]) or stop.side != "between")
-        shown = slice(0, frame + 1)
-        self.history.set_data(time[shown], 1e3 * self.take.history[shown])
-        self.head.set_data(time[frame : frame + 1], 1e3 * self.take.history[frame : frame + 1])
+    def runs(self, progress: bool) -> dict[str, ModelRun]:
+        """Both models, run; a failed one has its cause."""
+        return {name: run_model(self.bench, name, progress, retry=True) for name in self.models}
 
 
-def frame_count(film: Film) -> int:
-    """Number of frames that are drawn; the GIF joins those that look alike."""
-    return len(film.time)
+def stage_of(scene: Scene, model: str | None = None, reference: str | None = None, slow: float | None = None) -> Stage:
+    """Check what is asked for and build what both models share; none asked for: the scene's own.
+
+    Raises MultiPhiValueError, one line, for a model that cannot be drawn, matrices, and no or endless length.
+    """
+    models = _chosen(scene, model, reference)
+    comparison = scene.file.comparison.model_copy(update={"reference": models[1]})
+    scene = replace(scene, file=scene.file.model_copy(update={"comparison": comparison}))
+    mechanics = mechanics_of(scene)
+    beams = mechanics.beams
+    if beams is None:
+        raise MultiPhiValueError(f"{scene.path}: structure: got matrices, need beams, whose shapes are drawn along x")
+    mesh = mesh_nodes(scene, mechanics)
+    judged = scene.file.outputs.judged_points or scene.file.outputs.points or mechanics.points
+    nodes = {name: (x, tuple(f"{name}.{node}" if name else node for node in _nodes(x))) for name, x in mesh.items()}
+    touched = [point for contact in mechanics.contacts for point in meeting(contact)]
+    shown = tuple(dict.fromkeys([*judged, *touched, *(point for _, points in nodes.values() for point in points)]))
+    outputs = scene.file.outputs.model_copy(update={"points": shown})
+    parts = {name: _with_nodes(beam, mesh[name]) for name, beam in beams.parts.items()}
+    whole = replace(mechanics, beams=replace(beams, parts=parts))
+    bench = prepare(replace(scene, file=scene.file.model_copy(update={"outputs": outputs})), whole)
+    factor = _checked(slow, bench.t_end) if slow is not None else _slow_motion(bench)
+    return Stage(replace(bench, repeats=1), models, tuple(judged), nodes, factor)
 
 
-def frames(film: Film) -> Iterator[Image.Image]:
-    """The frames, all with the same palette."""
-    figure, (*upper, lower) = panels(HEIGHT, 3, RATIOS)
+class _FewColours(PillowWriter):
+    """Frames with one palette of few colours: a file a tenth as large."""
+
+    _frames: list[Image.Image]
+
+    def finish(self) -> None:
+        """Write all frames."""
+        sample = self._frames[0].convert("RGB")
+        sample.paste(CLOSED, (0, 0, 60, 60))  # a colour that the first frame need not have
+        palette = sample.quantize(COLOUR_COUNT, dither=Image.Dither.NONE)
+        self._frames = [
+            frame.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for frame in self._frames
+        ]
+        super().finish()
+
+
+def animation(stage: Stage, runs: Mapping[str, ModelRun]) -> FuncAnimation:
+    """The animation of two finished runs, by the names of their models."""
+    reduced, reference = (runs[name] for name in stage.models)
+    names = list(stage.beams)
+    figure, axes = panels(1.2 + 2.4 * len(names) + 2.2, len(names) + 1, [1.0] * len(names) + [0.9])
     figure.set_dpi(RESOLUTION)
-    given = zip(film.takes, upper, (COLOURS[0], REFERENCE), HISTORY_WIDTHS, strict=True)
-    shapes = [_shape(take, axes, colour, lower, width) for take, axes, colour, width in given]
-    clock = lower.text(1.0, 1.03, "", transform=lower.transAxes, ha="right", fontsize=10, animated=True)
-    _frame_shapes(film, upper)
-    _frame_history(film, lower)
-    _titles(film, figure, shapes)
-    palette = _palette((COLOURS[0], REFERENCE, FULL, CONTACT, CLOSED, AXIS, TEXT))
-    for image in _drawn(film, figure, shapes, clock):
-        yield image.quantize(palette=palette, dither=Image.Dither.NONE)
+    moved: list[Callable[[int], None]] = []
+    for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
+        for beam, panel in zip(names, axes, strict=False):
+            moved.append(_line(stage, run, beam, panel, colour, width))
+            moved += _touching(stage, run, beam, panel, 2 * width)
+        moved.append(_history(stage, run, axes[-1], colour, width / 2))
+    _frame(stage, runs, figure, axes)
+    clock = axes[-1].text(1.0, 1.03, "", transform=axes[-1].transAxes, ha="right", fontsize=10)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # placed once, not in every frame
+
+    def show(frame: int) -> list[Artist]:
+        for move in moved:
+            move(frame)
+        clock.set_text(f"t = {stage.time[frame]:.3f} s")
+        return []
+
+    return FuncAnimation(figure, show, frames=len(stage.time), init_func=list, repeat=True)
 
 
-def gif(images: Iterable[Image.Image], count: int) -> bytes:
-    """``count`` images as a GIF that starts again at its end."""
-    rest = iter(images)
-    first = next(rest)
-    durations = [round(1e3 / FRAME_RATE)] * (count - 1) + [HELD]
-    buffer = io.BytesIO()
-    first.save(buffer, "GIF", save_all=True, append_images=rest, duration=durations, loop=0)
-    return buffer.getvalue()
+def gif(moving: FuncAnimation, progress: Callable[[int, int], object] | None = None) -> bytes:
+    """The animation as a GIF that starts again at its end; progress: called with a frame's number and their count."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "animation.gif"
+        moving.save(path, _FewColours(fps=int(FRAME_RATE)), dpi=RESOLUTION, progress_callback=progress)
+        return path.read_bytes()
 
 
-def _palette(colours: Iterable[str]) -> Image.Image:
-    """An image that has every colour, in shades towards white."""
-    shares = np.linspace(0.0, 1.0, SHADES)[:, None]
-    shades = [np.array(to_rgb(colour)) * (1 - shares) + shares for colour in colours]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(np.rint(255 * np.concatenate(shades)).astype(np.uint8).tobytes())
-    return palette
+def _line(stage: Stage, run: ModelRun, beam: str, axes: Axes, colour: str, width: float) -> Callable[[int], None]:
+    x, nodes = stage.beams[beam]
+    deflection = 1e3 * np.array([_at(stage, run, node) for node in nodes])
+    (line,) = axes.plot(x, deflection[:, 0], color=colour, lw=width, label=run.name)
+    return lambda frame: line.set_ydata(deflection[:, frame])
 
 
-def _drawn(film: Film, figure: Figure, shapes: list[_Shape], clock: Text) -> Iterator[Image.Image]:
-    """Every frame on the one background."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    background = canvas.copy_from_bbox(figure.bbox)
-    for frame, now in enumerate(film.time):
-        canvas.restore_region(background)
-        clock.set_text(f"t = {now:.3f} s")
-        for shape in reversed(shapes):
-            shape.show(frame, film.time)
-            for artist in shape.artists:
-                figure.draw_artist(artist)
-        figure.draw_artist(clock)
-        yield Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+def _touching(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Callable[[int], None]]:
+    """Where each contact of a beam would touch it: a mark that changes its colour while the contact is closed."""
+    beams = stage.bench.mechanics.beams
+    assert beams is not None, "checked when the stage was built"
+    for contact in stage.bench.mechanics.contacts:
+        given = {contact.direction: 1.0} if isinstance(contact.direction, str) else contact.direction
+        for point in meeting(contact):
+            name, along = beams.points[point]
+            if name == beam:
+                c = given[point]
+                gap = np.interp(stage.time, run.time, run.gaps[contact.name])
+                z = 1e3 * (_at(stage, run, point) - gap / c)
+                closed = _closed(run.contact_intervals[contact.name], stage.time)
+                (mark,) = axes.plot([along], z[:1], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
+                yield _marked(mark, z, closed)
 
 
-def _shape(take: Take, axes: Axes, colour: str, lower: Axes, width: float) -> _Shape:
-    shades = _shades(colour, len(take.lines))
-    beams = tuple(
-        (line, axes.plot(line.x, np.zeros(len(line.x)), "-", color=shade, lw=BEAM_WIDTH, animated=True)[0])
-        for line, shade in zip(take.lines, shades, strict=True)
-    )
-    for line, shade in zip(take.lines, shades, strict=True):
-        z = 1e3 * line.height
-        axes.plot(line.x[[0, -1]], [z, z], color=AXIS, lw=0.8, zorder=0)
-        axes.plot(line.x[:1], [z], marker="|", ms=WALL, mew=BEAM_WIDTH, color=shade, zorder=1)
-    size = _stop_size(len(take.stops))
-    return _Shape(
-        take=take,
-        beams=beams,
-        stops=tuple((stop, _stop(axes, stop, size)) for stop in take.stops),
-        history=lower.plot([], [], "-", color=colour, lw=width, animated=True)[0],
-        head=lower.plot([], [], "o", color=colour, ms=5, animated=True)[0],
-    )
+def _marked(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Callable[[int], None]:
+    def move(frame: int) -> None:
+        mark.set_ydata(z[frame : frame + 1])
+        mark.set_color(CLOSED if closed[frame] else OPEN)
+
+    return move
 
 
-def _shades(colour: str, count: int) -> list[tuple[float, float, float]]:
-    """The colour for the first beam, lighter ones for the others, (r, g, b) each."""
-    shares = np.linspace(0.0, LIGHTEST, count) if count > 1 else np.zeros(1)
-    red, green, blue = to_rgb(colour)
-    return [(red + (1 - red) * s, green + (1 - green) * s, blue + (1 - blue) * s) for s in shares.tolist()]
+def _history(stage: Stage, run: ModelRun, axes: Axes, colour: str, width: float) -> Callable[[int], None]:
+    values = 1e3 * _at(stage, run, _followed(stage, run))
+    axes.plot(stage.time, values, color=OPEN, lw=width, zorder=0)
+    (line,) = axes.plot([], [], color=colour, lw=width, marker="o", ms=2 * width, markevery=[-1])
+    return lambda frame: line.set_data(stage.time[: frame + 1], values[: frame + 1])
 
 
-def _stop_size(count: int) -> float:
-    """Points; of so many stops that they fit beside each other."""
-    return min(STOP_SIZE, max(SMALLEST_STOP, ROW_WIDTH / max(count, 1)))
-
-
-def _stop(axes: Axes, stop: Stop, size: float) -> Line2D:
-    size = min(size, BETWEEN_SIZE) if stop.side == "between" else size
-    shape = SHAPES[stop.side]
-    return axes.plot([stop.x], [0.0], marker=shape, ms=size, ls="none", mec="none", zorder=3, animated=True)[0]
-
-
-def _frame_shapes(film: Film, upper: list[Axes]) -> None:
-    """The same axes for both models, room for everything at any time."""
-    drawn = [line.height + line.deflection for take in film.takes for line in take.lines]
-    z = 1e3 * np.concatenate([*map(np.ravel, drawn), *(stop.z for take in film.takes for stop in take.stops)])
-    x = np.concatenate([line.x for take in film.takes for line in take.lines])
-    room = MARGIN * np.ptp(z) or 1.0
-    several = len(film.takes[0].lines) > 1
-    for axes in upper:
-        axes.set_xlim(np.min(x) - 0.02 * np.ptp(x), np.max(x) + 0.02 * np.ptp(x))
-        axes.set_ylim(np.min(z) - room, np.max(z) + room)
-        axes.set_ylabel("z [mm]" if several else "w [mm]")
-    upper[0].set_xticklabels([])
-    upper[-1].set_xlabel("x [m]")
-
-
-def _frame_history(film: Film, lower: Axes) -> None:
-    """Grey where the reference is in contact."""
-    for intervals in film.takes[1].run.contact_intervals.values():
+def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:
+    """Room for everything at any time, names, and grey where the reference is in contact."""
+    reduced, reference = (runs[name] for name in stage.models)
+    for (beam, (_, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
+        z = 1e3 * np.array([_at(stage, run, node) for run in runs.values() for node in nodes])
+        room = MARGIN * np.ptp(z) or 1.0
+        panel.set_ylim(np.min(z) - room, np.max(z) + room)
+        panel.set_ylabel(f"{beam} w [mm]".strip())
+    axes[-2].set_xlabel("x [m]")
+    for intervals in reference.contact_intervals.values():
         for start, end in intervals:
-            lower.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
-    values = 1e3 * np.concatenate([take.history for take in film.takes])
-    room = MARGIN * np.ptp(values) or 1.0
-    lower.set_xlim(0.0, film.time[-1] + film.time[1])
-    lower.set_ylim(np.min(values) - room, np.max(values) + room)
-    lower.set_xlabel("time [s]")
-    lower.set_ylabel(f"{film.point} [mm]")
-    if film.takes[1].run.contact_intervals:
-        lower.set_title("grey: the reference is in contact", fontsize=9, color=TEXT, loc="left")
+            axes[-1].axvspan(start, end, color=CONTACT, lw=0, zorder=-1)
+    axes[-1].set(xlabel="time [s]", ylabel=f"{_followed(stage, reference)} [mm]", xlim=(0.0, stage.time[-1]))
+    axes[-1].set_title("grey: the reference is in contact", fontsize=9, loc="left")
+    axes[0].legend(loc="upper left", frameon=False, fontsize=9)
+    title = f"{stage.bench.scene.file.title}, {stage.slow:g} times slower than it happens"
+    took = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
+    figure.suptitle(f"{title}\ncomputed in: {took}", fontsize=9)
 
 
-def _titles(film: Film, figure: Figure, shapes: list[_Shape]) -> None:
-    figure.suptitle(f"{film.title}\n{film.slow:g} times slower than it happens", fontsize=10)
-    for shape in shapes:
-        axes, run = shape.beams[0][1].axes, shape.take.run
-        assert isinstance(axes, Axes), "the beam has been drawn"
-        axes.set_title(f"{run.label}: computed in {seconds(run.online_s)}", fontsize=10, loc="left")
-    _name_beams(shapes)
-    beams = [Line2D([], [], color=shape.history.get_color(), lw=BEAM_WIDTH) for shape in shapes]
-    names = [shape.take.run.name for shape in shapes]
-    stops, states = _legend_of_contacts(shapes[0].take.stops)
-    figure.legend([*beams, *stops], [*names, *states], loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+def _followed(stage: Stage, run: ModelRun) -> str:
+    """The judged point that moves most."""
+    return max(stage.judged, key=lambda name: float(np.ptp(run.points[name])))
 
 
-def _name_beams(shapes: list[_Shape]) -> None:
-    """Names of several beams, in the colours that each model's have."""
-    for shape in shapes:
-        if len(shape.beams) > 1:
-            handles = [Line2D([], [], color=artist.get_color(), lw=BEAM_WIDTH) for _, artist in shape.beams]
-            axes, names = shape.beams[0][1].axes, [line.name for line, _ in shape.beams]
-            assert isinstance(axes, Axes), "the beam has been drawn"
-            axes.legend(handles, names, loc="lower left", fontsize=8, frameon=False, ncols=len(names))
+def _at(stage: Stage, run: ModelRun, point: str) -> np.ndarray:
+    return np.interp(stage.time, run.time, run.points[point])
 
 
-def _legend_of_contacts(stops: tuple[Stop, ...]) -> tuple[list[Line2D], list[str]]:
-    """What stops look like, open and closed, and a closed contact between two beams; an open one is not drawn."""
-    looks = {"open stop": ("below", FULL), "closed stop": ("below", CLOSED), "beams in contact": ("between", CLOSED)}
-    between = {stop.side == "between" for stop in stops}
-    shown = {name: look for name, look in looks.items() if (look[0] == "between") in between}
-    handles = [
-        Line2D(
-            [],
-            [],
-            marker=SHAPES[side],
-            ms=STOP_SIZE if side == "below" else BETWEEN_SIZE,
-            ls="none",
-            mec="none",
-            color=colour,
-        )
-        for side, colour in shown.values()
-    ]
-    return handles, list(shown)
+def _closed(intervals: np.ndarray, time: np.ndarray) -> np.ndarray:
+    return np.any((intervals[:, :1] <= time) & (time <= intervals[:, 1:]), axis=0)
+
+
+def _chosen(scene: Scene, model: str | None, reference: str | None) -> tuple[str, str]:
+    """Names of the two models; a Craig-Bampton component would get every node as an interface point."""
+    drawn = [name for name, spec in scene.models.items() if spec.kind != "craig-bampton"]
+    reduced = [name for name in drawn if scene.models[name].kind != "full"]
+    if not reduced:
+        raise MultiPhiValueError(f"{scene.path}: models: got none that is reduced, need one to draw")
+    return (
+        _one_of("--model", reduced[0] if model is None else model, reduced),
+        _one_of("--reference", scene.file.comparison.reference if reference is None else reference, drawn),
+    )
+
+
+def _one_of(option: str, given: str, known: list[str]) -> str:
+    if given not in known:
+        raise MultiPhiValueError(f"{option}: got {given!r}, need one of: {', '.join(known)}")
+    return given
+
+
+def _slow_motion(bench: Workbench) -> float:
+    """Slow enough to see bounces, in an animation that is not too long; one significant digit."""
+    factor = min(PERIOD_SHOWN / bench.longest_period or math.inf, LONGEST / bench.t_end)
+    return float(f"{factor:.0e}")
+
+
+def _checked(slow: float, t_end: float) -> float:
+    least, most = 2 / (FRAME_RATE * t_end), MOST_FRAMES / (FRAME_RATE * t_end)
+    if not least <= slow <= most:
+        raise MultiPhiValueError(f"--slow: got {slow:g}, need {least:.4g} to {most:.4g} for {t_end:g} s")
+    return slow
+
+
+def _with_nodes(beam: Beam, x: np.ndarray) -> Beam:
+    return replace(beam, points={**beam.points, **_nodes(x)})
+
+
+def _nodes(x: np.ndarray) -> dict[str, float]:
+    return {f"x = {place!r} m": float(place) for place in x.tolist()}

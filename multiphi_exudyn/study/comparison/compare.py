@@ -17,7 +17,7 @@ from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_file import ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Workbench
 
 __all__ = ["Comparison", "compare", "histories", "summary"]

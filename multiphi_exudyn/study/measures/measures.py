@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
-from multiphi_exudyn.study.measures.response_frequencies import level_frequencies
 from multiphi_exudyn.study.measures.spectra import spectral_difference
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Workbench
@@ -25,7 +24,7 @@ DIFFERENCES: dict[str, Difference] = {
 
 
 def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dict[str, Any]:
-    """Every measure of a run: differences to ``reference`` by window or tolerance, the others by contact or level.
+    """Every measure of a run: differences to ``reference`` by window or tolerance, the others by point or contact.
 
     A number that does not exist is None; a table without entries ({}) says that there was nothing to measure.
     """
@@ -35,10 +34,10 @@ def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dic
         "dofs": run.dofs,
         "steps": run.steps,
         **_differences(bench, run, reference),
+        "largest": {name: _number(np.max(np.abs(values))) for name, values in run.points.items()},
         **_contacts(bench, run),
         "energy_end": _number(run.energy[-1]) if len(run.energy) else None,
         "ledger": {row: _number(value) for row, value in run.ledger.items()},
-        "frequencies": level_frequencies(run, [contact.name for contact in bench.mechanics.contacts]) if run.ok else {},
         "horizon_s": {tolerance: _number(end) for tolerance, end in run.horizon_s.items()},
         "warnings": list(run.warnings),
     }
@@ -80,6 +79,7 @@ def _contacts(bench: Workbench, run: ModelRun) -> dict[str, dict[str, Any]]:
         "contact_count": {name: len(times) for name, times in given.items()},
         "closed_time": {name: metrics.closed_time(times) for name, times in given.items()},
         "intervals": {name: times.tolist() for name, times in given.items()},
+        "largest_force": {name: _number(np.max(force)) for name, force in run.contact_force.items()},
         "impulse": {name: _number(value) for name, value in run.impulse.items()},
         "inner_losses": {name: metrics.inner_losses(times, bench.longest_period) for name, times in given.items()},
     }

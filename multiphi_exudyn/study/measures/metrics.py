@@ -93,6 +93,12 @@ METRICS = {
         "the agreement horizon between the reference and its own coarser or minutely disturbed copy: from here on a "
         "pointwise difference of the size of the tolerance says nothing about a model.",
     ),
+    "largest": Metric("largest displacement", "m", "largest |y| of one point over all samples of the run."),
+    "largest_force": Metric(
+        "largest contact force",
+        "N",
+        "over all samples of the run; an impact has an impulse, no force.",
+    ),
     "first_contact": Metric("first contact", "s", "start of the first contact interval after the release."),
     "intervals": Metric(
         "contact intervals",
@@ -117,18 +123,6 @@ METRICS = {
         "energy ledger",
         "J",
         "where the initial energy went, row by row; the residual is what the rows leave unaccounted for.",
-    ),
-    "frequencies": Metric(
-        "frequencies from the response",
-        "Hz",
-        "undamped natural frequencies identified from the points' histories alone, in the longest interval that each "
-        "level holds; only those whose standard deviation is below a third of a percent.",
-    ),
-    "repetition_rate": Metric(
-        "repetition rate",
-        "Hz",
-        "how often in a second a point's motion comes round, from the times between its passages through zero in the "
-        "same direction, weighted by how much of a window each cycle fills; contacts count in it.",
     ),
 }
 

@@ -16,14 +16,14 @@ found with the pole: it ends at half way to the next peak, or some widths of the
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.measures.response_frequencies import ResponseModes
 
-__all__ = ["frequency_response_functions", "identified_modes"]
+__all__ = ["ResponseModes", "frequency_response_functions", "identified_modes"]
 
 PROMINENCE = 10.0  # dB by which a peak of all responses together stands out of its surroundings
 FIRST_BAND = 0.1  # of the peak's frequency at most, either side: wide beside the noise of single lines
@@ -32,6 +32,14 @@ FEWEST_LINES = 8  # either side of it, whatever its width
 ROUNDS = 4  # of a band from the pole's width and a pole from the band
 DEGREE = 2  # of b_p, in the last band
 SOFTEST = 0.2  # of the critical damping: what is softer than this is no resonance
+
+
+@dataclass(frozen=True)
+class ResponseModes:
+    """Frequencies (m,) [Hz], ascending, and damping ratios (m,) of the modes that a response shows."""
+
+    frequencies: np.ndarray
+    ratios: np.ndarray
 
 
 def frequency_response_functions(

@@ -5,9 +5,8 @@ nothing. The map is the continuous wavelet transform with the complex Morlet wav
 
     psi(t) = (pi B)^(-1/2) exp(-t^2 / B) exp(2 pi i C t),   B = 3 (bandwidth), C = 1 (centre frequency),
 
-stretched by C / f: its amplitude spectrum has the standard deviation f / (pi C sqrt(2 B)) = 0.13 f, its envelope
-C sqrt(B / 2) / f = 1.2 / f. Amplitudes are normalised such that A sin(2 pi f t) has A on its ridge. Low frequencies are
-transformed at low sampling rates, an octave at a time: the cost is twice that of the highest octave.
+stretched by C / f, as a product of spectra: of the history's and of the wavelet's, exp(-B (pi C (F / f - 1))^2). Its
+envelope is C sqrt(B / 2) / f = 1.2 / f. Amplitudes are normalised such that A sin(2 pi f t) has A on its ridge.
 
 Source: C. Torrence, G. P. Compo, A practical guide to wavelet analysis, Bull. Am. Meteorol. Soc. 79 (1998).
 """
@@ -15,13 +14,10 @@ Source: C. Torrence, G. P. Compo, A practical guide to wavelet analysis, Bull. A
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import pywt
 import scipy.fft
-import scipy.signal
 
 from multiphi_exudyn.errors import MultiPhiValueError
 
@@ -30,10 +26,8 @@ __all__ = ["FEWEST", "FREQUENCIES", "Map", "spectral_difference", "wavelet_map"]
 FREQUENCIES = np.geomspace(2.0, 500.0, 160)  # Hz
 FREQUENCIES.flags.writeable = False
 BANDWIDTH, CENTRE = 3.0, 1.0  # B, C
-COARSEST = 16  # samples per period: a slower rate is no longer halved
 FEWEST = 4  # samples per period that the record itself must have
 MOST_COLUMNS = 600  # of a map
-PRECISION = 14  # PyWavelets samples the wavelet at 2^14 places: with 2^12 a row shows 1.5 % of a far-off frequency
 
 
 @dataclass(frozen=True)
@@ -64,15 +58,16 @@ def wavelet_map(values: np.ndarray, time: np.ndarray, frequencies: np.ndarray = 
     """Amplitude of a history (k,) at equally spaced times (k,) [s] over time and frequency; its mean is left out."""
     step = (time[-1] - time[0]) / (len(time) - 1)
     _check(frequencies, step)
-    columns = np.array_split(np.arange(len(time)), min(MOST_COLUMNS, len(time)))
-    starts = np.array([column[0] for column in columns])
-    counts = np.array([len(column) for column in columns])
-    amplitude = np.empty((len(frequencies), len(columns)))
-    for chosen, samples, every in _octaves(values - np.mean(values), frequencies, step):
-        places = np.arange(len(samples)) * every
-        for row, found in zip(chosen, _amplitudes(samples, frequencies[chosen], every * step), strict=True):
-            whole = found if every == 1 else np.interp(np.arange(len(time)), places, found)
-            amplitude[row] = np.add.reduceat(whole, starts) / counts
+    count = scipy.fft.next_fast_len(2 * len(time))  # as many zeros: the end does not run into the beginning
+    spectrum = scipy.fft.fft(values - np.mean(values), count)
+    lines = scipy.fft.fftfreq(count, step)
+    starts = np.array([column[0] for column in np.array_split(np.arange(len(time)), min(MOST_COLUMNS, len(time)))])
+    counts = np.diff([*starts, len(time)])
+    amplitude = np.empty((len(frequencies), len(starts)))
+    for row, frequency in enumerate(frequencies):
+        wavelet = np.where(lines > 0, np.exp(-BANDWIDTH * (math.pi * CENTRE * (lines / frequency - 1)) ** 2), 0.0)
+        found = 2 * np.abs(scipy.fft.ifft(spectrum * wavelet))[: len(time)]
+        amplitude[row] = np.add.reduceat(found, starts) / counts
     return Map(np.add.reduceat(time, starts) / counts, frequencies, amplitude)
 
 
@@ -82,21 +77,3 @@ def _check(frequencies: np.ndarray, step: float) -> None:
     if len(wrong):
         need = f"need above 0 and at most {highest:g} Hz ({FEWEST} samples per period)"
         raise MultiPhiValueError(f"frequencies: got {wrong[0]:g} Hz, {need}")
-
-
-def _octaves(samples: np.ndarray, frequencies: np.ndarray, step: float) -> Iterator[tuple[np.ndarray, np.ndarray, int]]:
-    """(indices of frequencies, samples, step in original samples) of every sampling rate that is needed."""
-    halvings = np.maximum(0, np.floor(np.log2(1 / (COARSEST * step * frequencies)))).astype(int)
-    for octave in range(int(np.max(halvings)) + 1):
-        if octave:
-            samples = scipy.signal.resample_poly(samples, 1, 2)
-        chosen = np.flatnonzero(halvings == octave)
-        if len(chosen):
-            yield chosen, samples, 2**octave
-
-
-def _amplitudes(samples: np.ndarray, frequencies: np.ndarray, step: float) -> np.ndarray:
-    """2 |W| / sqrt(scale), (f, k); PyWavelets integrates the wavelet over each sample, which the sinc takes back."""
-    scales = CENTRE / (frequencies * step)
-    found, _ = pywt.cwt(samples, scales, f"cmor{BANDWIDTH}-{CENTRE}", method="fft", precision=PRECISION)
-    return np.abs(found) * (2 / (np.sqrt(scales) * np.sinc(CENTRE / scales)))[:, None]

@@ -88,7 +88,7 @@ def rigid_models(bench: Workbench) -> tuple[str, ...]:
         return ()
     given = all(contact.rigid for contact in bench.mechanics.contacts)
     models = bench.scene.models
-    return tuple(name for name in models if given or getattr(models[name], "contact", "") == "rigid")
+    return tuple(name for name in models if given or models[name].rigid)
 
 
 def stiff_stops(bench: Workbench) -> StiffStops | None:

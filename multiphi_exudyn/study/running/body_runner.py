@@ -12,13 +12,14 @@ from scipy.interpolate import CubicHermiteSpline
 from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array, way
+from multiphi_exudyn.study.running.reduced_runner import level_words, printed_words
+from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array, way
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.scene_file import UserObjectModel
+from multiphi_exudyn.study.scene.model_kinds import UserObjectModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from reference_models.body_alone import solve_body_alone
 
-__all__ = ["run_user_object"]
+__all__ = ["body_label", "run_user_object"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,13 @@ class _Task:
     steps: int
 
 
-def run_user_object(bench: Workbench, spec: UserObjectModel, label: str) -> ModelRun:
+def body_label(bench: Workbench, spec: UserObjectModel) -> str:
+    """How tables and figures call it."""
+    levels = f"{level_words(bench, spec.rigid)}, r = {spec.modes}{printed_words(bench)}"
+    return f"Exudyn user object, {levels}, step {spec.step * 1e6:g} µs"
+
+
+def run_user_object(bench: Workbench, spec: UserObjectModel, label: str, how: How) -> ModelRun:
     """Add the body to an empty system, its modes matched to the step, and solve."""
     task, building = timed(lambda: _task(bench, spec))
     recorded, first, repeats = repeated(

@@ -13,9 +13,9 @@ from scipy.interpolate import CubicHermiteSpline
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.running.energy_gain import energy_gain
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.scene_file import CraigBamptonModel
+from multiphi_exudyn.study.scene.model_kinds import CraigBamptonModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from reference_models.craig_bampton import CraigBampton, craig_bampton
 from reference_models.craig_bampton_run import (
@@ -27,7 +27,7 @@ from reference_models.craig_bampton_run import (
 from reference_models.full_run import closed_intervals
 from reference_models.point_contact import PointContact
 
-__all__ = ["run_craig_bampton"]
+__all__ = ["craig_bampton_label", "run_craig_bampton"]
 
 FINER = 10  # samples of a gap for each recorded one, between which its crossings are interpolated
 
@@ -42,7 +42,15 @@ class _Task:
     dropped: float
 
 
-def run_craig_bampton(bench: Workbench, spec: CraigBamptonModel, label: str) -> ModelRun:
+def craig_bampton_label(bench: Workbench, spec: CraigBamptonModel) -> str:
+    """How tables and figures call it."""
+    given = bench.scene.file.start
+    start = "" if given is None or given.load_at in bench.interface else ", start projected"
+    reduced = f"{len(bench.interface)} interface points + {spec.modes} modes"
+    return f"Craig-Bampton in Exudyn, {reduced}, step {spec.step * 1e6:g} µs{start}"
+
+
+def run_craig_bampton(bench: Workbench, spec: CraigBamptonModel, label: str, how: How) -> ModelRun:
     """Reduce, solve, sample; a run that gains energy has failed, as a full one has."""
     task, building = timed(lambda: _task(bench, spec))
     settings = CraigBamptonSettings(

@@ -11,32 +11,40 @@ import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structure import damping_matrix
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, FullModel
+from multiphi_exudyn.study.scene.model_kinds import FullModel
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from reference_models.full_beam import FullBeam, FullRun
 from reference_models.gentler import Attempt, attempts
 
-__all__ = ["run_full"]
+__all__ = ["full_label", "run_full"]
 
 STILL = 1e-6  # of the range of its way: a patch that moves less from sample to sample sticks
 
 
-def run_full(bench: Workbench, spec: FullModel, label: str, progress: bool, retry: bool = False) -> ModelRun:
+def full_label(bench: Workbench, spec: FullModel) -> str:
+    """How tables and figures call it."""
+    kind = "ANCF" if spec.beam == "ancf" else "geometrically exact"
+    beam, each = ("beams", " each") if bench.mechanics.beam is None else ("beam", "")
+    return f"full Exudyn {beam}, {kind}, {spec.elements} elements{each}, step {spec.step * 1e6:g} µs"
+
+
+def run_full(bench: Workbench, spec: FullModel, label: str, how: How) -> ModelRun:
     """Run a full beam with the scene's damping on its own mesh; histories come on the common grid.
 
-    retry: a run that fails is tried again at gentler settings (reference_models/gentler.py); its message then says at
-    which, its time is that of all attempts.
+    how.retry: a run that fails is tried again at gentler settings (reference_models/gentler.py); its message then says
+    at which, its time is that of all attempts.
     """
     beam = bench.full_beam(spec)
     damping = damping_matrix(replace(beam.structure, damping=bench.mechanics.damping))
     start, loads = _start(bench), bench.loads_on(beam)
 
     def solve(beam: FullBeam) -> FullRun:
-        return beam.run(bench.t_end, damping=damping, loads=loads, progress=progress, **start)
+        return beam.run(bench.t_end, damping=damping, loads=loads, progress=how.progress, **start)
 
-    tried = attempts(beam, solve) if retry else [Attempt("as asked", solve(beam))]
+    tried = attempts(beam, solve) if how.retry else [Attempt("as asked", solve(beam))]
     result, _, repeats = repeated(_after(tried[-1].run, lambda: solve(beam)), bench.repeats if len(tried) == 1 else 0)
     run = ModelRun(
         name=spec.name,

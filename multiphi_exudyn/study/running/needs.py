@@ -20,7 +20,7 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.running.run_alone import Task
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scene_file import ReducedModel
+from multiphi_exudyn.study.scene.model_kinds import ReducedModel
 from multiphi_exudyn.study.scene.scenes import Scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
@@ -60,7 +60,7 @@ def needs_of(scene: Scene) -> Needs:
     model, given = bench.model(spec), bench.structure
     task = Task(
         structure=LinearStructure(given.mass, given.stiffness, given.damping, given.points),
-        contacts=bench.nonlinearities(spec.contact == "rigid"),
+        contacts=bench.nonlinearities(spec.rigid),
         modes=model.modes if isinstance(model.modes, (int, str)) else "all",
         overrides=bench.overrides,
         start=start_configuration(bench, model),

@@ -13,31 +13,64 @@ import numpy as np
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available, compile_entries
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.scene_file import GlobalBasisModel, ReducedModel
+from multiphi_exudyn.study.scene.model_kinds import GlobalBasisModel, ReducedModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
 from reference_models.global_basis import global_basis
 
-__all__ = ["ENERGY_INTERVAL", "run_global_basis", "run_reduced"]
+__all__ = [
+    "ENERGY_INTERVAL",
+    "global_label",
+    "level_words",
+    "printed_words",
+    "reduced_label",
+    "run_global_basis",
+    "run_reduced",
+]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
 APART = 0.01  # of the motion, by which a run and a nudged one differ at the end of its horizon: what a reader sees
 
 
-def run_reduced(bench: Workbench, spec: ReducedModel, label: str, horizon: bool = False) -> ModelRun:
-    """The model of a scene's entry from the scene's start; horizon: whether it is run once more, nudged."""
+def level_words(bench: Workbench, rigid: bool) -> str:
+    """Which levels a model has, as part of its label."""
+    contacts = bench.contacts(rigid)
+    if not contacts:
+        return "levels of force laws" if bench.mechanics.force_laws else "levels of friction"
+    return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"
+
+
+def printed_words(bench: Workbench) -> str:
+    """That levels have printed frequencies, as part of a label."""
+    return ", printed frequencies" if bench.overrides else ""
+
+
+def reduced_label(bench: Workbench, spec: ReducedModel) -> str:
+    """How tables and figures call it."""
+    chosen = f"modes for a truncation error of {spec.tolerance:g}" if spec.tolerance else f"r = {spec.modes}"
+    return f"Multi-Phi, {level_words(bench, spec.rigid)}, {chosen}{printed_words(bench)}"
+
+
+def global_label(bench: Workbench, spec: GlobalBasisModel) -> str:
+    """How tables and figures call it."""
+    return f"global basis, {level_words(bench, spec.rigid)}, r = {spec.modes} from each of two"
+
+
+def run_reduced(bench: Workbench, spec: ReducedModel, label: str, how: How) -> ModelRun:
+    """The model of a scene's entry from the scene's start; how.horizon: whether it is run once more, nudged."""
     (model, start), building = timed(lambda: _reduced_start(bench, spec))
-    return _run(bench, spec, label, model, start, building, horizon)
+    run, trajectory = _run(bench, spec, label, model, start, building, how)
+    return replace(run, indicators=_indicators(bench, trajectory)) if run.ok else run
 
 
-def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str, horizon: bool = False) -> ModelRun:
+def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str, how: How) -> ModelRun:
     """The structure projected on one basis, from its own static equilibrium; with all its modes exact in time."""
     (model, start), building = timed(lambda: _global_start(bench, spec))
-    return _run(bench, spec, label, model, start, building, horizon)
+    return _run(bench, spec, label, model, start, building, how)[0]
 
 
 def _run(
@@ -47,8 +80,8 @@ def _run(
     model: MultiPhiModel,
     start: Equilibrium,
     building: float,
-    horizon: bool,
-) -> ModelRun:
+    how: How,
+) -> tuple[ModelRun, Trajectory]:
     """Simulate and sample; steps are events, of which there are as many as the motion has."""
 
     def run_once() -> Trajectory:
@@ -71,10 +104,9 @@ def _run(
         warnings=trajectory.warnings,
     )
     if not run.ok:
-        return run
-    indicators = _indicators(bench, trajectory) if isinstance(spec, ReducedModel) else {}
-    until = {f"{APART:g}": trajectory.horizon(APART)} if horizon else {}
-    return replace(run, **_sampled(bench, trajectory), indicators=indicators, horizon_s=until)
+        return run, trajectory
+    until = {f"{APART:g}": trajectory.horizon(APART)} if how.horizon else {}
+    return replace(run, **_sampled(bench, trajectory), horizon_s=until), trajectory
 
 
 def _indicators(bench: Workbench, trajectory: Trajectory) -> dict[str, float]:
@@ -87,10 +119,10 @@ def _reduced_start(bench: Workbench, spec: ReducedModel) -> tuple[MultiPhiModel,
 
 
 def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiModel, Equilibrium]:
-    contacts = bench.contacts(spec.contact == "rigid")
+    contacts = bench.contacts(spec.rigid)
     assert spec.modes is not None, "filled in where the scene lists its models"
     projected = global_basis(bench.structure, contacts, spec.modes)
-    model = MultiPhiModel(projected, bench.nonlinearities(spec.contact == "rigid"), modes="all")
+    model = MultiPhiModel(projected, bench.nonlinearities(spec.rigid), modes="all")
     return model, start_of(replace(bench, structure=projected), model)
 
 

@@ -12,16 +12,21 @@ import numpy as np
 
 from multiphi_exudyn.study.running.energy_gain import energy_gain
 from multiphi_exudyn.study.running.reduced_runner import ENERGY_INTERVAL
-from multiphi_exudyn.study.running.runs import ModelRun, interval_array
+from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.scene_file import StepwiseModel
+from multiphi_exudyn.study.scene.model_kinds import StepwiseModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from reference_models.stepwise import StepwiseRun, solve_stepwise
 
-__all__ = ["run_stepwise"]
+__all__ = ["run_stepwise", "stepwise_label"]
 
 
-def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str) -> ModelRun:
+def stepwise_label(bench: Workbench, spec: StepwiseModel) -> str:
+    """How tables and figures call it."""
+    return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
+
+
+def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str, how: How) -> ModelRun:
     """Start, integrate, sample."""
     model = bench.model(spec)
     start, building = timed(lambda: start_configuration(bench, model))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 __all__ = [
@@ -21,9 +22,14 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
+    "did_you_mean",
     "numbered",
+    "one_of",
     "place_in_words",
 ]
+
+
+SHOWN = 12  # names in a message
 
 
 def _not_zero(value: float) -> float:
@@ -39,7 +45,12 @@ def _rigid_is_infinite(value: Any) -> Any:
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Stiffness = Annotated[float, BeforeValidator(_rigid_is_infinite), Field(gt=0)]  # N/m or N m; inf or "rigid"
+Stiffness = Annotated[  # N/m or N m; inf or "rigid"
+    float,
+    BeforeValidator(_rigid_is_infinite),
+    Field(gt=0),
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": "rigid"}]}),
+]
 NotZero = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
 Name = Annotated[str, Field(min_length=1, pattern=r"^[\w.{}-]+$")]
 Place = Name | Annotated[dict[Name, Finite], Field(min_length=1)]  # of a load: a point, or coefficients of points
@@ -60,6 +71,20 @@ def by_key(*keys: str) -> Discriminator:
 def numbered(name: str, i: int) -> str:
     """The name of the i-th of a row."""
     return name.replace("{i}", str(i))
+
+
+def one_of(what: str, given: object, known: Iterable[str]) -> str:
+    """What is needed in place of a name: "one of the points: a, b", of many the first few, and what may be meant."""
+    names = list(known)
+    shown = ", ".join(names[:SHOWN]) or "none"
+    more = f", ... ({len(names)} in all)" if len(names) > SHOWN else ""
+    return f"one of the {what}: {shown}{more}{did_you_mean(given, names)}"
+
+
+def did_you_mean(given: object, known: Iterable[str]) -> str:
+    """The known name nearest to what was given, as the end of a sentence; "" where none is near."""
+    near = difflib.get_close_matches(str(given), list(known), 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def place_in_words(at: str | Mapping[str, float]) -> str:

@@ -23,27 +23,21 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import BaseMotion, Gravity, StopMotion
 from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.scene.fields import numbered
+from multiphi_exudyn.study.scene.fields import numbered, one_of
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
+from multiphi_exudyn.study.scene.model_kinds import Demands
 from multiphi_exudyn.study.scene.scene_file import (
-    CraigBamptonModel,
     DampingSpec,
     DisplacedStart,
-    FullModel,
-    GlobalBasisModel,
     ModalDampingSpec,
-    ReducedModel,
-    StepwiseModel,
-    UserObjectModel,
 )
 from multiphi_exudyn.study.scene.scene_friction import check_friction, described_friction, friction_of
 from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
-from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from multiphi_exudyn.study.scene.structure_tables import (
     BeamSpec,
     BeamsStructure,
@@ -88,6 +82,11 @@ class Mechanics:
         return (*(friction.name for friction in self.frictions), *contacts)
 
     @property
+    def printed(self) -> bool:
+        """Whether levels have printed frequencies in place of their own."""
+        return self.parameter_set is not None and bool(published_override(self.parameter_set))
+
+    @property
     def points(self) -> tuple[str, ...]:
         """Names of the structure's points."""
         given: Mapping[str, object] = _known(self.matrices).points if self.beams is None else self.beams.points
@@ -123,6 +122,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
     taken = [*(contact.name for contact in mechanics.contacts), *(law.name for law in mechanics.force_laws)]
     check_friction(scene, taken, mechanics.frictions)
     _check_loads(scene, mechanics)
+    _check_models(scene, mechanics)
     return mechanics
 
 
@@ -249,30 +249,21 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
         for part in ("at", "direction"):
             place = getattr(load, part, None) or ()
             named |= {f"loads[{i}].{part}": name for name in ([place] if isinstance(place, str) else place)}
-    for field_name, name in named.items():
-        if name not in mechanics.points:
-            refuse(scene, field_name, name, f"one of the points: {', '.join(mechanics.points)}")
+    unknown = {field_name: name for field_name, name in named.items() if name not in mechanics.points}
+    faults = [f"{at}: got {name!r}, need {one_of('points', name, mechanics.points)}" for at, name in unknown.items()]
+    if faults:
+        raise MultiPhiValueError(f"{scene.path}: {'; '.join(faults)}")
 
 
 def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
-    """Loads are what they say, name contacts there are, and every model can take them."""
-    loads = loads_of(scene, None if mechanics.beams is None else "")
+    """Loads name contacts there are."""
     names = [contact.name for contact in mechanics.contacts]
     for i, load in enumerate(scene.file.loads):
         moved = [("contact", load.contact)] if isinstance(load, StopMotionSpec) else []
         moved += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
         for part, name in moved:
             if name not in names:
-                refuse(scene, f"loads[{i}].{part}", name, f"one of the contacts: {', '.join(names) or 'none'}")
-    for i, model in enumerate(scene.file.models):
-        if loads and isinstance(model, (CraigBamptonModel, StepwiseModel)):
-            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has no loads")
-        along = [load for load in loads if isinstance(load, (Gravity, BaseMotion))]
-        if along and isinstance(model, GlobalBasisModel):
-            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one has neither weight nor moving base")
-        moving = any(isinstance(load, StopMotion) or getattr(load, "fixed_stops", ()) for load in loads)
-        if moving and isinstance(model, FullModel) and model.contact == "circle":
-            refuse(scene, f"models[{i}].contact", "circle", "'coordinate': a round support does not move")
+                refuse(scene, f"loads[{i}].{part}", name, one_of("contacts", name, names))
 
 
 def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
@@ -281,52 +272,27 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
         if names.count(name) > 1:
             refuse(scene, "contacts", name, "a name of its own for every contact")
     _check_published(scene, mechanics)
+
+
+def _check_models(scene: Scene, mechanics: Mechanics) -> None:
+    """Every model can take what the scene has."""
+    sparse = mechanics.matrices is not None and scipy.sparse.issparse(mechanics.matrices.stiffness)
+    demands = Demands(
+        given_as="beams" if mechanics.matrices is None else "sparse" if sparse else "dense",
+        contacts=mechanics.contacts,
+        laws=mechanics.force_laws,
+        frictions=mechanics.frictions,
+        loads=loads_of(scene, None if mechanics.beams is None else ""),
+        printed=mechanics.printed,
+    )
     for i, model in enumerate(scene.file.models):
-        if isinstance(model, FullModel) and mechanics.beams is None:
-            refuse(scene, f"models[{i}].kind", "full", "another kind: matrices have no full model")
-        if isinstance(model, CraigBamptonModel) and _is_sparse(mechanics):
-            refuse(scene, f"models[{i}].kind", model.kind, "another kind: this one takes dense matrices")
-        for contact in mechanics.contacts:
-            _check_contact_of(scene, f"models[{i}].kind", model, contact)
-
-
-def _is_sparse(mechanics: Mechanics) -> bool:
-    return mechanics.matrices is not None and scipy.sparse.issparse(mechanics.matrices.stiffness)
-
-
-def _check_contact_of(scene: Scene, field_name: str, model: ModelSpec, contact: UnilateralContact) -> None:
-    """Penalty models need a finite stiffness, penalty elements on one coordinate a single point."""
-    if contact.rigid and isinstance(model, (FullModel, CraigBamptonModel, StepwiseModel)):
-        refuse(scene, f"stiffness of contact {contact.name}", "inf", f"a finite one: {model.name} is a penalty model")
-    if contact.friction:
-        if isinstance(model, (CraigBamptonModel, StepwiseModel, GlobalBasisModel)):
-            refuse(scene, field_name, model.kind, f"another kind: its contacts have no friction, {contact.name} has")
-        if isinstance(model, FullModel) and math.isinf(contact.tangential_stiffness):
-            needed = f"a finite one: {model.name} has friction with a spring in series"
-            refuse(scene, f"tangential_stiffness of contact {contact.name}", "inf", needed)
-    if contact.damping:
-        if isinstance(model, (CraigBamptonModel, StepwiseModel)):
-            refuse(scene, field_name, model.kind, f"another kind: its contacts have no damping, {contact.name} has")
-        if isinstance(model, FullModel) and model.contact == "circle":
-            refuse(
-                scene, field_name.replace("kind", "contact"), "circle", "'coordinate': a round support has no damping"
-            )
-    factors = list(contact.direction.values()) if isinstance(contact.direction, Mapping) else [1.0]
-    if len(factors) > 1 and isinstance(model, CraigBamptonModel):
-        needed = f"another kind: its contacts act on single points, {contact.name} on {len(factors)}"
-        refuse(scene, field_name, model.kind, needed)
-    if isinstance(model, FullModel) and len(factors) > 1:
-        if len(factors) > 2 or sum(factors) != 0 or not factors[0]:
-            needed = f"another kind: its contacts act on a point, or between two, {contact.name} on {contact.direction}"
-            refuse(scene, field_name, model.kind, needed)
-        if model.contact == "circle":
-            needed = f"'coordinate': a round support does not move, {contact.name} is between two points"
-            refuse(scene, field_name.replace("kind", "contact"), "circle", needed)
+        for fault in model.faults(demands):
+            refuse(scene, fault.field if fault.whole else f"models[{i}].{fault.field}", fault.given, fault.needed)
 
 
 def _check_published(scene: Scene, mechanics: Mechanics) -> None:
     """Printed frequencies are those of a rigid clamp and of a rigid support, and say nothing of others."""
-    if mechanics.parameter_set is None or not published_override(mechanics.parameter_set):
+    if not mechanics.printed:
         return
     if mechanics.force_laws:
         refuse(scene, "force_laws[0].name", mechanics.force_laws[0].name, "none: the printed frequencies have no law")
@@ -336,13 +302,6 @@ def _check_published(scene: Scene, mechanics: Mechanics) -> None:
         given = getattr(scene.file.structure, f"clamp_{name}")
         if math.isfinite(given):
             refuse(scene, f"structure.clamp_{name}", given, "'rigid': the printed frequencies are of a rigid clamp")
-    for i, model in enumerate(scene.file.models):
-        if isinstance(model, StepwiseModel):
-            refuse(scene, f"models[{i}].kind", model.kind, "reduced: the printed frequencies are of a rigid support")
-        if isinstance(model, (ReducedModel, UserObjectModel)) and model.contact != "rigid":
-            refuse(
-                scene, f"models[{i}].contact", model.contact, "'rigid': the printed frequencies are of a rigid support"
-            )
 
 
 def _at(scene: Scene, place: str, build: Callable[[], T]) -> T:

@@ -7,20 +7,17 @@ refer to is checked where the scene is loaded (:mod:`multiphi_exudyn.study.scene
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated
 
-from pydantic import Field, Tag, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, Tag
 
 from multiphi_exudyn.study.scene.fields import (
     Finite,
-    Modes,
     Name,
     NotNegative,
     NotZero,
     Place,
     Positive,
-    RelativeTolerance,
     Stiffness,
     Table,
     by_key,
@@ -28,21 +25,16 @@ from multiphi_exudyn.study.scene.fields import (
 )
 from multiphi_exudyn.study.scene.law_tables import LawSpec
 from multiphi_exudyn.study.scene.load_tables import LoadSpec
+from multiphi_exudyn.study.scene.model_kinds import ModelSpec
 from multiphi_exudyn.study.scene.structure_tables import StructureSpec
 
 __all__ = [
     "ContactSpec",
-    "CraigBamptonModel",
     "DisplacedStart",
     "FrictionSpec",
-    "FullModel",
-    "GlobalBasisModel",
     "LoadedStart",
     "ModalDampingSpec",
-    "ReducedModel",
     "SceneFile",
-    "StepwiseModel",
-    "UserObjectModel",
 ]
 
 
@@ -139,81 +131,6 @@ class OutputSpec(Table):
     tolerances: tuple[Positive, ...] = (0.01, 0.05)  # of the agreement horizon
 
 
-class ReducedModel(Table):
-    """A Multi-Phi model run by itself."""
-
-    kind: Literal["reduced"]
-    name: Name  # "{modes}" stands for the number of modes
-    modes: Modes | None = None  # none given: the scene's
-    tolerance: Positive | None = None  # truncation error wanted, from which the modes follow, in place of a number
-    contact: Literal["as-given", "rigid"] = "as-given"
-
-    @model_validator(mode="after")
-    def _one_choice_of_modes(self) -> ReducedModel:
-        if self.modes is not None and self.tolerance is not None:
-            raise PydanticCustomError("modes", "modes or a tolerance, not both")
-        return self
-
-
-class UserObjectModel(Table):
-    """A Multi-Phi model as a body inside Exudyn."""
-
-    kind: Literal["user-object"]
-    name: Name
-    step: Positive  # s
-    modes: Annotated[int, Field(ge=1)] | None = None
-    contact: Literal["as-given", "rigid"] = "as-given"
-
-
-class FullModel(Table):
-    """The full nonlinear Exudyn beam, or beams, with contact elements."""
-
-    kind: Literal["full"]
-    name: Name
-    beam: Literal["ancf", "geometrically-exact"] = "ancf"
-    elements: Annotated[int, Field(ge=1)]  # of each beam
-    step: Positive  # s
-    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
-    newton_tolerance: Positive = 1e-5  # relative and absolute
-    contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
-
-
-class CraigBamptonModel(Table):
-    """A Craig-Bampton component in Exudyn, contact elements on its interface coordinates."""
-
-    kind: Literal["craig-bampton"]
-    name: Name
-    modes: Annotated[int, Field(ge=0)]  # with the interface held
-    step: Positive  # s
-    newton_tolerance: Positive = 1e-6  # relative and absolute
-    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
-
-
-class StepwiseModel(Table):
-    """The reduced equations of a Multi-Phi model integrated by scipy's solve_ivp; compliant contacts only."""
-
-    kind: Literal["solve-ivp"]
-    name: Name
-    modes: Modes | None = None
-    method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
-    rtol: RelativeTolerance
-
-
-class GlobalBasisModel(Table):
-    """One basis for all levels, the modes of the open and of the closed one together, without time steps."""
-
-    kind: Literal["global-basis"]
-    name: Name
-    modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
-    contact: Literal["as-given", "rigid"] = "as-given"
-
-
-ModelSpec = Annotated[
-    ReducedModel | UserObjectModel | FullModel | CraigBamptonModel | StepwiseModel | GlobalBasisModel,
-    Field(discriminator="kind"),
-]
-
-
 class ComparisonSpec(Table):
     """Which model plays which part."""
 
@@ -235,5 +152,5 @@ class SceneFile(Table):
     loads: tuple[LoadSpec, ...] = ()
     damping: DampingSpec | None = None
     outputs: OutputSpec = OutputSpec()
-    models: Annotated[tuple[ModelSpec, ...], Field(min_length=1)]
+    models: Annotated[tuple[Annotated[ModelSpec, Field(discriminator="kind")], ...], Field(min_length=1)]
     comparison: ComparisonSpec

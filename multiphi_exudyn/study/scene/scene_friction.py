@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.scene.fields import place_in_words
-from multiphi_exudyn.study.scene.scene_file import (
-    CraigBamptonModel,
-    FrictionSpec,
-    FullModel,
-    GlobalBasisModel,
-    StepwiseModel,
-)
-from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+from multiphi_exudyn.study.scene.scene_file import FrictionSpec
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["check_friction", "described_friction", "friction_of"]
 
@@ -33,28 +27,13 @@ def described_friction(scene: Scene) -> tuple[str, ...]:
 
 
 def check_friction(scene: Scene, taken: Sequence[str], frictions: Sequence[Friction]) -> None:
-    """Names of their own beside those ``taken``, and models that can take them; or the field's error."""
+    """Names of their own beside those ``taken``; or the field's error."""
     names = list(taken)
     for i, friction in enumerate(frictions):
         if friction.name in names:
             needed = "a name of its own for every contact, force law and friction"
             refuse(scene, f"friction[{i}].name", friction.name, needed)
         names.append(friction.name)
-        for k, model in enumerate(scene.file.models):
-            _check_model(scene, f"models[{k}].kind", model, i, friction)
-
-
-def _check_model(scene: Scene, field: str, model: ModelSpec, i: int, friction: Friction) -> None:
-    if isinstance(model, (CraigBamptonModel, StepwiseModel, GlobalBasisModel)):
-        refuse(scene, field, model.kind, f"another kind: this one has no friction, and there is {friction.name}")
-    if isinstance(model, FullModel):
-        if friction.rigid:
-            needed = f"a finite one: {model.name} has friction with a spring in series"
-            refuse(scene, f"friction[{i}].stiffness", "inf", needed)
-        factors = list(friction.direction.values()) if isinstance(friction.direction, Mapping) else [1.0]
-        if len(factors) > 2 or (len(factors) == 2 and sum(factors) != 0):
-            needed = f"another kind: its friction acts on a point, or between two, {friction.name} on {len(factors)}"
-            refuse(scene, field, model.kind, needed)
 
 
 def _spring(spec: FrictionSpec) -> str:

@@ -12,8 +12,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw, expanded
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.law_tables import CubicLawSpec, HertzLawSpec, LawSpec, TableLawSpec
-from multiphi_exudyn.study.scene.scene_file import CraigBamptonModel, FullModel, StepwiseModel
-from multiphi_exudyn.study.scene.scenes import ModelSpec, Scene, refuse
+from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["check_laws", "described_laws", "law_of"]
 
@@ -33,25 +32,13 @@ def described_laws(scene: Scene) -> tuple[str, ...]:
 
 
 def check_laws(scene: Scene, contacts: Sequence[UnilateralContact], laws: Sequence[ForceLaw]) -> None:
-    """Names of their own, also for the springs of their chains, and models that can take them; or the field's error."""
+    """Names of their own, also for the springs of their chains; or the field's error."""
     names = [contact.name for contact in contacts]
     for i, law in enumerate(laws):
         taken = next((name for name in (law.name, *(s.name for s in expanded([law]))) if name in names), None)
         if taken is not None:
             refuse(scene, f"force_laws[{i}].name", law.name, f"a name of its own: there is {taken} already")
         names += [law.name, *(spring.name for spring in expanded([law]))]
-    for i, model in enumerate(scene.file.models):
-        for law in laws:
-            _check_law_of(scene, f"models[{i}]", model, law)
-
-
-def _check_law_of(scene: Scene, entry: str, model: ModelSpec, law: ForceLaw) -> None:
-    if isinstance(model, (CraigBamptonModel, StepwiseModel)):
-        refuse(scene, f"{entry}.kind", model.kind, f"another kind: this one has no force laws, and there is {law.name}")
-    points = 1 if isinstance(law.at, str) else len(law.at)
-    if points > 1 and isinstance(model, FullModel):
-        needed = f"another kind: its force laws act on single points, {law.name} on {points}"
-        refuse(scene, f"{entry}.kind", model.kind, needed)
 
 
 def _shape(spec: LawSpec) -> Any:

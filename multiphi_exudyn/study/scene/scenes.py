@@ -9,20 +9,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.scene.scene_file import (
-    CraigBamptonModel,
-    FullModel,
-    GlobalBasisModel,
-    ReducedModel,
-    SceneFile,
-    StepwiseModel,
-    UserObjectModel,
-)
+from multiphi_exudyn.study.scene.fields import one_of
+from multiphi_exudyn.study.scene.model_kinds import ModelSpec
+from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 
-__all__ = ["ModelSpec", "Scene", "load_scene", "refuse", "scene_data", "scene_of", "shipped_scenes"]
-
-ModelSpec = ReducedModel | UserObjectModel | FullModel | CraigBamptonModel | StepwiseModel | GlobalBasisModel
+__all__ = ["Scene", "load_scene", "refuse", "scene_data", "scene_of", "shipped_scenes"]
 
 MOST_SAMPLES = 10_000_000  # of one history: beyond that a typing error is likelier than a wish
 
@@ -42,10 +34,7 @@ class Scene:
 
     def filled(self, model: ModelSpec) -> ModelSpec:
         """The model with its number of modes, and that number in its name."""
-        if isinstance(model, FullModel) or (isinstance(model, ReducedModel) and model.tolerance is not None):
-            return model
-        modes = self.file.modes if model.modes is None else model.modes
-        return model.model_copy(update={"modes": modes, "name": model.name.replace("{modes}", str(modes))})
+        return model.filled(self.file.modes)
 
 
 def shipped_scenes() -> dict[str, str]:
@@ -124,7 +113,7 @@ def _check(scene: Scene) -> None:
     for part, given in parts.items():
         for name in given:
             if name not in names:
-                refuse(scene, f"comparison.{part}", name, f"one of the models: {', '.join(names)}")
+                refuse(scene, f"comparison.{part}", name, one_of("models", name, names))
     first: dict[str, ModelSpec] = {}
     for i, model in enumerate(map(scene.filled, file.models)):
         if first.setdefault(model.name, model) != model:

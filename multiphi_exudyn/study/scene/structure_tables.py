@@ -80,8 +80,8 @@ class MassSpec(Table):
 class ClampSpec(Table):
     """Stiffness of the beam's first end; infinite is ideally rigid."""
 
-    translation: Annotated[float, Field(ge=0)] = math.inf
-    rotation: Annotated[float, Field(ge=0)] = math.inf
+    translation: NotNegative | Stiffness = math.inf
+    rotation: NotNegative | Stiffness = math.inf
 
 
 SectionSpec = Annotated[

@@ -1,4 +1,4 @@
-"""Files in TOML: read, and validated against a form; every error is one line naming file and field."""
+"""Files in TOML: read, and validated against a form; every error is one line naming file and fields."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.study.scene.fields import did_you_mean
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -20,6 +21,8 @@ else:
 __all__ = ["read_toml", "validated"]
 
 Form = TypeVar("Form", bound=BaseModel)
+
+MOST = 12  # faults told in one line
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -31,24 +34,58 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def validated(form: type[Form], path: Path, data: Mapping[str, Any]) -> Form:
-    """``data`` in its form; the error names ``path``, the first wrong field, and how many more there are."""
+    """``data`` in its form; the error names ``path`` and every wrong field, those that are unknown first."""
     try:
         return form.model_validate_json(json.dumps(data, default=str))
     except ValidationError as error:
-        raise MultiPhiValueError(f"{path}: {_complaint(error, data)}") from error
+        raise MultiPhiValueError(f"{path}: {_complaint(form, error, data)}") from error
 
 
-def _complaint(error: ValidationError, data: Mapping[str, Any]) -> str:
-    """The first wrong field: what was given, what is needed, and how many more there are."""
-    found: dict[str, tuple[str, list[str]]] = {}
+def _complaint(form: type[BaseModel], error: ValidationError, data: Mapping[str, Any]) -> str:
+    """Of every wrong field what was given and what is needed, in one line."""
+    found: dict[str, tuple[bool, str, list[str]]] = {}
+    schema = form.model_json_schema()
     for item in error.errors(include_url=False):
-        missing = item["type"] == "missing"
+        missing, unknown = item["type"] == "missing", item["type"] == "extra_forbidden"
         field = _field(item["loc"], data, missing)
         given = "nothing" if missing else _one_line(repr(item["input"]))
-        found.setdefault(field, (given, []))[1].append(_needed(item))
-    field, (given, needs) = next(iter(found.items()))
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return f"{field}: got {given}, need {' or '.join(dict.fromkeys(needs))}{more}"
+        needed = _needed(item) + (did_you_mean(item["loc"][-1], _known(schema, data, item["loc"])) if unknown else "")
+        found.setdefault(field, (unknown, given, []))[2].append(needed)
+    faults = [
+        f"{field}: got {given}, need {' or '.join(dict.fromkeys(needs))}"
+        for field, (_, given, needs) in sorted(found.items(), key=lambda each: not each[1][0])
+    ]
+    more = f" (and {len(faults) - MOST} more)" if len(faults) > MOST else ""
+    return "; ".join(faults[:MOST]) + more
+
+
+def _known(schema: Mapping[str, Any], data: Any, location: Sequence[int | str]) -> set[str]:
+    """Names of the fields that the table around a place may have."""
+    forms = _forms(schema, schema, data)
+    for part in location[:-1]:
+        if isinstance(data, Mapping) and part in data:
+            inner = [form.get("properties", {}).get(part, form.get("additionalProperties", {})) for form in forms]
+        elif isinstance(data, list) and isinstance(part, int):
+            inner = [form.get("items", {}) for form in forms]
+        else:
+            continue  # a label that the validator gives to the branch of a union
+        data = data[part]
+        forms = [each for form in inner if form for each in _forms(schema, form, data)]
+    return {name for form in forms for name in form.get("properties", {})}
+
+
+def _forms(schema: Mapping[str, Any], form: Any, data: Any) -> list[Mapping[str, Any]]:
+    """The branches of a form that may be meant: of tables with a kind, those of this kind."""
+    if not isinstance(form, Mapping):
+        return []
+    if "$ref" in form:
+        return _forms(schema, schema["$defs"][form["$ref"].rpartition("/")[2]], data)
+    branches = form.get("anyOf", form.get("oneOf"))
+    if branches:
+        return [each for branch in branches for each in _forms(schema, branch, data)]
+    kind = form.get("properties", {}).get("kind", {}).get("const")
+    other = isinstance(data, Mapping) and kind not in (None, data.get("kind", kind))
+    return [] if other else [form]
 
 
 def _needed(item: Mapping[str, Any]) -> str:

@@ -28,14 +28,14 @@ from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics
-from multiphi_exudyn.study.scene.scene_file import (
+from multiphi_exudyn.study.scene.model_kinds import (
     CraigBamptonModel,
-    DisplacedStart,
     FullModel,
     ReducedModel,
     StepwiseModel,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.scene_loads import loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from reference_models.craig_bampton import independent_points
@@ -129,11 +129,9 @@ class Workbench:
 
     def model(self, spec: ReducedModel | UserObjectModel | StepwiseModel) -> MultiPhiModel:
         """The reduced model of a scene's entry."""
-        rigid = not isinstance(spec, StepwiseModel) and spec.contact == "rigid"
-        modes: int | str | Tolerance = spec.modes or "all"
-        if isinstance(spec, ReducedModel) and spec.tolerance is not None:
-            modes = Tolerance(spec.tolerance)
-        return MultiPhiModel(self.structure, self.nonlinearities(rigid), modes=modes, overrides=self.overrides)
+        tolerance = getattr(spec, "tolerance", None)
+        modes = (spec.modes or "all") if tolerance is None else Tolerance(tolerance)
+        return MultiPhiModel(self.structure, self.nonlinearities(spec.rigid), modes=modes, overrides=self.overrides)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
@@ -198,7 +196,7 @@ def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, flo
 
 def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
     """The beams, and what discretises them: kind and elements of the reference, or of another full model."""
-    full = [model for model in scene.models.values() if isinstance(model, FullModel)]
+    full = [model for model in scene.models.values() if model.kind == "full"]
     named = [model for model in full if model.name == scene.file.comparison.reference]
     kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
     assert mechanics.beams is not None, "a structure is beams or matrices"
@@ -237,9 +235,9 @@ def _check_modes(scene: Scene, structure: LinearStructure, mechanics: Mechanics)
             f"{scene.path}: structure: got {structure.n} DoFs and {mechanics.directions} contacts or laws"
         )
     for model in scene.models.values():
-        if isinstance(model, CraigBamptonModel):
+        if model.kind == "craig-bampton":
             _check_component(scene, structure, mechanics, model)
-        elif not isinstance(model, FullModel) and model.modes not in (None, "all") and int(model.modes) > most:
+        elif model.kind != "full" and model.modes not in (None, "all") and int(model.modes) > most:
             refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
 
 

@@ -1,0 +1,73 @@
+"""``multiphi-exudyn new | validate | schema``: a scene or a study written, checked without a run, and its form."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.files import write_whole
+from multiphi_exudyn.study.accuracy.cases import Study, load_study
+from multiphi_exudyn.study.accuracy.study_file import StudyFile
+from multiphi_exudyn.study.scene.mechanics import mechanics_of
+from multiphi_exudyn.study.scene.scene_file import SceneFile
+from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene.toml_file import read_toml
+from multiphi_exudyn.study.scene.workbench import prepare
+
+__all__ = ["KINDS", "run_new", "run_schema", "run_validate"]
+
+KINDS: dict[str, tuple[str, type[BaseModel]]] = {
+    "scene": ("multiphi_exudyn.study.scene", SceneFile),
+    "study": ("multiphi_exudyn.study.accuracy", StudyFile),
+}
+
+
+def run_new(kind: str, path: Path | None) -> bool:
+    """Write a template that is valid as it is; of a study also the scene it names, where there is none."""
+    path = path or Path(f"{kind}.toml")
+    beside = path.parent / "scene.toml"
+    _write_template(kind, path)
+    if kind == "study" and not beside.exists():
+        _write_template("scene", beside)
+    return True
+
+
+def run_validate(path: Path) -> bool:
+    """Check a scene or a study as far as that goes without a run, and say what it has."""
+    print(f"{path}: valid, {_of_study(load_study(str(path))) if 'scene' in read_toml(path) else _of_scene(str(path))}")
+    return True
+
+
+def run_schema(kind: str) -> bool:
+    """Print the JSON schema of a file's form, with which editors complete and check it."""
+    schema = json.dumps(KINDS[kind][1].model_json_schema())
+    print(json.dumps(json.loads(schema, parse_constant=lambda infinite: "rigid"), indent=1))
+    return True
+
+
+def _write_template(kind: str, path: Path) -> None:
+    if path.exists():
+        raise MultiPhiValueError(f"FILE: got {str(path)!r}, need a name that is not taken")
+    template = resources.files(KINDS[kind][0]) / "templates" / f"{kind}.toml"
+    try:
+        write_whole(path, template.read_bytes())
+    except OSError as error:
+        raise MultiPhiValueError(f"FILE: got {str(path)!r}, need a folder that can be written") from error
+    print(path)
+
+
+def _of_scene(source: str) -> str:
+    scene = load_scene(source)
+    bench = prepare(scene, mechanics_of(scene))
+    contacts = ", ".join(contact.name for contact in bench.mechanics.contacts) or "none"
+    return f"a scene of {bench.structure.n} degrees of freedom; contacts: {contacts}; models: {', '.join(scene.models)}"
+
+
+def _of_study(study: Study) -> str:
+    axes = " x ".join(f"{len(values)} of {axis}" for axis, values in study.file.axes.items()) or "no axes"
+    runs = len(study.budgets()) + sum(1 + len(study.runs(at)) for at in study.points if study.file.methods)
+    return f"a study of {len(study.points)} points ({axes}), {runs} runs"
