@@ -7,7 +7,8 @@ The file is an .npz archive without pickled objects. Of s segments, e events, an
     term_count, unit, free         (s,): p terms of each, T [s] of their powers, terms of the free response
     rate, power                    (sum p,) complex [1/s], int: phi = (t / T)^power exp(rate t), t from the start
     coefficient                    (sum (r + q) p,) complex, row by row: xi = Re coefficient phi
-    event_time, _kind, _element    (e,) [s], places in the header's kinds and elements
+    event_time                     (e,) [s]
+    event_kind, _element, _state   (e,): places in the header's kinds, elements and names of states
     event_loss, event_impulse      (e, 6) [J], (e,) [N s]
     shared                         (k, 3): place of the event, place of the element, impulse [N s]
     level{l}_shapes, _centre       (n, r + q), (n,): x = shapes xi + centre
@@ -150,7 +151,7 @@ def save(run: Histories, path: Path, **told: Any) -> None:
     """Write a run's motion; told: status, message, warnings, ledger, stats of the header."""
     elements = tuple(dict.fromkeys([*run.contacts, *run.frictions, *_elements(run.events)]))
     levels, numbers = _levels(run.segments)
-    header = {
+    header: dict[str, Any] = {
         "format": FORMAT,
         "t_start": run.t_start,
         "t_end": run.t_end,
@@ -160,12 +161,13 @@ def save(run: Histories, path: Path, **told: Any) -> None:
         "rubbing": run.rubbing,
         "elements": elements,
         "kinds": KINDS,
+        "entered": sorted({event.state for event in run.events}),
         "questions": _questions(run),
         "states": [level.states for level in levels],
         **told,
     }
     arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
-    arrays |= _segment_arrays(run.segments, numbers) | _event_arrays(run.events, elements)
+    arrays |= _segment_arrays(run.segments, numbers) | _event_arrays(run.events, elements, header["entered"])
     for number, level in enumerate(levels):
         arrays |= {f"level{number}_{name}": array for name, array in _level_arrays(run, level).items()}
     content = io.BytesIO()
@@ -307,13 +309,14 @@ def _elements(events: Sequence[Event]) -> Iterator[str]:
         yield from (name for name, _ in event.shared)
 
 
-def _event_arrays(events: Sequence[Event], elements: Sequence[str]) -> dict[str, np.ndarray]:
+def _event_arrays(events: Sequence[Event], elements: Sequence[str], entered: Sequence[str]) -> dict[str, np.ndarray]:
     place = {name: i for i, name in enumerate(elements)}
     shared = [(k, place[name], push) for k, event in enumerate(events) for name, push in event.shared]
     return {
         "event_time": np.array([event.time for event in events]),
         "event_kind": np.array([KINDS.index(event.kind) for event in events], np.int64),
         "event_element": np.array([place[event.contact] for event in events], np.int64),
+        "event_state": np.array([entered.index(event.state) for event in events], np.int64),
         "event_loss": np.array([dataclasses.astuple(event.loss) for event in events]).reshape(-1, LOSSES),
         "event_impulse": np.array([event.impulse for event in events]),
         "shared": np.array(shared).reshape(-1, 3),
@@ -324,8 +327,16 @@ def _events(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> tupl
     elements, shared = header["elements"], dict[int, list[tuple[str, float]]]()
     for k, place, push in arrays["shared"].tolist():
         shared.setdefault(int(k), []).append((elements[int(place)], push))
-    columns = (arrays[f"event_{name}"].tolist() for name in ("time", "element", "kind", "loss", "impulse"))
+    columns = (arrays[f"event_{name}"].tolist() for name in ("time", "element", "kind", "loss", "impulse", "state"))
     return tuple(
-        Event(time, elements[element], header["kinds"][kind], Loss(*loss), impulse, tuple(shared.get(k, ())))
-        for k, (time, element, kind, loss, impulse) in enumerate(zip(*columns, strict=True))
+        Event(
+            time,
+            elements[element],
+            header["kinds"][kind],
+            Loss(*loss),
+            impulse,
+            tuple(shared.get(k, ())),
+            header["entered"][state],
+        )
+        for k, (time, element, kind, loss, impulse, state) in enumerate(zip(*columns, strict=True))
     )
