@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
+from multiphi_exudyn.mechanics.matrix_files import read_array
 
 N = 5
 MASS = scipy.sparse.csc_array(np.diag(np.arange(1.0, N + 1)))
@@ -150,7 +151,9 @@ class TestSeveralArrays:
             read_structure((file, "k2"), (file, "k3"))
 
     def test_of_matlab_7_3(self, tmp_path):
-        file = write_mat_73(tmp_path / "model.mat", {"M": MASS.toarray(), "K": STIFFNESS})
+        tall = np.arange(6.0).reshape(3, 2)
+        file = write_mat_73(tmp_path / "model.mat", {"M": MASS.toarray(), "K": STIFFNESS, "tall": tall})
+        np.testing.assert_array_equal(read_array("rows", (file, "tall")), tall)
         found = read_structure(file, file)
         np.testing.assert_array_equal(found.mass, MASS.toarray())
         np.testing.assert_array_equal(found.stiffness.toarray(), STIFFNESS.toarray())
