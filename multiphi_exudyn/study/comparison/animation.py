@@ -22,7 +22,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from multiphi_exudyn.study.comparison.film import FRAME_RATE, Film, Line, Stop, Take
-from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, FULL, REFERENCE, panels
+from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, FULL, REFERENCE, greyed, panels
 from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["frame_count", "frames", "gif"]
@@ -185,18 +185,18 @@ def _frame_shapes(film: Film, upper: list[Axes]) -> None:
 
 
 def _frame_history(film: Film, lower: Axes) -> None:
-    """Grey where the reference is in contact."""
-    for intervals in film.takes[1].run.contact_intervals.values():
-        for start, end in intervals:
-            lower.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
+    """Grey where the reference is in contact, or sticks where there are no contacts."""
+    spans, grey = greyed(film.takes[1].run)
+    for start, end in spans:
+        lower.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
     values = 1e3 * np.concatenate([take.history for take in film.takes])
     room = MARGIN * np.ptp(values) or 1.0
     lower.set_xlim(0.0, film.time[-1] + film.time[1])
     lower.set_ylim(np.min(values) - room, np.max(values) + room)
     lower.set_xlabel("time [s]")
     lower.set_ylabel(f"{film.point} [mm]")
-    if film.takes[1].run.contact_intervals:
-        lower.set_title("grey: the reference is in contact", fontsize=9, color=TEXT, loc="left")
+    if grey:
+        lower.set_title(f"grey: {grey}", fontsize=9, color=TEXT, loc="left")
 
 
 def _titles(film: Film, figure: Figure, shapes: list[_Shape]) -> None:
