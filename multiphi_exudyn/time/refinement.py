@@ -47,5 +47,5 @@ def _interpolation_error(trajectory: Trajectory) -> float:
     lasting = trajectory.t_end * float(np.linalg.norm(np.abs(level.channels.force[:, : len(errors)]) @ errors))
     if lasting == 0:
         return 0.0
-    energies = np.asarray(trajectory.energy(np.linspace(0.0, trajectory.t_end, SAMPLES)))
+    energies = np.asarray(trajectory.energy(np.linspace(trajectory.start.time, trajectory.t_end, SAMPLES)))
     return lasting / max(math.sqrt(2 * float(np.max(energies))), np.finfo(float).tiny)

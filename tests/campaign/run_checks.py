@@ -13,6 +13,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.state import Phase
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
+RUBBED = 1e-10  # the same where there is friction
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
@@ -84,7 +85,7 @@ def ledger(run, scale):
     for name, value in rows.items():
         if not value >= -CLOSES * scale:
             return f"ledger: {name} {value:g} of {scale:g} J"
-    if not abs(found.residual) <= CLOSES * scale:
+    if not abs(found.residual) <= (RUBBED if run.model.rubbing else CLOSES) * scale:
         return f"ledger: residual {found.residual:g} of {scale:g} J"
     if not abs(found.truncation_strain) + abs(found.truncation_kinetic) <= NO_TRUNCATION * scale and _complete(run):
         return f"ledger: truncation {found.truncation_strain:g}, {found.truncation_kinetic:g} of {scale:g} J"

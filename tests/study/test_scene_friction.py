@@ -1,5 +1,6 @@
 """Friction in scene files: the reduced sides and the full beam answer alike, the page shows it, errors name fields."""
 
+import dataclasses
 import json
 import math
 
@@ -11,7 +12,9 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.cli.main import main
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.comparison.compare import compare, histories, summary
+from multiphi_exudyn.study.comparison.plots import greyed, history_figure
 from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
@@ -68,6 +71,30 @@ def test_the_page_and_the_files_tell_of_it(compared):
     assert content["stick_intervals"]["r6"]["ring"][0][0] == pytest.approx(0.0, abs=1e-12)
     assert np.max(np.abs(arrays["r6/friction/ring"])) <= 0.8 * (1 + 1e-12)
     assert json.dumps(content)
+
+
+def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
+    figure = history_figure(compared, "tip")
+    assert figure.axes[0].get_title() == "Displacement of tip; grey: friction sticks in the reference"
+    assert len(figure.axes) == 2
+    spans, _ = greyed(compared.reference)
+    assert len(spans) == len(figure.axes[0].patches) > 1
+    assert spans == pytest.approx(compared.reference.stick_intervals["ring"])
+    assert "the first contact phase, and" not in render(compared, [], [])
+
+
+def test_the_user_object_of_a_stop_that_rubs_is_its_reduced_model():
+    scene = load_scene("rubbing-stop")
+    bench = prepare(scene, mechanics_of(scene))
+    bench = dataclasses.replace(bench, time=bench.time[bench.time <= 0.25], repeats=1)
+    names = "reduced-r12", "user-object-r12"
+    reduced, body = (run_model(bench, name, progress=False) for name in names)
+    assert len(reduced.stick_intervals["stop"]) >= 2
+    for field in ("points", "gaps", "contact_force", "friction_force", "slip"):
+        for name, values in getattr(reduced, field).items():
+            assert np.max(np.abs(getattr(body, field)[name] - values)) < 1e-8 * np.max(np.abs(values))
+    assert body.stick_intervals["stop"] == pytest.approx(reduced.stick_intervals["stop"], abs=1e-9)
+    assert body.ledger["friction"] == pytest.approx(reduced.ledger["friction"], rel=1e-3)
 
 
 def test_a_start_leaves_springs_stretched_for_every_model(compared):

@@ -20,6 +20,7 @@ from multiphi_exudyn import (
     MultiPhiTypeError,
     MultiPhiValueError,
     StopMotion,
+    SweepLoad,
     UnilateralContact,
     simulate,
 )
@@ -149,3 +150,15 @@ def test_the_ledger_of_a_truncated_run_that_goes_on_knows_nothing_of_what_was_lo
     again = simulate(model, 4.0, start=first)
     assert again.start_loss.total == 0
     assert_allclose(again.ledger.residual, 0, atol=1e-12 * again.ledger.initial)
+
+
+def test_goes_on_in_the_middle_of_a_sweep_that_has_to_be_refined():
+    """What interpolation leaves of the sweep is judged by the energy of the run's own time."""
+    structure = LinearStructure([[1.0]], [[25.0]], points={"m": 0})
+    model = MultiPhiModel(structure, [Friction("ring", "m", 0.3)], modes="all")
+    loads = [SweepLoad("m", 2.0, 0.2, 3.0, 10.0)]
+    whole, first = simulate(model, 10.0, loads=loads), simulate(model, 4.3, loads=loads)
+    rest = simulate(model, 10.0, start=first, loads=loads)
+    t = np.linspace(4.3, 10.0, 101)
+    assert len(rest.events) > 5
+    assert_allclose(rest.at("m", t), whole.at("m", t), rtol=0, atol=1e-7 * np.max(np.abs(whole.at("m", t))))

@@ -86,7 +86,9 @@ class Reduction(Shown):
     @property
     def report(self) -> str:
         """What was taken and what was left out, items of one type and one fate a line."""
-        size = f"{self.structure.n} degrees of freedom, {len(self.model.contacts)} contacts, modes: {self.model.modes}"
+        frictions = sum(contact.held for contact in self.model.contacts)
+        elements = f"contacts: {len(self.model.contacts) - frictions}, frictions: {frictions}"
+        size = f"{self.structure.n} degrees of freedom, {elements}, modes: {self.model.modes}"
         taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
         left = [f"  {line}" for line in grouped(self.left_out)]
         return "\n".join([size, "taken", *taken, "left out", *(left or ["  nothing"])])

@@ -25,7 +25,7 @@ from PIL import Image
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, REFERENCE, panels
+from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, REFERENCE, greyed, panels
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
@@ -193,11 +193,12 @@ def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: lis
         panel.set_ylim(np.min(z) - room, np.max(z) + room)
         panel.set_ylabel(f"{beam} w [mm]".strip())
     axes[-2].set_xlabel("x [m]")
-    for intervals in reference.contact_intervals.values():
-        for start, end in intervals:
-            axes[-1].axvspan(start, end, color=CONTACT, lw=0, zorder=-1)
+    spans, grey = greyed(reference)
+    for start, end in spans:
+        axes[-1].axvspan(start, end, color=CONTACT, lw=0, zorder=-1)
     axes[-1].set(xlabel="time [s]", ylabel=f"{_followed(stage, reference)} [mm]", xlim=(0.0, stage.time[-1]))
-    axes[-1].set_title("grey: the reference is in contact", fontsize=9, loc="left")
+    if grey:
+        axes[-1].set_title(f"grey: {grey}", fontsize=9, loc="left")
     axes[0].legend(loc="upper left", frameon=False, fontsize=9)
     title = f"{stage.bench.scene.file.title}, {stage.slow:g} times slower than it happens"
     took = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))

@@ -2,7 +2,7 @@
 
 Every function returns a Figure. One colour per model in all of them (Okabe and Ito's colour-blind-safe
 set), the reference black, its coarser copy and the other full runs grey. Grey areas: the reference is in
-contact, as in Figs 38.8 to 38.10.
+contact, as in Figs 38.8 to 38.10; in scenes without contacts its friction sticks.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ __all__ = [
     "energy_figure",
     "error_time_figure",
     "first_contact_span",
+    "greyed",
     "history_figure",
     "mode_figure",
     "panels",
@@ -84,15 +85,19 @@ def styles(comparison: Comparison) -> dict[str, Style]:
 
 
 def history_figure(comparison: Comparison, point: str) -> Figure:
-    """A point's history, its detail in the first contact, and its difference to the reference."""
-    figure, (whole, detail, difference) = panels(9.0, 3, heights=(1.0, 1.2, 1.0))
+    """A point's history, its detail in the first contact if there are contacts, its difference to the reference."""
+    touches = bool(comparison.reference.contact_intervals)
+    heights = (1.0, 1.2, 1.0) if touches else (1.0, 1.0)
+    figure, (whole, *detail, difference) = panels(9.0 if touches else 6.0, len(heights), heights=heights)
     shown = [comparison.reference, *pictured(comparison)]
     _lines(whole, comparison, shown, point, per_second=1.0)
     whole.set_xlim(0, comparison.bench.t_end)
     whole.set_xlabel("time [s]")
-    whole.set_title(f"Displacement of {point}; grey: the reference is in contact", fontsize=10)
-    _lines(detail, comparison, shown, point, per_second=1e3)
-    _detail(detail, comparison, shown, point)
+    _, grey = greyed(comparison.reference)
+    whole.set_title(f"Displacement of {point}{grey and f'; grey: {grey}'}", fontsize=10)
+    for axes in detail:
+        _lines(axes, comparison, shown, point, per_second=1e3)
+        _detail(axes, comparison, shown, point)
     _differences(difference, comparison, point)
     _legend(figure, comparison, shown + [run for run in reduced(comparison) if run not in shown])
     return figure
@@ -182,6 +187,14 @@ def pictured(comparison: Comparison) -> list[ModelRun]:
     return own or reduced(comparison)
 
 
+def greyed(reference: ModelRun) -> tuple[np.ndarray, str]:
+    """Spans (k, 2) [s] that are drawn grey, and what happens in them; nothing where nothing touches or rubs."""
+    if reference.contact_intervals:
+        return union(reference.contact_intervals.values()), "the reference is in contact"
+    sticks = reference.stick_intervals
+    return union(sticks.values()), "friction sticks in the reference" if sticks else ""
+
+
 def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = None) -> tuple[float, float]:
     """Start and end [s] of the detail around the reference's first contact phase, of some contacts or of all."""
     names = comparison.reference.contact_intervals if contacts is None else contacts
@@ -215,7 +228,7 @@ def _lines(axes: Axes, comparison: Comparison, runs: Sequence[ModelRun], point: 
         drawn = style[run.name]
         time = per_second * run.time
         axes.plot(time, 1e3 * run.points[point], drawn.line, color=drawn.colour, lw=drawn.width)
-    for start, end in per_second * union(comparison.reference.contact_intervals.values()):
+    for start, end in per_second * greyed(comparison.reference)[0]:
         axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
     axes.set_ylabel(f"{point} [mm]")
 

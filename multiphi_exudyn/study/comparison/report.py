@@ -35,7 +35,7 @@ ON_THE_PAGE = (
     "ledger",
 )
 HISTORY = (
-    "{}: the whole run, the first contact phase, and the largest difference to the reference up to each time. "
+    "{}: the whole run, {}and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
 )
 MANY = "A bar is a time span in contact; the contacts are numbered as the scene has them."
@@ -86,8 +86,9 @@ def _totals(comparison: Comparison) -> dict[str, ContactTotals]:
 
 def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[Picture]:
     if comparison.reference.ok:
+        detail = "the first contact phase, " if comparison.reference.contact_intervals else ""
         for point in comparison.bench.points:
-            yield _picture("histories", plots.history_figure(comparison, point), HISTORY.format(point))
+            yield _picture("histories", plots.history_figure(comparison, point), HISTORY.format(point, detail))
         yield _picture(
             "cost",
             plots.error_time_figure(comparison),

@@ -158,7 +158,7 @@ def start_of(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
     """The same, with the stretches of friction's springs under a load that has been applied slowly."""
     start = bench.scene.file.start
     if start is None:
-        still = {contact.name: 0.0 for contact in model.contacts if contact.held}
+        still = {model.links[k].name: 0.0 for k in model.held}
         return Equilibrium(np.zeros(bench.structure.n), still)
     if not isinstance(start, DisplacedStart):
         return model.equilibrium({start.load_at: start.force})

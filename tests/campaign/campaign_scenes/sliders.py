@@ -178,9 +178,13 @@ def _free(random):
 
 
 def _redundant(random):
-    """Scenes of other kinds, blocks split in two or three of one direction: the motion is the same."""
+    """Scenes of other kinds, blocks split in two or three of one direction: the motion is the same.
+
+    Those without a higher static limit: which part lets go first, and what the others then bear, has no one answer.
+    """
     scene = (_blocks, _loads, _impacts)[int(random.integers(3))](random)
-    contacts, blocks = [], [f for f in scene.model.contacts if isinstance(f, mp.Friction) and f.rigid]
+    given = [contact for contact in scene.model.contacts if isinstance(contact, mp.Friction)]
+    contacts, blocks = [], [block for block in given if block.rigid and block.most == block.limit]
     for contact in scene.model.contacts:
         if contact not in blocks or (contact is not blocks[0] and random.random() < 0.3):
             contacts.append(contact)
