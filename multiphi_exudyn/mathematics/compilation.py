@@ -66,7 +66,6 @@ PASSES = (
     NativeLowering,
     NoPythonBackend,
 )  # of numba's thirty
-NEVER_CALLED = 1  # numba wants an address for a function that it will not run
 START, EACH_FUNCTION, EACH_LINE = 2.0, 0.02, 0.004  # s, on one core of 2020 that has nothing else to do
 WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
 MOST_PROCESSES = 4  # of some 250 MB each
@@ -205,7 +204,8 @@ def _read(function: FunctionType, library: _Library) -> Any:
     """Put a function in a library as numba calls it; numba's description of it."""
     called = {name: _external(callee) for name, callee in callees(function).items()}
     alone = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
-    kinds, flags = _types(function), Flags()
+    kinds = _types(function)
+    flags: Any = Flags()
     flags.error_model = "numpy"
     flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
     contexts = _known_types(), cpu_target.target_context
@@ -233,7 +233,6 @@ def _add_c_function(library: _Library, inner: Any, name: str) -> None:
 
 def _external(callee: FunctionType) -> Any:
     """A function to be found by its symbol."""
-    llvm.add_symbol(symbol(callee), NEVER_CALLED)
     return numba.types.ExternalFunction(symbol(callee), _types(callee))
 
 
