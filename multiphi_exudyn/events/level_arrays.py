@@ -56,6 +56,7 @@ class LevelArrays:
         self.held: Held | None = None
         self.room = ROOM
         self._count = 0  # of levels packed so far
+        self._weighed: int = 0  # size of the buffers when others were last looked at
         self.channels = ChannelArrays(levels)
         self.forget()
 
@@ -78,7 +79,10 @@ class LevelArrays:
         return self.buffers.size > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
 
     def _let_others_go(self) -> None:
-        """Of all that a model keeps the least recently used goes, until there is room."""
+        """Of all that a model keeps the least recently used goes, until there is room; looked at where this grows."""
+        if self.buffers.size == self._weighed:
+            return
+        self._weighed = self.buffers.size
         loaded = dict.fromkeys(levels for _, levels in self.levels.model.loaded.items())  # some by two keys
         others = [(levels, arrays) for levels in loaded for arrays in levels.kept_arrays if arrays is not self]
         total = self.buffers.size + sum(arrays.buffers.size for _, arrays in others)
@@ -91,6 +95,7 @@ class LevelArrays:
     def forget(self) -> None:
         """Begin anew, without any level."""
         self.buffers = Buffers()
+        self._weighed = 0
         self.loaded: dict[int, LoadedLevel] = {}
         self._offsets: dict[int, int] = {}  # of levels in the ints, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by key

@@ -66,7 +66,6 @@ PASSES = (
     NativeLowering,
     NoPythonBackend,
 )  # of numba's thirty
-NEVER_CALLED = 1  # numba wants an address for a function that it will not run
 START, EACH_FUNCTION, EACH_LINE = 2.0, 0.02, 0.004  # s, on one core of 2020 that has nothing else to do
 WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
 MOST_PROCESSES = 4  # of some 250 MB each
@@ -234,7 +233,6 @@ def _add_c_function(library: _Library, inner: Any, name: str) -> None:
 
 def _external(callee: FunctionType) -> Any:
     """A function to be found by its symbol."""
-    llvm.add_symbol(symbol(callee), NEVER_CALLED)
     return numba.types.ExternalFunction(symbol(callee), _types(callee))
 
 

@@ -58,7 +58,7 @@ def chosen_cases(name: str | None, quick: bool) -> list[Case]:
 
 
 def warm_up() -> None:
-    """Compile the loop, where numba is installed and has not kept it from an earlier run: half a minute, once."""
+    """Compile the loop, where numba is installed and has not kept it from an earlier run: some 15 s, once."""
     if importlib.util.find_spec("numba") is not None:
         problem = chosen_cases("zero-gap-rigid", quick=True)[0].build(True)
         with kept_back():
