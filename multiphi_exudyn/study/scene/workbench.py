@@ -90,9 +90,9 @@ class Workbench:
         return (*(until for until in named if until < ROUND_OFF * self.t_end), self.t_end)
 
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
-        """The scene's contacts, as given or all of them rigid."""
-        given = self.mechanics.contacts
-        return tuple(replace(contact, stiffness=math.inf, damping=0.0) for contact in given) if rigid else given
+        """The scene's contacts, as given or all of them rigid, along the stop too where they rub."""
+        given, ideal = self.mechanics.contacts, {"stiffness": math.inf, "tangential_stiffness": math.inf}
+        return tuple(replace(contact, damping=0.0, **ideal) for contact in given) if rigid else given
 
     def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw | Friction, ...]:
         """The contacts, as given or all of them rigid, and the scene's force laws and friction."""
