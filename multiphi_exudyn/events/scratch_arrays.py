@@ -31,7 +31,7 @@ class ScratchArrays:
         self._elements = int(ints[a.ELEMENTS])
         self._rigid = int(np.sum(ints[ints[a.KINDS] :][: self._elements] == a.RIGID))
         sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
-        self._rough = np.count_nonzero(buffers.numbers[ints[a.STATIC_FRICTIONS] :][: self._elements])
+        self._rough = int(np.count_nonzero(buffers.numbers[ints[a.STATIC_FRICTIONS] :][: self._elements]))
         self._struck = max(2 * self._rigid + self._rough, int(sliding), 1)
         self._together = self._rigid + int(np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0))  # held at once
         self.coordinates = self.exponentials = self.exits = 0

@@ -91,8 +91,9 @@ class Workbench:
 
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
         """The scene's contacts, as given or all of them rigid, along the stop too where they rub."""
-        given, ideal = self.mechanics.contacts, {"stiffness": math.inf, "tangential_stiffness": math.inf}
-        return tuple(replace(contact, damping=0.0, **ideal) for contact in given) if rigid else given
+        given, most = self.mechanics.contacts, math.inf
+        ideal = (replace(contact, stiffness=most, damping=0.0, tangential_stiffness=most) for contact in given)
+        return tuple(ideal) if rigid else given
 
     def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw | Friction, ...]:
         """The contacts, as given or all of them rigid, and the scene's force laws and friction."""
