@@ -17,11 +17,12 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
     10      a contact with friction       changes.turn_wishes, phases.is_denied
+    10      a rigid one that strikes      impact.rub, resting.sliding_level, rebounds.hear_touching
     11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
     12      friction at rest              sticking.stick_together, sticking.choose
     12      redundant friction            sticking.thin_out_idle, independence.thin_out
-    12      its impacts                   striking.slide_on
+    12      its impacts                   changes.bears_nothing, striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 

@@ -46,7 +46,10 @@ bases of two levels need not agree, so the law says what happens then; each sent
    moves, and sticks where it does not. Whether it goes on sticking, or sliding, does not keep it from closing: what
    is always taken is decided after it, at the same instant. With a spring it sticks while its force, beyond the limit
    by truncation, comes back to it. Where its pressure falls to zero it opens, and keeps no friction.
-   -> changes.turn_wishes, phases.is_denied
+   A rigid one that strikes has a tangential impulse of at most mu times the normal one, of all that touch at once,
+   speed or none. What then slides pushes with its friction, what rests sticks up to its static friction. Who is at its
+   stop begins in stick, and of redundant ones an independent set sticks.
+   -> changes.turn_wishes, phases.is_denied, impact.rub, resting.sliding_level, rebounds.hear_touching
 11. A rigid contact with restitution e that strikes leaves its stop with -e times its speed, and so do all that touch
    and are struck with it, in one impact (Moreau); those that are coupled have one e. Who is driven back to its stop is
    struck again at once. A bounce too low to be seen is the last: it takes as long as all that would follow, and where
@@ -57,8 +60,9 @@ bases of two levels need not agree, so the law says what happens then; each sent
    their static limits the ones that turn fall first: others may bear less after it, and stick on. What that leaves to
    the next derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others
    push with their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an
-   impulse.
-   -> sticking.stick_together, sticking.choose, sticking.thin_out_idle, independence.thin_out, striking.slide_on
+   impulse, nor does the friction of a contact that gives way.
+   -> sticking.stick_together, sticking.choose, sticking.thin_out_idle, independence.thin_out, striking.slide_on,
+   changes.bears_nothing
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing

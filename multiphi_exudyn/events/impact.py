@@ -2,6 +2,8 @@
 
     v+ = v- + A^T p,   p >= 0,  A v+ >= wanted, complementary,   A = H^T Phi_l         (Moreau; restitution 0: wanted 0)
 
+A contact with friction has a second row, along h_t - v_t, and an impulse along it within mu times its first one.
+
 Where others hang on the structure an impulse A^T p gives it B A^T p, B = F F^T the mobility that they leave it:
 
     v+ = v- + F z,   z = argmin |z|,  A F z >= wanted - A v-
@@ -229,7 +231,7 @@ def collide(
     """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
 
     held: the last so many contacts keep no speed away from their stop either. wanted: gap velocities (count + held,)
-    that they are to have at least, -1 for zero. impulses: (count + held,) [N s].
+    that they are to have at least, -1 for zero. impulses: (count + held,) [N s], those of friction behind them.
     What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
     underflows, and what is left of a place where it has come to rest would swing, and strike again: both become zero.
     """

@@ -80,6 +80,10 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     speed = worked @ drags + carried.T @ base.damping @ moved
     constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
     constant -= given @ level.pushes
+    slides = [k for k, link in enumerate(index) if link in base.oblique and np.isinf(base.stiffnesses[link])]
+    placed -= worked[:, slides] @ own.force_rows[slides]
+    speed -= worked[:, slides] @ own.force_rate_rows[slides]
+    constant -= worked[:, slides] @ level.asymptotic.forces[slides]
     pairs = []
     for i in level.rubbing_elements:
         held = next(k for k in base.link_places[i] if base.links[k].held)

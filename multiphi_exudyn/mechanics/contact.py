@@ -19,11 +19,20 @@ Friction. Where a closed contact slides along h_t, with the force N = lambda,
 The force on the structure is h N - h_t T. A contact that closes sticks where it is hit, or without a spring slides in
 the direction in which it moves; one that opens has T = 0.
 
-    normal            friction without a spring    with a spring k_t
-    compliant         works                        works
-    viscous           works                        refused: slip ends by N', which has an acceleration
-    rigid             levels alone: a run is       refused: so has N' of a reaction
-                      refused, as it strikes
+A rigid contact that strikes has an impulse p along h, and q along -h_t, of all that touch together (Moreau):
+
+    |q| <= mu p,   h_t.x'+ = v_t where it is smaller,   s (h_t.x'+ - v_t) >= 0 where q = s mu p
+
+mu_s has no part in it. With e = 0 an impact only takes energy. With e > 0 and an impulse that makes a speed along the
+stop, Newton's e beside friction may make some (T. R. Kane): such an impact is refused by name. Where sliding has no
+unique motion the level is refused with its number (levels/sliding.py).
+
+    normal            friction without a spring    with a spring k_t                     restitution beside friction
+    compliant         works                        works                                 refused, as without friction
+    viscous           works                        refused: slip ends by N', which has   refused, as without friction
+                                                   an acceleration
+    rigid             works                        refused: so has N' of a reaction      works, an impact that would
+                                                                                         make energy is refused
     force law         has none: a law is no contact, and has no N
 
 What works does so in runs, steady states, frequency responses, static equilibria, and in the Exudyn body, alone and

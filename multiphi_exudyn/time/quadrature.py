@@ -100,9 +100,17 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
         y, moved, accelerated = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
         load = (level.excitation.static + base.preload + base.pushes @ level.pushes)[:, None] + varying
         residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
-        residual += base.pushes[:, index] @ springs
+        residual += base.pushes[:, index] @ (springs - _reactions(level, xi, xi_t))
         power += np.sum((carried @ w_t) * residual, axis=0)
     return np.asarray(power)
+
+
+def _reactions(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray) -> np.ndarray:
+    """Forces (k, times) [N] of the closed rigid contacts that slide, whose friction acts on what channels carry."""
+    own, index = level.level, list(level.level.indices)
+    forces = own.force_rows @ xi + own.force_rate_rows @ xi_t + level.asymptotic.forces[:, None]
+    slides = [link in own.base.oblique and np.isinf(own.base.stiffnesses[link]) for link in index]
+    return np.where(np.array(slides, bool)[:, None], forces, 0.0)
 
 
 @functools.cache

@@ -22,11 +22,12 @@ DRIFTED = 1e-10  # of the largest value: what a sensitive motion has drifted bef
 INSTANTS = 60  # at which motions are compared
 DIGEST = 8  # of them are kept for a comparison of processors
 AT_EVENT = 1e-7  # of the run: closer to an event, velocities are not compared
-OTHERWISE = (  # brute force is tried so where it and the run differ: another touch, shorter steps
+OTHERWISE = (  # brute force is tried so where it and the run differ: another touch, shorter steps, more bounces
     {"touch": 1e-12},
     {"touch": 1e-10},
     {"finer": 2},
     {"finer": 8},
+    {"rocking": 20},
 )
 IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated load misses more than motion
 RUBBED = 1e-6  # of the energy: what friction takes

@@ -98,6 +98,18 @@ def test_a_load_whose_numbers_are_large_hides_no_impact():
     assert judged("units", 6)[0] == [("ok", "")]
 
 
+@pytest.mark.parametrize(
+    "number",
+    [
+        227,  # a contact that sticks on its stop, with much friction, while another strikes
+        271,  # one that has just left its stop by less than can be seen is struck with the next
+        665,  # one is carried along by its belt while another slides
+    ],
+)
+def test_rigid_contacts_that_rub_are_struck_together(number):
+    assert judged("rigid friction", number)[0] == [("ok", "")]
+
+
 def test_a_scene_comes_from_its_kind_and_number_alone():
     first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
     assert np.array_equal(first.velocity, again.velocity)

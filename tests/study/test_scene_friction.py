@@ -160,3 +160,20 @@ def test_the_limit_of_a_friction_is_an_axis_of_a_study(tmp_path):
     ):
         with pytest.raises(mp.MultiPhiValueError, match=said):
             load_study(write(tmp_path / "study.toml", study | {"axes": {path: [0.5]}}))
+
+
+def test_a_stop_that_rubs_may_be_rigid():
+    """In a scene's own words, and where a model takes all contacts rigid: along the stop, too."""
+    scene = load_scene("rubbing-stop")
+    bench = prepare(scene, mechanics_of(scene))
+    (stop,) = bench.contacts(rigid=True)
+    assert stop.stiffness == stop.tangential_stiffness == math.inf
+    found = []
+    for modes in (20, 40):
+        model = mp.MultiPhiModel(bench.structure, [stop], modes=modes)
+        run = mp.simulate(model, 0.2, loads=bench.loads)
+        assert run.status == "ok"
+        assert abs(run.ledger.residual) < 1e-12
+        found.append(run.at("side.node3", np.linspace(0, 0.2, 200)))
+    assert len(run.contact_intervals("stop")) > 0
+    assert np.linalg.norm(found[0] - found[1]) < 2e-3 * np.linalg.norm(found[1])

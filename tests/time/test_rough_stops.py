@@ -250,3 +250,45 @@ def test_friction_on_a_compliant_contact_bears_no_impulse():
     assert run.velocity(struck.time + 1e-13)[0] == pytest.approx(-0.5 * slowed, rel=1e-10)
     assert run.friction_force("floor", struck.time + 1e-9) == pytest.approx(-5.0, rel=1e-12)
     assert abs(run.ledger.residual) < 1e-12
+
+
+def test_a_belt_that_drives_what_sticks_works_against_what_slides_too():
+    """Mass couples two blocks on two belts: one is carried along, the other slides meanwhile."""
+    mass = [[1.0, 0.3, 0.0, 0.2], [0.3, 1.0, 0.1, 0.0], [0.0, 0.1, 1.0, 0.4], [0.2, 0.0, 0.4, 1.0]]
+    structure = mp.LinearStructure(mass, np.diag([5.0, 0.0, 3.0, 0.0]), points={"x": 0, "y": 1, "u": 2, "v": 3})
+    stops = [
+        mp.UnilateralContact(
+            "carried", "y", 0.0, friction=2.0, tangential={"x": 1.0, "u": 0.3}, tangential_velocity=0.1
+        ),
+        mp.UnilateralContact("sliding", "v", 0.0, friction=0.2, tangential="u", tangential_velocity=-1.0),
+    ]
+    weight = [mp.ConstantLoad("y", -10.0), mp.ConstantLoad("v", -10.0)]
+    run = mp.simulate(mp.MultiPhiModel(structure, stops, modes="all"), 0.5, velocity=[-0.2, 0, 1.0, 0], loads=weight)
+    assert any(segment.level.states == (1, 2) for segment in run.segments)
+    assert abs(run.ledger.residual) < 1e-13 * run.ledger.friction
+    assert_allclose(run.segments.works, np.sum([s.works for s in run.segments], axis=0), rtol=0, atol=1e-12)
+
+
+def feet(static):
+    """A rigid body, and a block, each pushed to and fro on a floor; the body stands on two feet."""
+    body = mp.LinearStructure(np.diag([1.0, 1.0, 1 / 3]), np.zeros((3, 3)), points={"x": 0, "y": 1})
+    block = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"x": 0, "y": 1})
+    rubs = {"friction": 0.3, "static_friction": static}
+    both = [
+        mp.UnilateralContact(name, [0.0, 1.0, arm], 0.0, tangential=[1.0, 0.0, 0.5], **rubs)
+        for name, arm in (("left", -1.0), ("right", 1.0))
+    ]
+    return (body, both), (block, [mp.UnilateralContact("floor", "y", 0.0, tangential="x", **rubs)])
+
+
+@pytest.mark.parametrize("amplitude", [2.5, 6.0])
+def test_of_two_feet_of_a_rigid_body_one_sticks_for_both(amplitude):
+    """Which of them bears what is not determined; how the body moves is: as a block."""
+    t, found = np.linspace(0.0, 4.0, 80), []
+    for structure, contacts in feet(None):
+        start = np.eye(structure.n)[0] * 0.7
+        loads = [mp.ConstantLoad("y", -G), mp.HarmonicLoad("x", amplitude, 0.8)]
+        run = mp.simulate(mp.MultiPhiModel(structure, contacts, modes="all"), 4.0, velocity=start, loads=loads)
+        assert run.status == "ok"
+        found.append(run.at("x", t))
+    assert_allclose(*found, rtol=0, atol=1e-12)

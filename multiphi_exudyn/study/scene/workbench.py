@@ -90,9 +90,10 @@ class Workbench:
         return (*(until for until in named if until < ROUND_OFF * self.t_end), self.t_end)
 
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
-        """The scene's contacts, as given or all of them rigid."""
-        given = self.mechanics.contacts
-        return tuple(replace(contact, stiffness=math.inf, damping=0.0) for contact in given) if rigid else given
+        """The scene's contacts, as given or all of them rigid, along the stop too where they rub."""
+        given, most = self.mechanics.contacts, math.inf
+        ideal = (replace(contact, stiffness=most, damping=0.0, tangential_stiffness=most) for contact in given)
+        return tuple(ideal) if rigid else given
 
     def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw | Friction, ...]:
         """The contacts, as given or all of them rigid, and the scene's force laws and friction."""

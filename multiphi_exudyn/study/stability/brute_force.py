@@ -68,7 +68,8 @@ class SegmentTable:
         closed = np.zeros((len(segments), count), dtype=bool)
         excused = np.full((len(segments), count), -np.inf)
         for row, segment in enumerate(segments):
-            closed[row, list(segment.level.level.indices)] = True
+            held = set(segment.level.level.indices)
+            closed[row] = [not held.isdisjoint(trajectory.model.pressing_links(i)) for i in range(count)]
             until = segment.start + segment.armed_at if segment.armed_at > 0 else segment.end
             for (i, _), phase in zip(exits_of(segment.level), segment.phases, strict=True):
                 if phase is not Phase.ARMED:

@@ -86,7 +86,8 @@ class Problem:
     @property
     def conservative(self) -> bool:
         """Whether nothing but impacts may change the energy."""
-        return not (self.damped or self.loads or self.frictions)
+        rubs = self.frictions or any(isinstance(c, UnilateralContact) and c.friction for c in self.contacts)
+        return not (self.damped or self.loads or rubs)
 
     @property
     def driven(self) -> bool:

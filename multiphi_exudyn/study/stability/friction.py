@@ -10,7 +10,8 @@ from multiphi_exudyn.mechanics.assembly import assemble
 from multiphi_exudyn.mechanics.beam import planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad
+from multiphi_exudyn.mechanics.loads import ConstantLoad, HarmonicLoad, Load, SampledLoad
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import chain, oscillator, stop
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -91,6 +92,49 @@ def _uneven() -> Problem:
     return Problem(structure, rings, 1.0, displacement=np.array([0.01, 0.01]))
 
 
+def _dropped(sideways: float, friction: float, restitution: float = 0.0) -> Problem:
+    """1 kg falls 20 mm onto a rigid floor on which it rubs, and slides to rest."""
+    structure = LinearStructure(np.eye(2), np.zeros((2, 2)), points={"m0": 0, "m1": 1})
+    floor = UnilateralContact("floor", "m1", 0.0, friction=friction, tangential="m0", restitution=restitution)
+    place, velocity, weight = np.array([0.0, 0.02]), np.array([sideways, 0.0]), ConstantLoad("m1", -10.0)
+    return Problem(structure, [floor], 0.5, displacement=place, velocity=velocity, loads=[weight])
+
+
+def _slides_to_rest(problem: Problem, trajectory: Trajectory) -> str:
+    """It slides as long as mu g takes to stop it, counted from the fall: v = mu g t, bounces or not."""
+    assert problem.velocity is not None
+    floor = problem.contacts[0]
+    assert isinstance(floor, UnilateralContact)
+    falls, stops = math.sqrt(2 * 0.02 / 10.0), float(problem.velocity[0]) / (10.0 * floor.friction)
+    late = abs(trajectory.events[0].time / falls - 1) + abs(trajectory.events[-1].time / stops - 1)
+    return "" if late <= 1e3 * REST else f"struck, or at rest, {late:.1e} of the time too late"
+
+
+def _rough_stops(modes: int | str = "all") -> Problem:
+    """A chain between two rigid stops, each of which rubs on what another mass does."""
+    stops = [
+        UnilateralContact("below", "m1", 1e-3, friction=0.5, tangential={"m0": 1.0, "m2": -1.0}),
+        UnilateralContact("above", {"m3": -1.0}, 1e-3, friction=0.3, static_friction=0.6, tangential="m4"),
+    ]
+    loads = [HarmonicLoad("m2", 60.0, 9.0), HarmonicLoad("m4", 40.0, 13.0)]
+    return Problem(chain([1.0] * 8, [1e4] * 8), stops, 0.5, modes=modes, loads=loads)
+
+
+def _inside_cones(problem: Problem, trajectory: Trajectory) -> str:
+    """|T| <= mu_s N where it sticks, |T| = mu N where it slides."""
+    times, worst = np.linspace(0.0, problem.t_end, 2001), 0.0
+    for part in problem.parts:
+        assert isinstance(part, UnilateralContact)
+        pressure = np.asarray(trajectory.contact_force(part.name, times))
+        tension = np.abs(np.asarray(trajectory.friction_force(part.name, times)))
+        sticks = np.zeros(len(times), dtype=bool)
+        for first, last in trajectory.stick_intervals(part.name):
+            sticks |= (times >= first) & (times <= last)
+        over, beside = tension - part.most * pressure, np.abs(tension - part.friction * pressure)
+        worst = max(worst, float(np.max(np.where(sticks, over, beside)) / np.max(pressure)))
+    return "" if worst <= 1e3 * REST else f"friction {worst:.1e} of the largest pressure off its law"
+
+
 def _jumping(stiffness: float) -> Problem:
     load = SampledLoad("m0", np.array([0.05, 0.1, 0.3]), np.array([30.0, 30.0, -30.0]))
     return _block(_ring(20.0, stiffness), 0.0, 0.5, load)
@@ -149,6 +193,14 @@ CASES = (
          lambda quick: _two_masses(_ring(5.0), stop("m1", 1e-3, 1e5)), quick=False),
     Case("friction-between-bodies", "Two bodies rub on each other alone.",
          lambda quick: _between()),
+    Case("friction-rigid-floor", "A block strikes a rigid floor aslant, on the edge of the cone, and slides.",
+         lambda quick: _dropped(1.5, 0.5), _slides_to_rest),
+    Case("friction-rigid-floor-bouncing", "The same with restitution: endless bounces rub as long as one.",
+         lambda quick: _dropped(1.5, 0.5, 0.5), _slides_to_rest),
+    Case("friction-rigid-stops", "Two rigid stops that rub: impacts move what they rub on, and each other.",
+         lambda quick: _rough_stops(), _inside_cones),
+    Case("friction-truncated-rigid-stops", "Five of eight modes of every state of the same.",
+         lambda quick: _rough_stops(5)),
     Case("friction-truncated-sprung", "Six modes of every state: what stick and slip leave out differs.",
          lambda quick: _beam(1e5, 6)),
     Case("friction-truncated-rigid", "The same without a spring: a constraint comes and goes.",

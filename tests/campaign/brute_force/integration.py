@@ -19,17 +19,18 @@ MOST_ROCKING = 6  # instants close together: an end of endless impacts
 FINE = 17  # places in two steps at which a dip is looked for
 
 
-def solved(system, displacement, velocity, times, touch=TOUCH, finer=1):
+def solved(system, displacement, velocity, times, touch=TOUCH, finer=1, rocking=MOST_ROCKING):
     """Motion from t = 0 at times (k,), ascending; touch: of the scene's lengths, see TOUCH.
 
     finer: steps, and with them the looks at signs, are so many times as short: a shorter dip is seen.
+    rocking: instants close together after which endless impacts are ended.
     """
-    return _Integration(system, np.asarray(times, float), touch, finer).run(displacement, velocity)
+    return _Integration(system, np.asarray(times, float), touch, finer, rocking).run(displacement, velocity)
 
 
 class _Integration:
-    def __init__(self, system, times, touch, finer):
-        self.times, self.touch = times, touch
+    def __init__(self, system, times, touch, finer, rocking):
+        self.times, self.touch, self.rocking = times, touch, rocking
         self.levels = Levels(system, times, finer)
         self.n = self.levels.n
 
@@ -67,7 +68,7 @@ class _Integration:
                     raise NoAnswer("too many events")
                 rocking = rocking + 1 if t - before <= 100 * instants.moment(t) else 0
                 before = t
-                if rocking > MOST_ROCKING:
+                if rocking > self.rocking:
                     y = instants.at_rest(y, t)
                 state, y = instants.settled(state, y, t, answer)
         if shown < len(self.times):
