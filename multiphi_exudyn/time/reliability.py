@@ -93,11 +93,12 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
 def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
     """Of the contact of which the modes of these levels leave out most of the static flexibility."""
     yield from _sticking(levels)
+    held = {link.name for level in levels[:1] for link in level.base.links if link.held}
     shares = [
         (share, name, level.modes)
         for level in levels
         for name, share in level.static_shares.items()
-        if name not in {link.name for link in level.base.links if link.held}
+        if name not in held
     ]
     share, name, modes = max(shares, default=(0.0, "", 0))
     if share >= CONTACT_SHARE:
