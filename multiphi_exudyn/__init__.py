@@ -42,6 +42,7 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
+from multiphi_exudyn.time.many import ManyRuns, simulate_many
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Ledger, Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
@@ -65,6 +66,7 @@ __all__ = [
     "Level",
     "LevelOverride",
     "LinearStructure",
+    "ManyRuns",
     "ModalDamping",
     "MultiPhiError",
     "MultiPhiModel",
@@ -91,6 +93,7 @@ __all__ = [
     "planar_beam",
     "read_structure",
     "simulate",
+    "simulate_many",
     "steady_state",
     "truncation_indicator",
 ]

@@ -5,5 +5,5 @@ constant or vary in time. A record keeps what the loop has done; a trajectory sa
 loop's own flow. What its truncated modes could not hold, and what to distrust in it, is read off it.
 
 Order: warning_groups, base_share, flow, quadrature, segment, friction_rows, sampling, work, growing, record,
-trajectory, defects, truncation, chatter, loop_record, loop, going_on, motion, refinement, reliability, simulate.
+trajectory, defects, truncation, chatter, loop_record, loop, going_on, motion, refinement, reliability, simulate, many.
 """
