@@ -91,7 +91,7 @@ def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> tuple
     return position, rate, drop_round_off(constant, size)
 
 
-def _columns(rows: list[tuple[float, ...]], width: int) -> list[np.ndarray]:
+def _columns(rows: Sequence[tuple[float, ...]], width: int) -> list[np.ndarray]:
     """Columns of a table: two of places, the others of numbers."""
     table = np.array(rows, float).reshape(-1, width).T
     return [table[0].astype(int), table[1].astype(int), *table[2:]]
