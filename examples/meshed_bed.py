@@ -89,8 +89,9 @@ class Bed:
         structure = strip(*mesh, stops)
         contacts = [mp.UnilateralContact(f"stop {i}", f"p{i}", GAP, STIFFNESS) for i in range(stops)]
         started = time.process_time()
-        self.model = mp.MultiPhiModel(structure, contacts, modes=MODES)
-        base, tip = self.model.base, f"p{stops - 1}"
+        most = mp.MultiPhiModel(structure, contacts, modes=MODES + REPEATS)
+        base, tip = most.base, f"p{stops - 1}"
+        self.model = dataclasses.replace(most, modes=MODES)
         bent = base.modes.shapes @ (self.model.base_load({tip: 1.0}) / base.modes.omega**2)
         self.start = LIFT / (structure.row(tip) @ bent) * bent
         self.model.level(())

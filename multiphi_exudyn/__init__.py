@@ -45,6 +45,7 @@ from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, 
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
 from multiphi_exudyn.time.balance import Ledger
+from multiphi_exudyn.time.many import ManyRuns, simulate_many
 from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -70,6 +71,7 @@ __all__ = [
     "Level",
     "LevelOverride",
     "LinearStructure",
+    "ManyRuns",
     "ModalDamping",
     "ModalStructure",
     "MultiPhiError",
@@ -100,6 +102,7 @@ __all__ = [
     "planar_beam",
     "read_structure",
     "simulate",
+    "simulate_many",
     "steady_state",
     "structure_from_modes",
     "truncation_indicator",

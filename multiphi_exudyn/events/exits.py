@@ -7,6 +7,8 @@ An exit whose element may not leave asks what it would say in the level entered:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
@@ -18,11 +20,13 @@ from multiphi_exudyn.mechanics.element import ElementState, Exit
 __all__ = [
     "after",
     "asked_alone",
+    "asked_state",
     "entered_row",
     "exits_of",
     "force_shares",
     "signal_row",
     "signal_rows",
+    "signal_table",
     "state_of",
     "way_back",
 ]
@@ -38,11 +42,16 @@ def exits_of(level: LoadedLevel) -> list[tuple[int, Exit]]:
     return [(i, exit_) for i in range(len(level.states)) for exit_ in state_of(level, i).exits]
 
 
+def asked_state(level: LoadedLevel, element: int, exit_: Exit) -> int:
+    """The number of the state that an exit of an element asks for."""
+    states = level.level.base.contacts[element].states
+    return next(number for number, state in enumerate(states) if state.name == exit_.asked)
+
+
 def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
     """The states of all elements after one has taken an exit."""
-    names = [state.name for state in level.level.base.contacts[element].states]
     states = list(level.states)
-    states[element] = names.index(exit_.asked)
+    states[element] = asked_state(level, element, exit_)
     return tuple(states)
 
 
@@ -55,17 +64,46 @@ def asked_alone(exit_: Exit) -> Exit:
 
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
-    """s of an element's exit in a level; a load that is a limit leaves no round-off of both."""
-    own, terms = level.level, [exit_.constant]
-    position, rate = np.zeros(own.modes), np.zeros(own.modes)
-    for share in exit_.shares:
-        link = own.base.link_places[element][share.link]
-        position, rate = position + share.gap * own.gap_rows[link], rate + share.rate * own.gap_rows[link]
-        terms.append(share.gap * float(level.gap_constants[link]))
-    for k, force in force_shares(level, element, exit_):
-        position, rate = position + force * own.force_rows[k], rate + force * own.force_rate_rows[k]
-        terms.append(force * float(level.asymptotic.forces[k]))
-    return Row(position, rate, float(drop_round_off(np.sum(terms), np.sum(np.abs(terms)))))
+    """s of an element's exit in a level."""
+    position, rate, constant = (part[0] for part in signal_table(level, [(element, exit_)]))
+    return Row(position, rate, float(constant))
+
+
+def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """s of exits of elements in a level: of xi (e, r), of xi' (e, r) and constant (e,).
+
+    A load that is a limit leaves no round-off of both.
+    """
+    own, count = level.level, len(exits)
+    places = own.base.link_places
+    moving = [
+        (k, places[element][share.link], share.gap, share.rate)
+        for k, (element, exit_) in enumerate(exits)
+        for share in exit_.shares
+    ]
+    pushing = [(k, *given) for k, (element, exit_) in enumerate(exits) for given in force_shares(level, element, exit_)]
+    position, rate = np.zeros((2, count, own.modes))
+    constant = np.array([exit_.constant for _, exit_ in exits], float)
+    size = np.abs(constant)
+    k, link, gap, speed = _columns(moving, 4)
+    np.add.at(position, k, gap[:, None] * own.gap_rows[link])
+    np.add.at(rate, k, speed[:, None] * own.gap_rows[link])
+    closing = gap * level.gap_constants[link]
+    constant += np.bincount(k, closing, count)
+    size += np.bincount(k, np.abs(closing), count)
+    k, place, force = _columns(pushing, 3)
+    np.add.at(position, k, force[:, None] * own.force_rows[place])
+    np.add.at(rate, k, force[:, None] * own.force_rate_rows[place])
+    pressing = force * level.asymptotic.forces[place]
+    constant += np.bincount(k, pressing, count)
+    size += np.bincount(k, np.abs(pressing), count)
+    return position, rate, drop_round_off(constant, size)
+
+
+def _columns(rows: Sequence[tuple[float, ...]], width: int) -> list[np.ndarray]:
+    """Columns of a table: two of places, the others of numbers."""
+    table = np.array(rows, float).reshape(-1, width).T
+    return [table[0].astype(int), table[1].astype(int), *table[2:]]
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:
@@ -77,7 +115,8 @@ def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[in
 def signal_rows(level: LoadedLevel) -> list[Row]:
     """s of all exits of a level, which keeps them."""
     if "signals" not in level.entries:
-        level.entries["signals"] = [signal_row(level, element, exit_) for element, exit_ in exits_of(level)]
+        table = signal_table(level, exits_of(level))
+        level.entries["signals"] = [Row(position, rate, float(c)) for position, rate, c in zip(*table, strict=True)]
     rows: list[Row] = level.entries["signals"]
     return rows
 

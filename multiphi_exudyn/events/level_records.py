@@ -9,7 +9,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.exits import after, exits_of, signal_row
+from multiphi_exudyn.events.exits import asked_state, exits_of, signal_row, signal_table
 from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
@@ -71,10 +71,20 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
     """The record of a signal."""
+    return _put_signals(buffers, level, (row.position[None, :], row.rate[None, :], np.array([row.constant])))[0]
+
+
+def _put_signals(
+    buffers: Buffers, level: LoadedLevel, table: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> list[list[int]]:
+    """The records of signals (exits.signal_table)."""
+    position, rate, constant = table
     r, shapes = level.modal.modes, level.modal.response.shapes
-    at = buffers.put("numbers", np.concatenate([row.position, row.rate, [row.constant]]))
-    waves = buffers.put("waves", np.concatenate([row.position[:r] @ shapes, row.rate[:r] @ shapes]))
-    return [at, waves, int(np.any(row.rate))]
+    numbers = np.hstack([position, rate, constant[:, None]])
+    waves = np.hstack([position[:, :r] @ shapes, rate[:, :r] @ shapes])
+    at, wave, rates = buffers.put("numbers", numbers), buffers.put("waves", waves), np.any(rate, axis=1).tolist()
+    count, width = numbers.shape[1], waves.shape[1]
+    return [[at + k * count, wave + k * width, int(moves)] for k, moves in enumerate(rates)]
 
 
 def _record(buffers: Buffers, given: dict[int, int]) -> int:
@@ -95,7 +105,7 @@ def _put_response(buffers: Buffers, level: Level) -> int:
     """The record of a level's response (response_arrays.py)."""
     response, put = level.response, buffers.put
     maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-    basis, reached = _put_basis(buffers, response.basis), buffers.take("ints", 2 * len(response.poles))
+    basis, reached = _put_basis(buffers, response.basis), put("ints", response_arrays.reached_modes(maps))
     places = [put("waves", values) for values in maps]
     places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
     chains = [len(response.chains)]
@@ -103,9 +113,7 @@ def _put_response(buffers: Buffers, level: Level) -> int:
         parts = chain.mixing, chain.shapes.T, chain.pushes
         chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
     places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
-    record = put("ints", [level.modes, basis, reached, *places])
-    response_arrays.reached_modes(buffers.ints, buffers.waves, record)
-    return record
+    return put("ints", [level.modes, basis, reached, *places])
 
 
 def _put_basis(buffers: Buffers, basis: Exponentials) -> int:
@@ -119,13 +127,11 @@ def _put_basis(buffers: Buffers, basis: Exponentials) -> int:
 
 def _put_exits(buffers: Buffers, level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> int:
     """Records of the exits of a level."""
-    records = buffers.take("ints", a.EXIT_INTS * len(exits))
-    for k, (i, exit_) in enumerate(exits):
-        asked = after(level, i, exit_)[i]
-        values = [i, asked, exit_.firmness, *put_signal(buffers, level, signal_row(level, i, exit_)), -1]
-        values += _turn(buffers, level, i, exit_)
-        buffers.ints[records + a.EXIT_INTS * k : records + a.EXIT_INTS * (k + 1)] = values
-    return records
+    signals, table = _put_signals(buffers, level, signal_table(level, exits)), list[list[int]]()
+    for signal, (i, exit_) in zip(signals, exits, strict=True):
+        asked = asked_state(level, i, exit_)
+        table.append([i, asked, exit_.firmness, *signal, -1, *_turn(buffers, level, i, exit_)])
+    return buffers.put("ints", np.array(table, dtype=int))
 
 
 def _turn(buffers: Buffers, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
@@ -133,5 +139,5 @@ def _turn(buffers: Buffers, level: LoadedLevel, element: int, exit_: Exit) -> li
     if exit_.turn is None:
         return [-1] * (a.EXIT_INTS - a.TURN)
     speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
-    asked = [after(level, element, Exit(name))[element] for name in (exit_.turn.forward, exit_.turn.backward)]
+    asked = [asked_state(level, element, Exit(name)) for name in (exit_.turn.forward, exit_.turn.backward)]
     return [*put_signal(buffers, level, speed), *asked]

@@ -73,6 +73,8 @@ def _turned(
     rows = np.vstack([base.directions.T, base.points])
     sizes = np.concatenate([np.linalg.norm(rows, axis=1), np.ones(base.modes.count)])
     free, squares, vectors = np.flatnonzero(squares == 0), squares.copy(), vectors.copy()
+    if not len(free):
+        return turned(squares, vectors, rows, sizes)
     resisted, rotation = np.linalg.eigh(vectors[:, free].T @ damping @ vectors[:, free])
     drifting = int(np.sum(resisted <= UNDAMPED * np.max(np.abs(damping), initial=0.0)))
     if 0 < drifting < len(free):

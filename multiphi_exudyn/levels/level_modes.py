@@ -8,8 +8,10 @@ w = sqrt|K| Phi^T p, as
 
 again by singular values; mu = 0 unless the level is indefinite or nearly so.
 
-Where a quarter of the modes or fewer are asked for, in a base without rigid-body modes and with no K < 0, they are the
-largest eigenvectors of the level's compliance, a matrix of rank d away from the base's,
+Where one direction alone is closed, with K > 0, the lowest modes are those of a rank-one change, roots of its secular
+equation (secular_equation.py). Where a quarter of the modes or fewer are asked for otherwise, in a base without
+rigid-body modes and with no K < 0, they are the largest eigenvectors of the level's compliance, a matrix of rank d away
+from the base's,
 
     A = Omega^-2 - Omega^-2 P (1/K + P^T Omega^-2 P)^-1 P^T Omega^-2            (rigid: 1/K = 0)
 
@@ -33,11 +35,13 @@ import scipy.sparse.linalg
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.modes import right_singular_vectors
+from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
 
 __all__ = ["level_modes"]
 
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
 FEW = 4  # modes of the base for each mode asked for: from there on the compliance is the cheaper way to them
+ROOTED = 50  # modes of a base from which roots of the secular equation are cheaper than all singular values
 LARGE = 150  # modes of a base from which iterations are the cheaper way to the few
 APART = 1e-6  # relative distance of two compliances at least, to count what lies beyond the middle between them
 
@@ -48,9 +52,30 @@ def level_modes(
     """omega^2 ascending, modes (m, r), the lowest ``modes`` at least or all, and the mu that limits their accuracy."""
     if not closed_directions.members:
         return base.modes.omega[:modes] ** 2, np.eye(base.modes.count, modes), 0.0
+    if modes is not None and base.modes.count >= ROOTED:
+        found = _rank_one(base, closed_directions, modes)
+        if found is not None:
+            return found
     if modes is not None and _few(base, closed_directions, modes):
         return _lowest(base, closed_directions, modes)
     return _modes(base, closed_directions, _null_space(closed_directions.vectors[:, closed_directions.rigid]))
+
+
+def _rank_one(
+    base: ModalBase, closed_directions: ClosedDirections, modes: int
+) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """``_modes``, the lowest ones only, where they are those of a rank-one change."""
+    sprung = np.flatnonzero(closed_directions.stiffness)
+    if len(sprung) != 1 or closed_directions.stiffness[sprung[0]] < 0:
+        return None
+    along, stiffness = closed_directions.vectors[:, sprung[0]], closed_directions.stiffness[sprung[0]]
+    found = rank_one_modes(base.modes.omega**2, along, float(stiffness), modes)
+    if found is None:
+        return None
+    squares, vectors = found
+    if math.isinf(stiffness):
+        vectors = vectors - np.outer(along, along @ vectors) / (along @ along)
+    return squares, vectors, 0.0
 
 
 def _modes(

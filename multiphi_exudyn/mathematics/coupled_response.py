@@ -76,15 +76,22 @@ def _moving(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse
     r, rates, powers, columns, rows = len(shapes), list[complex](), list[int](), list[int](), []
     poles, chains = list[bool](), list[Chain]()
     for first, end in parts.groups:
-        raised, own = parts.powers(first, end), slice(first, end)
+        own = slice(first, end)
+        if end - first == 1:
+            rates.append(complex(parts.rates[first]))
+            powers.append(0)
+            columns.append(first)
+            rows.append(maps[:, own])
+            poles.append(True)
+            continue
+        raised = parts.powers(first, end)
         for i in range(end - first):
             rates += [complex(parts.rates[first])] * len(raised)
             powers += range(len(raised))
             columns += [first + i] * len(raised)
             rows.append(np.einsum("dj,mjr->mdr", raised[:, i], maps[:, own]))
-        poles += [end - first == 1] * (len(raised) * (end - first))
-        if end - first > 1:
-            chains.append(Chain(parts.mixing[own, own], shapes[:, own], maps[1][own]))
+        poles += [False] * (len(raised) * (end - first))
+        chains.append(Chain(parts.mixing[own, own], shapes[:, own], maps[1][own]))
     found = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, r), complex)
     basis = Exponentials(np.array(rates, complex), np.array(powers, int))
     nothing = np.zeros_like(found[0])

@@ -33,6 +33,9 @@ are one equation of second order.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -64,18 +67,12 @@ RESPONSE = 12  # ints of the record
 CHAIN = 4  # ints of a chain
 
 
-@compiled
-def reached_modes(ints: Ints, waves: Waves, response: int) -> None:
-    """Fill in the modes that every exponential takes part in: where V, A, B or P is not zero."""
-    r, p, reached = ints[response + MODES], ints[ints[response + FREE] + SIZE], ints[response + REACHED]
-    for j in range(p):
-        first, end = r, 0
-        for k in range(FROM_DISPLACEMENT, SHAPES + 1):
-            row = ints[response + k] + j * r
-            for i in range(r):
-                if waves[row + i] != 0:
-                    first, end = min(first, i), max(end, i + 1)
-        ints[reached + 2 * j], ints[reached + 2 * j + 1] = first, end
+def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
+    """The modes (p, 2) of every exponential, first and one past the last of those where a map (p, r) is not 0."""
+    part = np.any([given != 0 for given in maps], axis=0)
+    r, index = part.shape[1], np.arange(part.shape[1])
+    first = np.min(np.where(part, index, r), axis=1, initial=r)
+    return np.column_stack([first, np.max(np.where(part, index + 1, 0), axis=1, initial=0)])
 
 
 @compiled

@@ -46,8 +46,8 @@ class LinearStructure(Shown):
     free: (n,) the degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
 
     Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
-    of its modes and static shapes, 4 r + 40 + contacts + points, a few times while it is computed, and once the factors
-    of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.4 GB for matrices and mesh, at most 1.1 GB in all.
+    of its coordinates, r + 8 and some for each contact and point, a few times while it is computed, and once the
+    factors of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.5 GB for matrices and mesh, at most 0.8 GB in all.
 
     Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
     asymmetric matrix, a mass that is not positive definite, a negative diagonal of stiffness or damping.

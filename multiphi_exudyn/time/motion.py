@@ -59,13 +59,20 @@ class _Kept:
 class Motion:
     """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
 
-    compiled: False for the loop as plain Python. time [s]: how far it is. message: why it goes no further, or "".
-    start_loss: at a start without events. Nothing has happened before ``begin``, or ``advance``, is called.
+    compiled: False for the loop as plain Python. loop: what is called in its place. time [s]: how far it is. message:
+    why it goes no further, or "". start_loss: at a start without events. Nothing has happened before ``begin``, or
+    ``advance``, is called.
     """
 
-    def __init__(self, arrays: LevelArrays, start: Start, compiled: bool | None = None) -> None:
+    def __init__(
+        self,
+        arrays: LevelArrays,
+        start: Start,
+        compiled: bool | None = None,
+        loop: Callable[..., Any] | None = None,
+    ) -> None:
         self.arrays, self.start = arrays, start
-        self._loop: Callable[..., Any] = advance if compiled is False else carry
+        self._loop: Callable[..., Any] = loop or (advance if compiled is False else carry)
         self._measured: Measure = measure if compiled is False else measured
         self.model, self.levels = arrays.levels.model, arrays.levels
         self.time, self.message, self.start_loss = start.time, "", Loss()

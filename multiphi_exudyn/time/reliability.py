@@ -96,11 +96,12 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
 def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
     """Of the contact of which the modes of these levels leave out most of the static flexibility."""
     yield from _sticking(levels)
+    held = {link.name for level in levels[:1] for link in level.base.links if link.held}
     shares = [
         (share, name, level.modes)
         for level in levels
         for name, share in level.static_shares.items()
-        if name not in {link.name for link in level.base.links if link.held}
+        if name not in held
     ]
     share, name, modes = max(shares, default=(0.0, "", 0))
     if share >= CONTACT_SHARE:
@@ -173,7 +174,13 @@ def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -
     given += base.strain(start.displacement, start.penetrating, start.gaps)
     if lost <= ENERGY_SHARE * abs(given):
         return
-    yield from _energy_warning(lost, max(samples.largest_energy, abs(given)))
+    yield from _energy_warning(lost, abs(given) if _left_alone(trajectory) else max(samples.largest_energy, abs(given)))
+
+
+def _left_alone(trajectory: Trajectory) -> bool:
+    """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
+    excitation, model = listed(trajectory.segments).levels[0].excitation, trajectory.model
+    return not (excitation.histories or np.any(excitation.static) or model.general or model.overrides)
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:

@@ -7,8 +7,9 @@ on the way ends the trajectory early, with a status and its cause.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Run", "levels_of", "motion_of", "simulate", "started"]
+__all__ = ["Run", "Shared", "checked_end", "levels_of", "motion_of", "simulate", "started", "warned"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -68,17 +69,27 @@ def simulate(
     each of which is issued as a MultiPhiWarning too.
     Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
     """
-    if not isinstance(model, MultiPhiModel):
-        raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
-    model = _holding(model, loads, start)
-    run = started(Run(model, _time("t_end", t_end), displacement, velocity, loads, compiled, start))
+    end = checked_end(model, t_end)
+    trajectory = warned(Run(_holding(model, loads, start), end, displacement, velocity, loads, compiled, start))
+    issue(trajectory.warnings)
+    return trajectory
+
+
+def checked_end(model: MultiPhiModel, t_end: float) -> float:
+    """t_end [s] of runs of a model, if both can be."""
+    if not isinstance(model, MultiPhiModel):
+        raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
+    return _time("t_end", t_end)
+
+
+def warned(given: Run) -> Trajectory:
+    """The answer with its warnings, none of them issued."""
+    run, modes = started(given), given.model.modes
     trajectory = run.trajectory()
-    tolerance = model.modes if isinstance(model.modes, Tolerance) else None
     outside = base_warnings(trajectory.model, displacement=run.displacement, velocity=run.velocity)
-    found = (*warnings_of(trajectory, tolerance), *outside)
-    issue(found)
+    found = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *outside)
     return replace(trajectory, warnings=found) if found else trajectory
 
 
@@ -89,11 +100,22 @@ def _holding(model: MultiPhiModel, loads: Sequence[Load], start: Trajectory | Eq
     return model.holding(patterns(model.structure, loads))
 
 
+class Shared(Protocol):
+    """What many runs of one model under the same loads have in common (many.py)."""
+
+    def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
+        """The levels under the loads, made once."""
+
+    def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
+        """A run in these levels on arrays that no other run has at that time."""
+
+
 @dataclass(frozen=True)
 class Run:
     """What ``simulate`` is asked for, there is more about it there; t_end [s].
 
     rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
+    shared: what it has in common with other runs, None where it is alone.
     """
 
     model: MultiPhiModel
@@ -105,6 +127,7 @@ class Run:
     start: Trajectory | Equilibrium | None = None
     stretches: Mapping[str, float] | None = None
     rewound: bool = False
+    shared: Shared | None = None
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -129,7 +152,7 @@ class Run:
         before = self.start if isinstance(self.start, Trajectory) else None
         levels = self._levels(finer)
         start = _start(self, levels) if before is None else going_on(before, levels, self.rewound)
-        return motion_of(levels, start, self.compiled)
+        return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
@@ -139,6 +162,8 @@ class Run:
         def made() -> LoadedLevels:
             return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
 
+        if self.shared is not None:
+            return self.shared.levels((id(model), finer), made)
         return made() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), made)
 
     def _decided(self) -> Trajectory:

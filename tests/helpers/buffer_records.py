@@ -73,9 +73,9 @@ class Buffers:
 
     def put_response(self, response, squares, damping):
         """``modal_response(squares, damping)``."""
-        r, p = response.shapes.shape
+        r = len(response.shapes)
         maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-        basis, reached = self.put_basis(response.basis), self.put_ints(np.zeros(2 * p))
+        basis, reached = self.put_basis(response.basis), self.put_ints(response_arrays.reached_modes(maps))
         places = [self.put_waves(values) for values in maps]
         places += [self.put_numbers(squares), self.put_numbers(np.diagonal(damping) / 2)]
         chains = [len(response.chains)]
@@ -83,9 +83,7 @@ class Buffers:
             parts = chain.mixing, chain.shapes.T, chain.pushes
             chains += [len(chain.mixing), *(self.put_waves(part) for part in parts)]
         places += [self.put_ints(response.alone), self.put_ints(response.poles), self.put_ints(chains)]
-        record = self.put_ints([r, basis, reached, *places])
-        response_arrays.reached_modes(self.ints, self.waves, record)
-        return record
+        return self.put_ints([r, basis, reached, *places])
 
 
 class Search:

@@ -40,7 +40,7 @@ class TestFewModesOfALevel:
             assert np.abs(shown).max(initial=0) <= SUBSPACES * np.abs(full.force_rows).max(initial=0)
 
     @pytest.mark.parametrize("stiffness", [1e6, math.inf])
-    @pytest.mark.parametrize("closed", [1, 20])
+    @pytest.mark.parametrize("closed", [2, 20])
     def test_take_no_singular_values_but_theirs(self, monkeypatch, stiffness, closed):
         """A base of 200: what all its modes would cost is not paid for a quarter of them."""
         base, columns = bed(stiffness, n=200).base, []
@@ -53,6 +53,18 @@ class TestFewModesOfALevel:
         for modes in (12, 48):
             assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
         assert columns == [12, 48]
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    @pytest.mark.parametrize("twins", [False, True])
+    def test_one_contact_away_take_no_singular_values_and_no_iterations(self, monkeypatch, stiffness, twins):
+        base = bed(stiffness, n=80 if twins else 160, twins=twins).base
+        full = build_level(base, (7,))
+        for needless in ("right_singular_vectors", "_of_all", "_iterated"):
+            monkeypatch.setattr(f"multiphi_exudyn.levels.level_modes.{needless}", None)
+        few = build_level(base, (7,), 12)
+        assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
+        wanted = full.vectors[:, :12]
+        assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < 1e-10
 
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):

@@ -1,0 +1,214 @@
+"""Many runs of one model that differ in their starts alone, on all cores.
+
+A thread carries one run at a time, on arrays of its own; levels are built once, for all. The compiled loop lets other
+threads go on, and everything else of a run is done by one thread at a time, so a run is what it is alone, to the bit,
+however many threads there are. What is not asked for is not kept.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.levels.mode_choice import Tolerance, is_count
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.loads import Load, patterns
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.time.base_share import row_warnings
+from multiphi_exudyn.time.motion import Motion, carry
+from multiphi_exudyn.time.simulate import Run, checked_end, warned
+from multiphi_exudyn.time.trajectory import Start, Trajectory
+from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
+
+__all__ = ["ManyRuns", "simulate_many"]
+
+BAR_DELAY = 2.0  # s before a progress bar appears
+KEPT = 8  # levels under loads as finely interpolated as runs have needed
+
+_Start: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"
+
+
+@dataclass(frozen=True)
+class ManyRuns:
+    """What is kept of k runs.
+
+    points: (p,) as they were given. times: (t,) [s]. samples: (k, p, t) displacements of the points [m] at the times,
+    NaN from where a run has failed. events: (k,) their numbers. ends: (k,) how far each came [s].
+    status: (k,) "ok" or "failed". messages: (k,) the causes. warnings: (k,) what to distrust in each.
+    """
+
+    points: tuple[At, ...]
+    times: np.ndarray
+    samples: np.ndarray
+    events: np.ndarray
+    ends: np.ndarray
+    status: tuple[str, ...]
+    messages: tuple[str, ...]
+    warnings: tuple[tuple[str, ...], ...]
+
+
+def simulate_many(
+    model: MultiPhiModel,
+    t_end: float,
+    displacements: np.ndarray | None = None,
+    velocities: np.ndarray | None = None,
+    loads: Sequence[Load] = (),
+    points: Sequence[At] = (),
+    times: np.ndarray | None = None,
+    threads: int | None = None,
+) -> ManyRuns:
+    """Runs of ``model`` from 0 to t_end [s] from k starts, each as ``simulate`` would do it, to the bit.
+
+    displacements, velocities: (k, n) x and x' at t = 0, None for zero; one of them is needed. loads: of all runs.
+    points: names, {point: coefficient} or rows (n,), at which displacements are sampled. times: (t,) [s] at which, None
+    for the end alone. threads: None for as many as there are cores; the answer does not hang on it.
+
+    A run that fails, or whose start is refused, is a status of its row. Warnings are issued by their kinds, with the
+    numbers of the runs. Raises MultiPhiValueError or MultiPhiTypeError for bad input that is common to all.
+    """
+    from tqdm import tqdm
+
+    end, starts = checked_end(model, t_end), _starts(model, displacements, velocities)
+    wider = model.holding(patterns(model.structure, loads))
+    rows = [(isinstance(point, (str, Mapping)), model.structure.row(point)) for point in points]
+    outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]
+    Excitation.of(wider, loads, end)  # what is wrong with a load is so for all runs
+    given = Run(wider, end, loads=loads)
+    task = _Task(given, starts, tuple(points), _times(times, end))
+    with tqdm(total=len(starts), unit="run", disable=None, leave=False, delay=BAR_DELAY) as bar:
+        task.carry_out(_threads(threads), bar)
+    result = task.result()
+    groups = grouped((str(number), sentences) for number, sentences in enumerate(result.warnings))
+    issue((*outside, *(group.told(len(starts)) for group in groups)))
+    return result
+
+
+class _Task:
+    """Runs to be done, and what is kept of them; given: what they have in common.
+
+    lock: whoever has it works on levels and on what is kept.
+    """
+
+    def __init__(self, given: Run, starts: list[_Start], points: tuple[At, ...], times: np.ndarray) -> None:
+        self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
+        self.levels = BoundedCache[object, LoadedLevels](KEPT)
+        self._points, self._times, count = points, times, len(starts)
+        self._samples, self._ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
+        self._events, self._told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
+
+    def carry_out(self, threads: int, bar: Any) -> None:
+        """All runs; a Tolerance is decided by the first ones, one after the other."""
+        left, model = iter(range(len(self._starts))), self._given.model
+        while isinstance(model.modes, Tolerance) and model.decided is None and (number := next(left, None)) is not None:
+            self._run(number, None)
+            bar.update()
+        with ThreadPoolExecutor(threads) as pool:
+            working = [pool.submit(self._work, left, bar) for _ in range(threads)]
+            try:
+                for each in working:
+                    each.result()
+            finally:
+                self._stopped = True
+
+    def result(self) -> ManyRuns:
+        """What is kept."""
+        status, messages, warnings = zip(*self._told, strict=True)
+        kept = self._samples, self._events, self._ends
+        return ManyRuns(self._points, self._times, *kept, status, messages, warnings)
+
+    def _work(self, left: Iterator[int], bar: Any) -> None:
+        worker = _Worker(self)
+        with self.lock:
+            while not self._stopped and (number := next(left, None)) is not None:
+                self._run(number, worker)
+                bar.update()
+
+    def _run(self, number: int, worker: _Worker | None) -> None:
+        displacement, velocity = self._starts[number]
+        run = replace(self._given, displacement=displacement, velocity=velocity, shared=worker)
+        try:
+            trajectory = warned(run)
+            self._events[number], self._ends[number] = len(trajectory.events), trajectory.t_end
+            self._told[number] = trajectory.status, trajectory.message, trajectory.warnings
+            self._sample(number, trajectory)
+        except MultiPhiError as refused:
+            self._told[number] = "failed", str(refused), ()
+
+    def _sample(self, number: int, trajectory: Trajectory) -> None:
+        known = self._times <= trajectory.t_end
+        if not (trajectory.segments and np.any(known)):
+            return
+        with kept_back():
+            for place, point in enumerate(self._points):
+                self._samples[number, place, known] = trajectory.at(point, self._times[known])
+
+
+class _Worker:
+    """The arrays of a thread (simulate.Shared)."""
+
+    def __init__(self, task: _Task) -> None:
+        self._task = task
+        self._arrays = BoundedCache[LoadedLevels, LevelArrays](KEPT)
+
+    def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
+        """The levels under the loads, those of all threads."""
+        return self._task.levels.get_or_build(key, made)
+
+    def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
+        """A run on the thread's arrays."""
+        return Motion(self._arrays.get_or_build(levels, lambda: LevelArrays(levels)), start, compiled, self._loop)
+
+    def _loop(self, *given: Any) -> Any:
+        """The compiled loop, while others may go on."""
+        self._task.lock.release()
+        try:
+            return carry(*given)
+        finally:
+            self._task.lock.acquire()
+
+
+def _starts(model: MultiPhiModel, displacements: Any, velocities: Any) -> list[_Start]:
+    """x and x' of every start."""
+    n, needed = model.structure.n, "a (k, n) array of real numbers"
+    given = {"displacements": displacements, "velocities": velocities}
+    found = {name: real_array(name, values, needed) for name, values in given.items() if values is not None}
+    if not found:
+        raise MultiPhiTypeError(f"displacements: got None, and no velocities, need {needed}")
+    count = len(next(iter(found.values())))
+    for name, values in found.items():
+        if values.ndim != 2 or values.shape != (count, n) or not count:
+            raise MultiPhiValueError(f"{name}: got shape {values.shape}, need (k, {n}), k the same for both")
+    none = [None] * count
+    return list(zip(found.get("displacements", none), found.get("velocities", none), strict=True))
+
+
+def _times(given: Any, end: float) -> np.ndarray:
+    """The times of samples, ``end`` where none are given."""
+    if given is None:
+        return np.array([end])
+    times = np.asarray(real_array("times", given, "a list of times in s"))
+    if times.ndim != 1 or not np.all((times >= 0) & (times <= end)):
+        raise MultiPhiValueError(f"times: got {times}, need times from 0 to {end:g} s")
+    return times
+
+
+def _threads(given: int | None) -> int:
+    if given is None:
+        return os.cpu_count() or 1
+    if not is_count(given):
+        raise MultiPhiTypeError(f"threads: got {given!r}, need an integer or None")
+    if given < 1:
+        raise MultiPhiValueError(f"threads: got {given}, need at least 1")
+    return given

@@ -1,0 +1,120 @@
+"""Roots of the secular equation are eigenvalues to round-off, for symmetric structures too, in a few steps."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from multiphi_exudyn.mathematics import secular_equation
+from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
+
+COUNT = 12
+STIFFNESSES = [1e-6, 1.0, 1e3, 1e9, math.inf]
+
+
+def whole(d, p, k, count):
+    """The same from the whole matrix; its round-off is that of its largest number."""
+    if math.isinf(k):
+        free = scipy.linalg.null_space(p[None, :])
+        values, vectors = scipy.linalg.eigh(free.T @ (d[:, None] * free))
+        return values[:count], free @ vectors[:, :count]
+    values, vectors = scipy.linalg.eigh(np.diag(d) + k * np.outer(p, p))
+    return values[:count], vectors[:, :count]
+
+
+def check(d, p, k, found):
+    values, vectors = found
+    assert_allclose(vectors.T @ vectors, np.eye(len(values)), atol=1e-12)
+    forces = p @ vectors if math.isfinite(k) else np.zeros(len(values))
+    left = d[:, None] * vectors - vectors * values
+    if math.isinf(k):
+        assert np.max(np.abs(p @ vectors)) < 1e-12 * np.linalg.norm(p)
+        left -= np.outer(p, (p @ left) / (p @ p))
+    else:
+        left += k * np.outer(p, forces)
+    largest = np.max(d) + (k * (p @ p) if math.isfinite(k) else 0.0)
+    assert np.max(np.abs(left)) < 1e-13 * largest
+    assert np.all(np.diff(values) >= 0)
+
+
+@pytest.mark.parametrize("k", STIFFNESSES)
+def test_are_those_of_the_whole_matrix(k):
+    random = np.random.default_rng(1)
+    d, p = np.sort(random.uniform(1, 100, 60)), random.normal(size=60)
+    found = rank_one_modes(d, p, k, COUNT)
+    check(d, p, k, found)
+    values, vectors = whole(d, p, k, COUNT)
+    assert_allclose(found[0], values, rtol=1e-11 if k < 1e6 or math.isinf(k) else 1e-6)
+    if k < 1e6 or math.isinf(k):
+        signs = np.sign(np.sum(vectors * found[1], axis=0))
+        assert_allclose(found[1] * signs, vectors, atol=1e-10)
+
+
+@pytest.mark.parametrize("k", STIFFNESSES)
+@pytest.mark.parametrize("absent", [slice(0, None, 2), slice(1, None, 2), slice(0, 9), slice(5, None)])
+def test_modes_that_do_not_move_the_contact_stay(k, absent):
+    """A contact on a line of symmetry: every other mode has a node there."""
+    random = np.random.default_rng(2)
+    d, p = np.sort(random.uniform(1, 100, 40)), random.normal(size=40)
+    p[absent] = 0.0
+    count = 4
+    found = rank_one_modes(d, p, k, count)
+    check(d, p, k, found)
+    for value in d[:count][p[:count] == 0]:
+        if value <= found[0][-1]:
+            assert np.min(np.abs(found[0] - value)) == 0
+
+
+@pytest.mark.parametrize("k", STIFFNESSES)
+@pytest.mark.parametrize("times", [2, 3])
+def test_of_equal_frequencies_one_direction_is_moved(k, times):
+    """A square plate, or equal beams side by side."""
+    random = np.random.default_rng(3)
+    d = np.repeat(np.sort(random.uniform(1, 100, 20)), times)
+    p = random.normal(size=len(d))
+    found = rank_one_modes(d, p, k, COUNT)
+    check(d, p, k, found)
+    assert_allclose(found[0][: times - 1], d[0], rtol=1e-15)
+    assert_allclose(found[0], whole(d, p, k, COUNT)[0], rtol=1e-12 if k < 1e6 or math.isinf(k) else 1e-6)
+
+
+@given(st.integers(0, 2**31), st.sampled_from(STIFFNESSES), st.floats(0, 14), st.floats(0, 12))
+def test_clusters_and_components_of_any_size(seed, k, nearest, smallest):
+    """Neighbours down to round-off of each other, components over many orders."""
+    random = np.random.default_rng(seed)
+    d = 1 + np.cumsum(10.0 ** random.uniform(-nearest, 1, 30))
+    p = random.normal(size=30) * 10.0 ** random.uniform(-smallest, 0, 30)
+    found = rank_one_modes(d, p, k, 8)
+    assert found is not None
+    check(d, p, k, found)
+    index = np.arange(8)
+    assert np.all(found[0] >= d[index])
+    assert np.all(found[0] <= d[index + 1])
+
+
+def test_soft_modes_keep_their_digits_beside_stiff_ones():
+    """omega^2 over sixteen orders: those of the whole matrix would have none left."""
+    d = 10.0 ** np.arange(-8, 9)
+    values, _ = rank_one_modes(d, np.ones(17), math.inf, 8)
+    residual = np.sum(1 / (d - values[:, None]), axis=1)
+    slope = np.sum(1 / (d - values[:, None]) ** 2, axis=1)
+    assert np.max(np.abs(residual / slope) / values) < 1e-14
+
+
+@pytest.mark.parametrize("k", STIFFNESSES)
+def test_all_roots_take_a_few_steps(monkeypatch, k):
+    steps, step = [], secular_equation._middle_way
+    monkeypatch.setattr(secular_equation, "_middle_way", lambda *given: steps.append(1) or step(*given))
+    omega = np.arange(1, 201) ** 2.0
+    rank_one_modes(omega**2, np.sin(0.7 * np.arange(1, 201)), k, COUNT)
+    assert len(steps) <= 8
+
+
+def test_more_than_there_are_between_the_poles_are_left_to_others():
+    assert rank_one_modes(np.arange(1.0, 6), np.ones(5), 1.0, 5) is None
+    assert rank_one_modes(np.arange(1.0, 6), np.ones(5), math.inf, 5) is None
+    assert rank_one_modes(np.arange(1.0, 6), np.zeros(5), 1.0, 3) is None

@@ -1,0 +1,167 @@
+"""Many runs at once are each what they are alone, to the bit, however many threads there are."""
+
+import math
+import threading
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from small_structures import bed, chain, stop
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.mathematics.compiled import available
+from multiphi_exudyn.time import many
+
+END = 6.0
+TIMES = np.linspace(0, END, 13)
+
+
+def model(modes=4, **contact):
+    stops = [stop("m5", 0.1, **contact), stop({"m2": -1.0}, 0.12, 40.0, name="above")]
+    return mp.MultiPhiModel(chain(6, damping=mp.RayleighDamping(0.02, 0.01), stiffness=30.0), stops, modes=modes)
+
+
+def starts(count, seed=0, n=6):
+    return np.random.default_rng(seed).uniform(-0.09, 0.35, (count, n))
+
+
+def alone(given, starts, **options):
+    """What ``simulate_many`` keeps, from runs one by one of a model that has built nothing."""
+    runs = []
+    for x in starts:
+        with many.kept_back():
+            runs.append(mp.simulate(given, END, displacement=x, **options))
+    return runs
+
+
+def check(found, runs, points):
+    assert found.status == tuple(run.status for run in runs)
+    assert found.messages == tuple(run.message for run in runs)
+    assert found.warnings == tuple(run.warnings for run in runs)
+    assert_array_equal(found.events, [len(run.events) for run in runs])
+    assert_array_equal(found.ends, [run.t_end for run in runs])
+    for k, run in enumerate(runs):
+        for p, point in enumerate(points):
+            assert_array_equal(found.samples[k, p], run.at(point, TIMES))
+
+
+LOADS = {
+    "none": (),
+    "constant": (mp.ConstantLoad("m3", 0.2),),
+    "harmonic": (mp.HarmonicLoad("m1", 0.3, 0.2),),
+    "function": (mp.FunctionLoad("m1", lambda t: 0.1 * np.sin(t)),),
+}
+
+
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+@pytest.mark.parametrize("loads", LOADS)
+@pytest.mark.parametrize("stiffness", [50.0, math.inf])
+def test_are_those_of_simulate_to_the_bit(loads, stiffness):
+    points = ("m5", {"m0": 1.0, "m2": -2.0}, np.eye(6)[4])
+    given, x = LOADS[loads], starts(9)
+    runs = alone(model(stiffness=stiffness), x, loads=given)
+    assert sum(len(run.events) for run in runs) > 20
+    for threads in (1, 3):
+        found = mp.simulate_many(
+            model(stiffness=stiffness), END, x, loads=given, points=points, times=TIMES, threads=threads
+        )
+        check(found, runs, points)
+
+
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+def test_many_levels_are_built_once_for_all():
+    stops, random = bed(1e5, n=60, stops=20), np.random.default_rng(1)
+    shapes = stops.level(()).shapes[:, :4]
+    velocities = (shapes @ random.normal(size=(4, 8))).T
+    found = mp.simulate_many(stops, 0.02, velocities=velocities, threads=4)
+    built = stops.levels_built
+    assert built > 20
+    mp.simulate_many(stops, 0.02, velocities=velocities[::-1], threads=2)
+    assert stops.levels_built == built
+    assert found.samples.shape == (8, 0, 1)
+    assert np.sum(found.events) > 50
+
+
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+def test_a_tolerance_is_decided_by_the_first_run():
+    first, second = model(mp.Tolerance(0.02)), model(mp.Tolerance(0.02))
+    runs = alone(first, starts(4))
+    check(mp.simulate_many(second, END, starts(4), points=["m5"], times=TIMES, threads=3), runs, ["m5"])
+    assert second.decided.modes == first.decided.modes
+
+
+class TestARunThatFails:
+    def test_is_a_status_of_its_row(self, monkeypatch):
+        """Refused, inside a rigid stop; not finite; and failed on the way, by chatter that is looked for too early."""
+        x = starts(5)
+        x[1, 5], x[3, 0] = -1.0, math.nan
+        found = mp.simulate_many(model("all"), END, x, points=["m5"], times=TIMES, threads=2)
+        assert found.status == ("ok", "failed", "ok", "failed", "ok")
+        assert "inside the rigid contact" in found.messages[1]
+        assert "NaN" in found.messages[3]
+        assert np.all(np.isnan(found.samples[[1, 3]]))
+        assert np.all(np.isfinite(found.samples[[0, 2, 4]]))
+        monkeypatch.setattr("multiphi_exudyn.time.motion.allowed", lambda model: 1e-3)
+        monkeypatch.setattr("multiphi_exudyn.time.motion.window", lambda model: 2)
+        found = mp.simulate_many(model("all"), END, x[:1], points=["m5"], times=TIMES)
+        assert found.status == ("failed",)
+        assert "chatter" in found.messages[0]
+        assert 0 < found.ends[0] < END
+        assert_array_equal(np.isnan(found.samples[0, 0]), found.ends[0] < TIMES)
+
+    def test_warnings_are_issued_by_their_kinds(self):
+        with pytest.warns(mp.MultiPhiWarning, match="truncated contact: 3 of 3 runs") as issued:
+            mp.simulate_many(model(2, stiffness=50.0), END, starts(3))
+        kinds = [str(one.message).partition(":")[0] for one in issued]
+        assert len(kinds) == len(set(kinds))
+
+
+@pytest.mark.skipif(not available(), reason="plain Python holds the interpreter's lock")
+def test_threads_are_in_the_loop_at_the_same_time(monkeypatch):
+    """Each waits in the loop until all are there, which would never be if it kept the others out."""
+    here, carry = threading.Barrier(3, timeout=60), many.carry
+    waited = []
+
+    def waiting(*given):
+        if len(waited) < 3:
+            waited.append(1)
+            here.wait()
+        return carry(*given)
+
+    monkeypatch.setattr(many, "carry", waiting)
+    found = mp.simulate_many(model("all"), END, starts(3), threads=3)
+    assert found.status == ("ok",) * 3
+    assert not here.broken
+
+
+def test_an_error_that_is_nobodys_ends_all(monkeypatch):
+    def broken(*_):
+        time.sleep(0.01)
+        raise RuntimeError("a fault of the program")
+
+    monkeypatch.setattr(many, "carry", broken)
+    with pytest.raises(RuntimeError, match="a fault of the program"):
+        mp.simulate_many(model("all"), END, starts(50), threads=2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "begins"),
+    [
+        (TypeError, {"displacements": None}, "displacements: got None, and no velocities"),
+        (ValueError, {"displacements": np.zeros(6)}, "displacements: got shape (6,)"),
+        (ValueError, {"displacements": np.zeros((0, 6))}, "displacements: got shape (0, 6)"),
+        (ValueError, {"velocities": np.zeros((2, 6))}, "velocities: got shape (2, 6)"),
+        (ValueError, {"points": ["m9"]}, "point: got 'm9'"),
+        (ValueError, {"loads": [mp.ConstantLoad("m9", 1.0)]}, "point: got 'm9'"),
+        (TypeError, {"loads": mp.ConstantLoad("m1", 1.0)}, "loads: got ConstantLoad"),
+        (ValueError, {"times": [0.0, 7.0], "points": ["m0"]}, "times: got"),
+        (ValueError, {"threads": 0}, "threads: got 0"),
+        (TypeError, {"threads": 2.0}, "threads: got 2.0"),
+        (TypeError, {"model": None}, "model: got NoneType"),
+        (ValueError, {"t_end": -1.0}, "t_end: got -1.0"),
+    ],
+)
+def test_bad_input_is_refused(refused, kind, changes, begins):
+    given = {"model": model("all"), "t_end": END, "displacements": np.zeros((3, 6))}
+    refused(kind, begins, mp.simulate_many, **(given | changes))
