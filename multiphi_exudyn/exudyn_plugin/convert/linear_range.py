@@ -68,6 +68,18 @@ def _told(left_out: Sequence[str]) -> Iterator[str]:
         yield f"left out: {part}; this motion is without it"
 
 
+def _let_go(trajectory: Trajectory) -> Iterator[str]:
+    """Of contacts with dampers that opened: at that instant Exudyn's pull."""
+    damped = {contact.name for contact in trajectory.model.contacts if getattr(contact, "damping", 0.0)}
+    opened = [event.contact for event in trajectory.events if event.kind == "open" and event.contact in damped]
+    if opened:
+        also = f" (and {len(set(opened)) - 1} more)" if len(set(opened)) > 1 else ""
+        yield (
+            f"contact damper: at {opened[0]!r}{also} it does not pull where the contact opens, as Exudyn's does, so "
+            "rebounds differ from Exudyn's"
+        )
+
+
 class LinearRange:
     """Validity of a model that ``reduce`` made: asks its system, and names what was left out (grouped sentences).
 
@@ -79,7 +91,7 @@ class LinearRange:
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
-        return (*_told(self._left_out), *self.check(trajectory).sentences)
+        return (*_told(self._left_out), *_let_go(trajectory), *self.check(trajectory).sentences)
 
     def __copy__(self) -> LinearRange:
         return self
@@ -102,7 +114,8 @@ class LinearRange:
             return RangeCheck(times, np.zeros(len(times)))
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
-        extent = Extent(reach, float(np.max(sizes)), float(np.max(speeds) / np.max(sizes)))
+        rate = max(float(np.max(speeds) / np.max(sizes)), 1.0 / trajectory.t_end)  # no motion is slower than its run
+        extent = Extent(reach, float(np.max(sizes)), rate)
         known = [contact for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.beside(self._mbs) as compared:
             errors = [
@@ -169,7 +182,7 @@ class LinearLimits:
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
-        return (*_told(self._left_out), *self.check(trajectory).sentences)
+        return (*_told(self._left_out), *_let_go(trajectory), *self.check(trajectory).sentences)
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """The error at many times, every mode alone: TOLERANCE at its limit, in proportion to its amplitude."""

@@ -47,9 +47,10 @@ class Extent:
 class Linearisation:
     """M z'' + C z' + K z = static + (contacts and loads by functions of time), q = displacement + basis z.
 
-    mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n). displacement,
-    velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad]. contacts: rows
-    (n_full,) by name. loads: by index of the system.
+    mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n).
+    displacement, velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad].
+    symmetrised: of which matrices the other part is left out, a sentence each. contacts: rows (n_full,) by name.
+    loads: by index of the system.
     """
 
     mass: np.ndarray
@@ -61,6 +62,7 @@ class Linearisation:
     velocity: np.ndarray
     time: float
     largest: float
+    symmetrised: tuple[str, ...] = ()
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
     loads: Mapping[int, TimedLoad] = field(default_factory=dict)
 

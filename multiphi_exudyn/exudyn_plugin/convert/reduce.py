@@ -50,6 +50,7 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Item", "Reduction", "reduce"]
 
+SMALL = 100  # coordinates up to which all modes are kept unless told: a run then has the accuracy of the system's own
 HELD = 1e-9  # of a row's largest entry before projection: a contact that moves less is held by constraints
 
 
@@ -59,7 +60,9 @@ class Reduction:
 
     model: structure, contacts, modes. velocity: z'(0), (n,); the displacement z(0) is zero. loads: p, none if zero,
     and those by functions of time.
-    taken: every item of the model. left_out: what is no part of it, with the reason.
+    taken: every item of the model. left_out: what is no part of it, with the reason. symmetrised: matrices that were
+    not symmetric, by how much and between which coordinates; their symmetric part is taken, and what the other part
+    does is found by ``check``.
     """
 
     model: MultiPhiModel
@@ -67,6 +70,7 @@ class Reduction:
     loads: tuple[Load, ...]
     taken: tuple[Item, ...]
     left_out: tuple[tuple[Item, str], ...]
+    symmetrised: tuple[str, ...] = ()
 
     @property
     def structure(self) -> LinearizedStructure:
@@ -81,7 +85,8 @@ class Reduction:
         size = f"{self.structure.n} degrees of freedom, {len(self.model.contacts)} contacts, modes: {self.model.modes}"
         taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
         left = [f"  {line}" for line in grouped(self.left_out)]
-        return "\n".join([size, "taken", *taken, "left out", *(left or ["  nothing"])])
+        made = ["made symmetric", *(f"  {sentence}" for sentence in self.symmetrised)] if self.symmetrised else []
+        return "\n".join([size, "taken", *taken, *made, "left out", *(left or ["  nothing"])])
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """How far a trajectory of this model left the linear range (linear_range.py); its warnings say so too."""
@@ -106,14 +111,15 @@ class Reduction:
 
 def reduce(
     mbs: Any,
-    modes: int | str | UpTo | Tolerance = 12,
+    modes: int | str | UpTo | Tolerance | None = None,
     points: Mapping[str, Any] | None = None,
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
     strict: bool = False,
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
-    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them.
+    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them. None: all
+    of a small system, else chosen from static shares.
     points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
     ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``; friction is that of
     the latter where it is the law of ``mp.Friction``, with the object's name.
@@ -164,6 +170,7 @@ def reduce(
         ),
         taken,
         left_out,
+        linear.symmetrised,
     )
 
 
@@ -176,7 +183,9 @@ def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) ->
             yield load_item(i, load, f"constant load{held}")
 
 
-def _modes(modes: int | str | UpTo | Tolerance, most: int) -> int | str | UpTo | Tolerance:
+def _modes(modes: int | str | UpTo | Tolerance | None, most: int) -> int | str | UpTo | Tolerance | None:
+    if modes is None:
+        return "all" if most <= SMALL else None
     return "all" if isinstance(modes, int) and modes > most else modes
 
 
