@@ -24,6 +24,7 @@ __all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
 
 TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
 SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
+DENSE = 100  # the same where user functions are to be seen, which may act in a part of the run only
 ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
 SAMPLES = 256  # times at which the largest displacement and velocity are looked for
 PROBED = 12  # lowest modes of which limits are kept: those that move far
@@ -83,15 +84,19 @@ def _let_go(trajectory: Trajectory) -> Iterator[str]:
 class LinearRange:
     """Validity of a model that ``reduce`` made: asks its system, and names what was left out (grouped sentences).
 
+    asked: the part of what was left out that the system has at any state, which is named where the two disagree.
     Pickled it becomes ``LinearLimits``; a copy asks the same system.
     """
 
-    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str]) -> None:
-        self._mbs, self._linear, self._left_out = mbs, linear, tuple(left_out)
+    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str], asked: Sequence[str] = ()) -> None:
+        self._mbs, self._linear = mbs, linear
+        self._left_out, self._asked = tuple(part for part in left_out if part not in asked), tuple(asked)
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
-        return (*_told(self._left_out), *_let_go(trajectory), *self.check(trajectory).sentences)
+        found = self.check(trajectory)
+        missing = self._left_out if found.holds else (*self._left_out, *self._asked)
+        return (*_told(missing), *_let_go(trajectory), *found.sentences)
 
     def __copy__(self) -> LinearRange:
         return self
@@ -100,14 +105,14 @@ class LinearRange:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LinearLimits, (self._left_out, *self._limits)
+        return LinearLimits, ((*self._left_out, *self._asked), *self._limits)
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """The error of a trajectory of this model at a few instants."""
         samples, z, z_t = _sampled(trajectory)
         linear = self._linear
         sizes, speeds = linear.size(z), linear.size(z_t)
-        spread = np.linspace(0.0, trajectory.t_end, SPREAD + 1)[1:]
+        spread = np.linspace(0.0, trajectory.t_end, (DENSE if self._asked else SPREAD) + 1)[1:]
         times = np.unique([*spread, samples[np.argmax(sizes)], samples[np.argmax(speeds)]])
         reach = float(np.max(np.abs(linear.basis @ z)))
         if not reach > ROUND_OFF * linear.largest:

@@ -123,7 +123,8 @@ class Compared:
         return least / extent.size
 
     def _driven(self, time: float) -> np.ndarray:
-        """Give the system its loads by functions of time; their generalised force (n_full,) in the linearisation."""
+        """Give the system its time and its loads by functions of it; their force (n_full,) in the linearisation."""
+        self._full.set_time(self._linear.time + time)
         total = np.zeros(len(self._linear.displacement))
         for index, load in self._linear.loads.items():
             value = load.value(time)

@@ -40,7 +40,7 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 __all__ = ["LinearizedStructure", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
-SYMMETRISED = 0.02  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
+SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
 

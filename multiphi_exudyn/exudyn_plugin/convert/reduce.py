@@ -30,6 +30,7 @@ from multiphi_exudyn.exudyn_plugin.convert.items import (
     has_stops,
     left_out_functions,
     left_out_objects,
+    linearised_functions,
     load_item,
     missing_parts,
     taken_objects,
@@ -160,7 +161,7 @@ def reduce(
     if strict and missing:
         raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
     linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed)
-    validity = LinearRange(mbs, linear, missing)
+    validity = LinearRange(mbs, linear, missing, linearised_functions(left_out))
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
         linear.basis.T @ linear.velocity,
