@@ -37,7 +37,7 @@ AGREEMENT = 0.01
 SAMPLES = 200  # of a run
 FIELDS = ("script", "verdict", "error", "named", "told")
 NO_RUN = "no run"
-FINER = 8  # times as many steps, where an error may be that of Exudyn's own run
+FINER = (8, 64)  # times as many steps, where an error may be that of Exudyn's own run
 RENAMED = {"bodyOrNodeList": "itemNumbers", "bodyList": "bodyNumbers"}
 SHAPES = ("Rectangle", "OrthoCubePoint", "OrthoCubeLines", "CheckerBoard", "Cylinder", "Sphere", "Basis")
 
@@ -189,10 +189,11 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     told = "; ".join(trajectory.warnings)
     try:
         error = _error(settings, solve, start, shown, trajectory)
-        if not told and error > AGREEMENT:  # is it the error of Exudyn's own steps?
-            settings.timeIntegration.numberOfSteps *= FINER
-            coarse, error = error, _error(settings, solve, start, shown, trajectory)
-            told = f"with {FINER} times as many steps of Exudyn's own run, {coarse:.2g} with the script's"
+        for finer in () if trajectory.warnings else FINER:  # is it the error of Exudyn's own steps?
+            if error > AGREEMENT:
+                settings.timeIntegration.numberOfSteps *= FINER[0]
+                error, coarse = _error(settings, solve, start, shown, trajectory), error
+                told += f"{coarse:.2g}, with {finer} times as many steps of Exudyn's own run {error:.2g}; "
     except Exception as failure:  # whatever the script's own run raises
         return _verdict(NO_RUN, "", mbs, f"{type(failure).__name__}: {failure}")
     verdict = "warned" if trajectory.warnings else "agrees" if error <= AGREEMENT else "WRONG"

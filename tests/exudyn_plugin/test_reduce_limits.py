@@ -164,6 +164,26 @@ def test_a_user_function_that_does_more_is_warned_of_by_name(force):
     assert any(said.startswith("linear range: the motion has left it") for said in told)
 
 
+def test_small_errors_that_add_up_to_a_shift_are_told():
+    """Duffing's oscillator: omega^2 grows by 3/4 e for a force k u (1 + e (u / a)^2) at the amplitude a."""
+    e, amplitude, end = 0.004, 0.01, 60.0
+
+    def force(mbs, t, i, u, v, k, d, offset):
+        return k * u * (1 + e * (u / amplitude) ** 2)
+
+    system = Mass(velocity=amplitude * 20.0, data=1)
+    given = {"markerNumbers": system.markers, "stiffness": 200.0, "springForceUserFunction": force}
+    system.mbs.AddObject(eii.CoordinateSpringDamper(name="spring", **given))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    found = reduction.check(simulated(reduction, end))
+    assert found.error < 0.01
+    assert found.lag == pytest.approx(3 / 8 * e * 20.0 * end, rel=0.3)
+    assert not found.holds
+    assert "oscillations are shifted by some" in found.sentences[0]
+    assert reduction.check(simulated(reduction, 1.0)).holds
+
+
 def test_a_damped_contact_that_opens_is_warned_of():
     system = spring_mass()
     law = {"contactStiffness": 1e5, "contactDamping": 5.0, "offset": -0.005}

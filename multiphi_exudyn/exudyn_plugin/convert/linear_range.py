@@ -23,6 +23,8 @@ from multiphi_exudyn.time.trajectory import Trajectory
 __all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
 
 TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
+SAME = 1e-3  # error up to which user functions do what the model does: a hundred times what differentiating them leaves
+LAG = 0.05  # rad: shift of an oscillation from which a motion is told to have left the range; an error of 4 %
 SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
 DENSE = 100  # the same where user functions are to be seen, which may act in a part of the run only
 ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
@@ -33,11 +35,15 @@ LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of t
 
 @dataclass(frozen=True)
 class RangeCheck:
-    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none."""
+    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none.
+
+    lag: by how much [rad] errors that repeat in every oscillation shift it until the end of the run, about.
+    """
 
     times: np.ndarray
     errors: np.ndarray
     reason: str = ""
+    lag: float = 0.0
 
     @property
     def error(self) -> float:
@@ -47,7 +53,7 @@ class RangeCheck:
     @property
     def holds(self) -> bool:
         """Whether the motion stayed within the linear range; False where nothing could be checked."""
-        return self.error <= TOLERANCE
+        return self.error <= TOLERANCE and self.lag <= LAG
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -56,12 +62,30 @@ class RangeCheck:
             return (f"linear range: not checked, {self.reason}",)
         if self.holds:
             return ()
+        if self.error <= TOLERANCE:
+            return (
+                f"linear range: forces of the Exudyn system that the model lacks are small ({100 * self.error:.2g} %), "
+                f"but change frequencies: at the end of the run its oscillations are shifted by some {self.lag:.1g} rad",
+            )
         found = self.times[np.argmax(self.errors > TOLERANCE)]
         away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
         return (
             f"linear range: the motion has left it by t = {found:.3g} s: forces of the Exudyn system that the model "
             f"lacks move it {away} of its largest displacement away; make the motion smaller, or solve the system",
         )
+
+
+def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
+    """Shift [rad] of oscillations through ``turned`` [rad]: half the relative change of omega^2 times what they turn.
+
+    away, amplitudes: (k, n), how far the model is off and what it does, mode by mode, at the instants looked at.
+    """
+    moving = amplitudes - np.mean(amplitudes, axis=0)
+    powers = np.sum(moving**2, axis=1)
+    if not np.max(powers) > 0:
+        return 0.0
+    lasting = np.mean(powers) / np.max(powers)  # share of the run in which it moves
+    return float(0.5 * turned * lasting * abs(np.sum(away * moving)) / np.sum(powers))
 
 
 def _told(left_out: Sequence[str]) -> Iterator[str]:
@@ -95,7 +119,7 @@ class LinearRange:
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
         found = self.check(trajectory)
-        missing = self._left_out if found.holds else (*self._left_out, *self._asked)
+        missing = self._left_out if found.error <= SAME else (*self._left_out, *self._asked)
         return (*_told(missing), *_let_go(trajectory), *found.sentences)
 
     def __copy__(self) -> LinearRange:
@@ -123,7 +147,7 @@ class LinearRange:
         extent = Extent(reach, float(np.max(sizes)), rate)
         known = [contact for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.beside(self._mbs) as compared:
-            errors = [
+            found = [
                 compared.error(
                     trajectory.displacement(t),
                     trajectory.velocity(t),
@@ -134,7 +158,9 @@ class LinearRange:
                 )
                 for t in times
             ]
-        return RangeCheck(times, np.array(errors))
+        errors, away = (np.array(parts) for parts in zip(*found, strict=True))
+        amplitudes = (linear.modes[1].T @ (linear.mass @ trajectory.displacement(times))).T
+        return RangeCheck(times, errors, lag=_lag(away, amplitudes, rate * trajectory.t_end))
 
     def _changed(self) -> str:
         """Why the system is no longer the one that was reduced, as far as its size tells; empty if it is."""
@@ -176,7 +202,7 @@ class LinearRange:
             return True  # nothing acts on it
         extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
         with self._linear.beside(self._mbs) as compared:
-            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE) <= TOLERANCE
+            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE)[0] <= TOLERANCE
 
 
 class LinearLimits:

@@ -97,8 +97,8 @@ class Compared:
         enough: float,
         time: float = 0.0,
         contacts: Mapping[str, float] | None = None,
-    ) -> float:
-        """The error at displacement and velocity (n,), at a time [s] of the run.
+    ) -> tuple[float, np.ndarray]:
+        """The error at displacement and velocity (n,), at a time [s] of the run, and c + d (n,) by modes.
 
         contacts: forces [N] of contacts and frictions by name. enough: an error that is small; stiff modes relax only
         as long as it is larger.
@@ -109,18 +109,19 @@ class Compared:
         force = linear.static + linear.basis.T @ (pushed + self._driven(time))
         force = force - linear.stiffness @ z - linear.damping @ z_t
         squares, shapes = linear.modes
-        relaxed, least = np.zeros(len(z)), math.inf
+        relaxed, least, away = np.zeros(len(z)), math.inf, np.zeros(len(z))
         for softest in _stages(squares, extent.rate):
             displacement = linear.displacement + linear.basis @ (z + shapes @ relaxed)
             moved = self._full.moved(displacement, linear.basis @ z_t, pushed, extent.reach)
             more = shapes.T @ (linear.mass @ (linear.basis.T @ moved.accelerations) - force)
             drift = more / np.maximum(squares, extent.rate**2)
             found = np.hypot(np.linalg.norm(relaxed) + np.linalg.norm(drift), moved.shift)
-            least = min(least, float(found))
+            if found < least:
+                least, away = float(found), relaxed + drift
             if least <= enough * extent.size:
                 break
             relaxed = relaxed + np.where(squares >= softest, drift, 0.0)
-        return least / extent.size
+        return least / extent.size, away
 
     def _driven(self, time: float) -> np.ndarray:
         """Give the system its time and its loads by functions of it; their force (n_full,) in the linearisation."""
