@@ -180,7 +180,7 @@ def test_small_errors_that_add_up_to_a_shift_are_told():
     assert found.error < 0.01
     assert found.lag == pytest.approx(3 / 8 * e * 20.0 * end, rel=0.3)
     assert not found.holds
-    assert "oscillations are shifted by some" in found.sentences[0]
+    assert "oscillations are off by some" in found.sentences[0]
     assert reduction.check(simulated(reduction, 1.0)).holds
 
 

@@ -65,7 +65,7 @@ class RangeCheck:
         if self.error <= TOLERANCE:
             return (
                 f"linear range: forces of the Exudyn system that the model lacks are small ({100 * self.error:.2g} %), "
-                f"but change frequencies: at the end of the run its oscillations are shifted by some {self.lag:.1g} rad",
+                f"but change frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
             )
         found = self.times[np.argmax(self.errors > TOLERANCE)]
         away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
@@ -84,7 +84,7 @@ def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
     powers = np.sum(moving**2, axis=1)
     if not np.max(powers) > 0:
         return 0.0
-    lasting = np.mean(powers) / np.max(powers)  # share of the run in which it moves
+    lasting = min(1.0, 2 * float(np.mean(powers) / np.max(powers)))  # share of the run in which it moves; of a sine 1
     return float(0.5 * turned * lasting * abs(np.sum(away * moving)) / np.sum(powers))
 
 
