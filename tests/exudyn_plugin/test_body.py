@@ -434,10 +434,10 @@ def solve(model, start, chosen, store=True, solver=RADIUS_ONE, **given):
 @pytest.mark.parametrize(
     ("said", "radius", "given"),
     [
-        ("spectralRadius: got 0.9, need 1", 0.9, {}),
+        ("spectralRadius 0.9", 0.9, {}),
         ("matchedStepSize of 'multiPhi0': got 0.0002 s", 1.0, {"matchedStepSize": 2e-4}),
         ("need storeSolver=True", 1.0, {"store": False}),
-        ("need GeneralizedAlpha or TrapezoidalIndex2", 1.0, {"solver": exu.DynamicSolverType.RK44}),
+        ("got RK44, which is explicit", 1.0, {"solver": exu.DynamicSolverType.RK44}),
     ],
 )
 def test_settings_under_which_it_would_be_wrong_are_refused(said, radius, given):
@@ -528,19 +528,35 @@ def test_what_the_body_raises_inside_a_step_comes_out_as_it_is(refused):
 @pytest.mark.parametrize(
     ("said", "given"),
     [
-        ("spectralRadius: got 0.9, need 1 with the Multi-Phi body 'multiPhi0': set simulationSettings.timeInt", {}),
-        ("solver: got RK44, need GeneralizedAlpha or Trap", {"solverType": exu.DynamicSolverType.RK44}),
+        ("solver: got GeneralizedAlpha with spectralRadius 0.9 (Exudyn's default is 0.9)", {}),
+        ("solver: got RK44, which is explicit; need an impl", {"solverType": exu.DynamicSolverType.RK44}),
     ],
 )
 def test_the_first_line_of_a_wrong_solver_is_what_to_set(refused, said, given):
     model, start = rig(COMPLIANT)
     chosen = exu.SimulationSettings()
     chosen.solution.file.write = False
-    for solve_dynamic in (exu.MainSystem.SolveDynamic, exu.SolveDynamic):
+    for solve_dynamic in (exu.MainSystem.SolveDynamic, exu.SolveDynamic, exu.solver.SolveDynamic):
         container, mbs = new_system()
         CreateMultiPhiBody(mbs, model, displacement=start)
         mbs.Assemble()
         refused(ValueError, said, solve_dynamic, mbs, chosen, **given)
+        del container
+
+
+def test_a_solver_that_is_called_itself_is_refused_as_plainly(refused):
+    model, start = rig(COMPLIANT)
+    chosen = exu.SimulationSettings()
+    chosen.solution.file.write = False
+    implicit, explicit = exu.MainSolverImplicitSecondOrder(), exu.MainSolverExplicit()
+    for solver, said in (
+        (implicit, "SolveDynamic: got a solver that is not stored"),
+        (explicit, "solver: got MainSolverExplicit, which is explicit"),
+    ):
+        container, mbs = new_system()
+        CreateMultiPhiBody(mbs, model, displacement=start)
+        mbs.Assemble()
+        refused(ValueError, said, solver.SolveSystem, mbs, chosen)
         del container
 
 

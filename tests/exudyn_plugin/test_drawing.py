@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, Drawing
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, Drawing, PositionInterface
 from multiphi_exudyn.exudyn_plugin.body.drawing import BLOCK, graphics_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 from reference_models.solver_settings import fixed_steps
@@ -38,11 +38,11 @@ def rig():
     return model, bent * initial_displacement() / float(model.structure.row("node3") @ bent)
 
 
-def system(drawing, matched=STEP):
+def system(drawing, matched=STEP, **given):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     items = CreateMultiPhiBody(
-        mbs, rig()[0], name="beam", displacement=rig()[1], matchedStepSize=matched, drawing=drawing
+        mbs, rig()[0], name="beam", displacement=rig()[1], matchedStepSize=matched, drawing=drawing, **given
     )
     mbs.Assemble()
     container.visualizationSettings.view0.window.renderWindowSize = [240, 120]
@@ -115,8 +115,23 @@ def test_every_redraw_has_one_bar_between_neighbours_and_one_block_a_stop():
     drawing = Drawing.of_beam(rig_beam(), 20)
     _, mbs, _ = system(drawing)
     mbs.systemData.SetSystemState(mbs.systemData.GetSystemState(exu.ConfigurationType.Initial), SHOWN)
-    shapes = graphics_of(mbs.variables["multiPhi"]["beam"], drawing)(mbs, 0)
+    body = mbs.variables["multiPhi"]["beam"]
+    shapes = graphics_of(body, drawing, [-1.0] * 4)(mbs, 0)
     assert len(shapes) == len(drawing.rows) - 1 + 1
+    red = graphics_of(body, drawing, [1.0, 0.0, 0.0, 1.0])(mbs, 0)
+    assert np.allclose(np.reshape(red[0]["colors"], (-1, 4)), [1.0, 0.0, 0.0, 1.0], atol=1e-6)
+    assert np.array_equal(red[-1]["colors"], shapes[-1]["colors"])
+
+
+def test_show_and_color_are_those_of_the_items():
+    tip = PositionInterface((0.6, 0.0), [None, "node3"])
+    _, mbs, items = system(None, show=False, color=[1.0, 0.0, 0.0, 1.0], interface={"tip": tip})
+    seen = mbs.GetObject(items["oGenericODE2"]), mbs.GetNode(items["nInterface"]["tip"])
+    for item in seen:
+        assert item["Vshow"] is False
+        assert np.allclose(item["Vcolor"], [1.0, 0.0, 0.0, 1.0])
+    with pytest.raises(mp.MultiPhiError, match="color: got"):
+        system(None, color=[1.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -361,9 +361,9 @@ class MultiPhiBody:
         integration = settings.timeIntegration.generalizedAlpha
         if not (trapezoidal or integration.useNewmark) and integration.spectralRadius != 1:
             raise MultiPhiValueError(
-                f"spectralRadius: got {integration.spectralRadius:g}, need 1 with the Multi-Phi body {self.name!r}: "
-                "set simulationSettings.timeIntegration.generalizedAlpha.spectralRadius = 1, or "
-                "solverType=exu.DynamicSolverType.TrapezoidalIndex2"
+                f"solver: got GeneralizedAlpha with spectralRadius {integration.spectralRadius:g} (Exudyn's default is "
+                f"0.9), with which events of the Multi-Phi body {self.name!r} are not exact; need TrapezoidalIndex2 or "
+                "spectralRadius = 1: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
             )
         if self.coordinates.interface is not None and not (trapezoidal or integration.useIndex2Constraints):
             raise MultiPhiValueError(

@@ -45,6 +45,7 @@ def CreateMultiPhiBody(
     show: bool = True,
     drawing: Drawing | None = None,
     start: Trajectory | Equilibrium | None = None,
+    color: Sequence[float] = (-1.0, -1.0, -1.0, -1.0),
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
 
@@ -57,8 +58,8 @@ def CreateMultiPhiBody(
     one coordinate each, or {name: PositionInterface or RigidInterface}, positions and frames to which markers of
     positions and of rigid bodies attach (interface_nodes.py); needs TrapezoidalIndex2 and constant loads. Where an
     ObjectContactCoordinate acts on them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``:
-    shorter steps than the others are no gain, and with matchedStepSize an error. show: as in other Create
-    functions. drawing: None, or how the renderer shows the body.
+    shorter steps than the others are no gain, and with matchedStepSize an error. show, color: as in other
+    Create functions (RGBA, negative for the usual). drawing: None, or how the renderer shows the body.
 
     Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, and {name: SensorIndex},
     the forces on its coordinates), nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
@@ -79,7 +80,7 @@ def CreateMultiPhiBody(
     if isinstance(model.modes, Tolerance):
         raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
     _check_step(matchedStepSize)
-    check_drawing(drawing, model)
+    check_drawing(drawing, color, model)
     nodes = interface_nodes(model.structure, interface)
     body = MultiPhiBody(
         name,
@@ -98,9 +99,10 @@ def CreateMultiPhiBody(
             f"loads: got {', '.join(sorted(varying))} with an interface, need constant loads (a varying force can be a "
             "load of the system on an interface coordinate)"
         )
-    body.items.update(_add_items(mbs, body, show, drawing))
+    look = {"show": show, "color": list(color)}
+    body.items.update(_add_items(mbs, body, look, drawing))
     if nodes:
-        _add_interface(mbs, body, nodes, show)
+        _add_interface(mbs, body, nodes, look)
     body.items.update(add_sensors(mbs, body))
     bodies.add(body)
     if model.contacts or nodes or matchedStepSize is not None or body.varies:
@@ -127,7 +129,7 @@ def _motion(run: Run) -> Motion:
     return motion
 
 
-def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None) -> dict[str, Any]:
+def _add_items(mbs: Any, body: MultiPhiBody, look: dict[str, Any], drawing: Drawing | None) -> dict[str, Any]:
     stepped, (q, q_t) = body.stepped_level(body.state.states), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
@@ -145,7 +147,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
             nodeNumbers=[node],
             **matrices(stepped, body.force_vector(stepped)),
             visualization=VObjectGenericODE2(
-                show=show, graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing)
+                **look, graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing, look["color"])
             ),
         )
     )
@@ -159,8 +161,8 @@ def _add_items(mbs: Any, body: MultiPhiBody, show: bool, drawing: Drawing | None
     return items
 
 
-def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], show: bool) -> None:
+def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], look: dict[str, Any]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, nodes, body.model.most_levels)
     stepped = body.stepped_level(body.state.states)
-    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, show)
+    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, look)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors

@@ -12,7 +12,7 @@ moves is drawn where it is at rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -92,8 +92,11 @@ class Drawing:
         return np.asarray(surface - math.copysign((1 + BLOCK / 2) * self.radius, coefficient) * self.direction)
 
 
-def check_drawing(drawing: Any, model: MultiPhiModel) -> None:
-    """Raises unless ``drawing`` is None or one of this model's structure."""
+def check_drawing(drawing: Any, color: Any, model: MultiPhiModel) -> None:
+    """Raises unless ``drawing`` is None or one of this model's structure, and ``color`` four numbers."""
+    shade = real_array("color", color, "four numbers, red, green, blue and opacity")
+    if shade.shape != (4,) or not np.all(np.isfinite(shade)):
+        raise MultiPhiValueError(f"color: got {color}, need four numbers, red, green, blue and opacity")
     if drawing is None:
         return
     if not isinstance(drawing, Drawing):
@@ -103,14 +106,17 @@ def check_drawing(drawing: Any, model: MultiPhiModel) -> None:
         raise MultiPhiValueError(f"{received}, need {model.structure.n}, the structure's degrees of freedom")
 
 
-def graphics_of(body: MultiPhiBody, drawing: Drawing) -> Callable[[Any, int], list[dict[str, Any]]]:
-    """A graphicsDataUserFunction of the body's object."""
+def graphics_of(
+    body: MultiPhiBody, drawing: Drawing, color: Sequence[float]
+) -> Callable[[Any, int], list[dict[str, Any]]]:
+    """A graphicsDataUserFunction of the body's object; color: RGBA of its bars, a negative one is the usual."""
+    shown = BODY if color[0] < 0 else color
     stops = _stops(body.model, drawing)
 
     def draw(mbs: Any, itemNumber: int) -> list[dict[str, Any]]:
         deflections, closed = _shown_state(mbs, body, drawing.rows)
         blocks = [_block(centre, bool(closed[i]), drawing.radius) for i, centre in stops.items()]
-        return _bars(drawing.line(deflections), drawing.radius) + blocks
+        return _bars(drawing.line(deflections), drawing.radius, shown) + blocks
 
     return draw
 
@@ -140,9 +146,9 @@ def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.nda
     return moved[:, 0], body.coordinates.layout.states(data) > 0
 
 
-def _bars(line: np.ndarray, radius: float) -> list[dict[str, Any]]:
+def _bars(line: np.ndarray, radius: float, color: Sequence[float]) -> list[dict[str, Any]]:
     return [
-        graphics.Cylinder(a.tolist(), (b - a).tolist(), radius, color=list(BODY), nTiles=SIDES)
+        graphics.Cylinder(a.tolist(), (b - a).tolist(), radius, color=list(color), nTiles=SIDES)
         for a, b in pairwise(line)
     ]
 

@@ -1,18 +1,21 @@
 """SolveDynamic with Multi-Phi bodies: what they need of the solver is checked before it starts.
 
 Inside a run Exudyn wraps what a body raises in an error of its own, which blames the user's functions. Called as a
-method of the system or from the module, SolveDynamic checks before, and what a body raises in a run comes out as it is.
-A run of the implicit solver, by SolveDynamic or not, in which the bodies have not been called to its end raises then.
+method of the system or from Exudyn's modules, SolveDynamic checks before, and so does an explicit solver that is called
+itself; what a body raises in a run comes out as it is. A run of the implicit solver, by SolveDynamic or not, in which
+the bodies have not been called to its end raises then.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import exudyn as exu
+import exudyn.solver
 
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.exudyn_plugin.body.switching import BODIES, check_solver
@@ -25,13 +28,13 @@ _CHECKED = "_multiPhiChecked"  # marks a function that checks already
 
 def install_checks() -> None:
     """Let Exudyn's SolveDynamic check what Multi-Phi bodies need; systems without them are solved as before."""
-    for place in (exu.MainSystem, exu):
+    for place in (exu.MainSystem, exu, exu.solver):
         present = place.SolveDynamic
         if not hasattr(present, _CHECKED):
             place.SolveDynamic = _checked(present)
-    if not hasattr(exu.MainSolverImplicitSecondOrder.SolveSystem, _CHECKED):
-        solver: Any = exu.MainSolverImplicitSecondOrder
-        solver.SolveSystem = _watched(solver.SolveSystem)
+    for solver, watched in ((exu.MainSolverImplicitSecondOrder, _watched), (exu.MainSolverExplicit, _refused)):
+        if not hasattr(solver.SolveSystem, _CHECKED):
+            solver.SolveSystem = watched(solver.SolveSystem)
 
 
 def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
@@ -46,12 +49,8 @@ def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
             check_solver(kind in IMPLICIT, kind.name, bodies)
             for body in bodies.values():
                 body.check_integration(settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
-        try:
+        with _own_errors():
             return solve(mbs, simulationSettings, solverType, *given, **named)
-        except Exception as error:
-            if isinstance(error.__cause__, MultiPhiError):
-                raise error.__cause__ from None
-            raise
 
     setattr(solve_dynamic, _CHECKED, True)
     return solve_dynamic
@@ -65,7 +64,8 @@ def _watched(solve: Callable[..., Any]) -> Callable[..., Any]:
             return solve(solver, mbs, *given, **named)
         bodies.begin()
         try:
-            found = solve(solver, mbs, *given, **named)
+            with _own_errors():
+                found = solve(solver, mbs, *given, **named)
         except BaseException:
             bodies.clock.next_time = -math.inf
             raise
@@ -75,3 +75,26 @@ def _watched(solve: Callable[..., Any]) -> Callable[..., Any]:
 
     setattr(solve_system, _CHECKED, True)
     return solve_system
+
+
+def _refused(solve: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(solve)
+    def solve_system(solver: Any, mbs: Any, *given: Any, **named: Any) -> Any:
+        bodies = mbs.variables.get(BODIES)
+        if bodies is not None and bodies.installed(mbs):
+            check_solver(False, type(solver).__name__, bodies)
+        return solve(solver, mbs, *given, **named)
+
+    setattr(solve_system, _CHECKED, True)
+    return solve_system
+
+
+@contextmanager
+def _own_errors() -> Iterator[None]:
+    """What a body raised in a user function of Exudyn, without Exudyn's error around it."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error.__cause__, MultiPhiError):
+            raise error.__cause__ from None
+        raise

@@ -204,8 +204,8 @@ def check_solver(implicit: bool, name: str, bodies: Mapping[str, Any]) -> None:
     """Raises for a dynamic solver that has no implicit steps."""
     if not implicit:
         raise MultiPhiValueError(
-            f"solver: got {name}, need GeneralizedAlpha or TrapezoidalIndex2 with the Multi-Phi body "
-            f"{next(iter(bodies))!r}: set solverType=exu.DynamicSolverType.TrapezoidalIndex2"
+            f"solver: got {name}, which is explicit; need an implicit one for the Multi-Phi body "
+            f"{next(iter(bodies))!r}: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
         )
 
 

@@ -103,6 +103,10 @@ class FullSystem:
             mbs.systemData.SetTime(time)
             yield cls(mbs, solver, displacement, velocity)
 
+    def set_time(self, time: float) -> None:
+        """Let user functions see a time [s]."""
+        self._mbs.systemData.SetTime(time)
+
     def load(self, index: int, value: np.ndarray) -> None:
         """Give a load by a user function its value at present, (k,)."""
         load = exu.LoadIndex(index)

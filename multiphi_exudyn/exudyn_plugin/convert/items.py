@@ -23,6 +23,7 @@ __all__ = [
     "is_curved",
     "left_out_functions",
     "left_out_objects",
+    "linearised_functions",
     "load_item",
     "missing_parts",
     "rough_parameters",
@@ -36,6 +37,7 @@ HELD_GAP = "constraints hold its gap"
 HELD_GAPS = "constraints hold the gaps of its limit stops"
 HELD_FRICTION = "constraints hold the coordinate of its friction"
 IDLE = (INACTIVE, HELD_GAP, HELD_GAPS, HELD_FRICTION)  # reasons for which leaving an item out changes no motion
+USER_FUNCTION = "what its user function does away from the current state"  # which a run's check asks the system for
 NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"
@@ -153,6 +155,11 @@ def missing_parts(left_out: Iterable[tuple[Item, str]]) -> list[str]:
     return grouped((item, reason) for item, reason in left_out if reason not in IDLE)
 
 
+def linearised_functions(left_out: Iterable[tuple[Item, str]]) -> list[str]:
+    """The part of it that the system itself can be asked for at any state, grouped."""
+    return grouped((item, reason) for item, reason in left_out if reason == USER_FUNCTION)
+
+
 def load_item(index: int, load: Mapping[str, Any], became: str = "") -> Item:
     return Item(load["name"], index, f"Load{load['loadType']}", became)
 
@@ -200,7 +207,7 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str) -
     if is_constraint(item) and (user_function(item).startswith("offset") or _prescribes_velocity(item)):
         return "the motion it prescribes; its coordinate is held where it is"
     if user_function(item):
-        return "what its user function does away from the current state"
+        return USER_FUNCTION
     return ""
 
 

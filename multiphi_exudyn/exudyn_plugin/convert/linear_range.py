@@ -23,7 +23,10 @@ from multiphi_exudyn.time.trajectory import Trajectory
 __all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
 
 TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
+SAME = 1e-3  # error up to which user functions do what the model does: a hundred times what differentiating them leaves
+LAG = 0.05  # rad: shift of an oscillation from which a motion is told to have left the range; an error of 4 %
 SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
+DENSE = 100  # the same where user functions are to be seen, which may act in a part of the run only
 ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
 SAMPLES = 256  # times at which the largest displacement and velocity are looked for
 PROBED = 12  # lowest modes of which limits are kept: those that move far
@@ -32,11 +35,15 @@ LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of t
 
 @dataclass(frozen=True)
 class RangeCheck:
-    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none."""
+    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none.
+
+    lag: by how much [rad] errors that repeat in every oscillation shift it until the end of the run, about.
+    """
 
     times: np.ndarray
     errors: np.ndarray
     reason: str = ""
+    lag: float = 0.0
 
     @property
     def error(self) -> float:
@@ -46,7 +53,7 @@ class RangeCheck:
     @property
     def holds(self) -> bool:
         """Whether the motion stayed within the linear range; False where nothing could be checked."""
-        return self.error <= TOLERANCE
+        return self.error <= TOLERANCE and self.lag <= LAG
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -55,6 +62,11 @@ class RangeCheck:
             return (f"linear range: not checked, {self.reason}",)
         if self.holds:
             return ()
+        if self.error <= TOLERANCE:
+            return (
+                f"linear range: forces of the Exudyn system that the model lacks are small ({100 * self.error:.2g} %), "
+                f"but change frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
+            )
         found = self.times[np.argmax(self.errors > TOLERANCE)]
         away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
         return (
@@ -63,23 +75,52 @@ class RangeCheck:
         )
 
 
+def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
+    """Shift [rad] of oscillations through ``turned`` [rad]: half the relative change of omega^2 times what they turn.
+
+    away, amplitudes: (k, n), how far the model is off and what it does, mode by mode, at the instants looked at.
+    """
+    moving = amplitudes - np.mean(amplitudes, axis=0)
+    powers = np.sum(moving**2, axis=1)
+    if not np.max(powers) > 0:
+        return 0.0
+    lasting = min(1.0, 2 * float(np.mean(powers) / np.max(powers)))  # share of the run in which it moves; of a sine 1
+    return float(0.5 * turned * lasting * abs(np.sum(away * moving)) / np.sum(powers))
+
+
 def _told(left_out: Sequence[str]) -> Iterator[str]:
     for part in left_out:
         yield f"left out: {part}; this motion is without it"
 
 
+def _let_go(trajectory: Trajectory) -> Iterator[str]:
+    """Of contacts with dampers that opened: at that instant Exudyn's pull."""
+    damped = {contact.name for contact in trajectory.model.contacts if getattr(contact, "damping", 0.0)}
+    opened = [event.contact for event in trajectory.events if event.kind == "open" and event.contact in damped]
+    if opened:
+        also = f" (and {len(set(opened)) - 1} more)" if len(set(opened)) > 1 else ""
+        yield (
+            f"contact damper: at {opened[0]!r}{also} it does not pull where the contact opens, as Exudyn's does, so "
+            "rebounds differ from Exudyn's"
+        )
+
+
 class LinearRange:
     """Validity of a model that ``reduce`` made: asks its system, and names what was left out (grouped sentences).
 
+    asked: the part of what was left out that the system has at any state, which is named where the two disagree.
     Pickled it becomes ``LinearLimits``; a copy asks the same system.
     """
 
-    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str]) -> None:
-        self._mbs, self._linear, self._left_out = mbs, linear, tuple(left_out)
+    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str], asked: Sequence[str] = ()) -> None:
+        self._mbs, self._linear = mbs, linear
+        self._left_out, self._asked = tuple(part for part in left_out if part not in asked), tuple(asked)
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
-        return (*_told(self._left_out), *self.check(trajectory).sentences)
+        found = self.check(trajectory)
+        missing = self._left_out if found.error <= SAME else (*self._left_out, *self._asked)
+        return (*_told(missing), *_let_go(trajectory), *found.sentences)
 
     def __copy__(self) -> LinearRange:
         return self
@@ -88,24 +129,25 @@ class LinearRange:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LinearLimits, (self._left_out, *self._limits)
+        return LinearLimits, ((*self._left_out, *self._asked), *self._limits)
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """The error of a trajectory of this model at a few instants."""
         samples, z, z_t = _sampled(trajectory)
         linear = self._linear
         sizes, speeds = linear.size(z), linear.size(z_t)
-        spread = np.linspace(0.0, trajectory.t_end, SPREAD + 1)[1:]
+        spread = np.linspace(0.0, trajectory.t_end, (DENSE if self._asked else SPREAD) + 1)[1:]
         times = np.unique([*spread, samples[np.argmax(sizes)], samples[np.argmax(speeds)]])
         reach = float(np.max(np.abs(linear.basis @ z)))
         if not reach > ROUND_OFF * linear.largest:
             return RangeCheck(times, np.zeros(len(times)))
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
-        extent = Extent(reach, float(np.max(sizes)), float(np.max(speeds) / np.max(sizes)))
+        rate = max(float(np.max(speeds) / np.max(sizes)), 1.0 / trajectory.t_end)  # no motion is slower than its run
+        extent = Extent(reach, float(np.max(sizes)), rate)
         known = [contact for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.beside(self._mbs) as compared:
-            errors = [
+            found = [
                 compared.error(
                     trajectory.displacement(t),
                     trajectory.velocity(t),
@@ -116,7 +158,9 @@ class LinearRange:
                 )
                 for t in times
             ]
-        return RangeCheck(times, np.array(errors))
+        errors, away = (np.array(parts) for parts in zip(*found, strict=True))
+        amplitudes = (linear.modes[1].T @ (linear.mass @ trajectory.displacement(times))).T
+        return RangeCheck(times, errors, lag=_lag(away, amplitudes, rate * trajectory.t_end))
 
     def _changed(self) -> str:
         """Why the system is no longer the one that was reduced, as far as its size tells; empty if it is."""
@@ -158,7 +202,7 @@ class LinearRange:
             return True  # nothing acts on it
         extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
         with self._linear.beside(self._mbs) as compared:
-            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE) <= TOLERANCE
+            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE)[0] <= TOLERANCE
 
 
 class LinearLimits:
@@ -169,7 +213,7 @@ class LinearLimits:
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
-        return (*_told(self._left_out), *self.check(trajectory).sentences)
+        return (*_told(self._left_out), *_let_go(trajectory), *self.check(trajectory).sentences)
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """The error at many times, every mode alone: TOLERANCE at its limit, in proportion to its amplitude."""

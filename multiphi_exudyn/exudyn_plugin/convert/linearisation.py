@@ -47,9 +47,10 @@ class Extent:
 class Linearisation:
     """M z'' + C z' + K z = static + (contacts and loads by functions of time), q = displacement + basis z.
 
-    mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n). displacement,
-    velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad]. contacts: rows
-    (n_full,) by name. loads: by index of the system.
+    mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n).
+    displacement, velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad].
+    symmetrised: of which matrices the other part is left out, a sentence each. contacts: rows (n_full,) by name.
+    loads: by index of the system.
     """
 
     mass: np.ndarray
@@ -61,6 +62,7 @@ class Linearisation:
     velocity: np.ndarray
     time: float
     largest: float
+    symmetrised: tuple[str, ...] = ()
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
     loads: Mapping[int, TimedLoad] = field(default_factory=dict)
 
@@ -95,8 +97,8 @@ class Compared:
         enough: float,
         time: float = 0.0,
         contacts: Mapping[str, float] | None = None,
-    ) -> float:
-        """The error at displacement and velocity (n,), at a time [s] of the run.
+    ) -> tuple[float, np.ndarray]:
+        """The error at displacement and velocity (n,), at a time [s] of the run, and c + d (n,) by modes.
 
         contacts: forces [N] of contacts and frictions by name. enough: an error that is small; stiff modes relax only
         as long as it is larger.
@@ -107,21 +109,23 @@ class Compared:
         force = linear.static + linear.basis.T @ (pushed + self._driven(time))
         force = force - linear.stiffness @ z - linear.damping @ z_t
         squares, shapes = linear.modes
-        relaxed, least = np.zeros(len(z)), math.inf
+        relaxed, least, away = np.zeros(len(z)), math.inf, np.zeros(len(z))
         for softest in _stages(squares, extent.rate):
             displacement = linear.displacement + linear.basis @ (z + shapes @ relaxed)
             moved = self._full.moved(displacement, linear.basis @ z_t, pushed, extent.reach)
             more = shapes.T @ (linear.mass @ (linear.basis.T @ moved.accelerations) - force)
             drift = more / np.maximum(squares, extent.rate**2)
             found = np.hypot(np.linalg.norm(relaxed) + np.linalg.norm(drift), moved.shift)
-            least = min(least, float(found))
+            if found < least:
+                least, away = float(found), relaxed + drift
             if least <= enough * extent.size:
                 break
             relaxed = relaxed + np.where(squares >= softest, drift, 0.0)
-        return least / extent.size
+        return least / extent.size, away
 
     def _driven(self, time: float) -> np.ndarray:
-        """Give the system its loads by functions of time; their generalised force (n_full,) in the linearisation."""
+        """Give the system its time and its loads by functions of it; their force (n_full,) in the linearisation."""
+        self._full.set_time(self._linear.time + time)
         total = np.zeros(len(self._linear.displacement))
         for index, load in self._linear.loads.items():
             value = load.value(time)

@@ -12,6 +12,7 @@ their geometric stiffness (geometric_stiffness.py).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,8 +29,9 @@ from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
     static_solver,
 )
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation
-from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import checked_matrices
+from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import ASYMMETRY, Checked, checked_matrices
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
+from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
@@ -39,6 +41,7 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 __all__ = ["LinearizedStructure", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
+SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
 
@@ -84,13 +87,13 @@ def linear_structure_from(
     with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
         with _inactive(mbs, objects):
-            mass, stiffness, dampers, basis = projected_matrices(mbs)
-            _check_equilibrium(mbs, stiffness, basis)
+            found, basis = projected_matrices(mbs)
+            _check_equilibrium(mbs, found.stiffness, basis)
         rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
-    if damping is None and np.any(dampers):
-        damping = dampers
-    structure = LinearizedStructure(mass, stiffness, damping, rows, coordinates=basis)
+    if damping is None and np.any(found.damping):
+        damping = found.damping
+    structure = LinearizedStructure(found.mass, found.stiffness, damping, rows, coordinates=basis)
     return structure, contacts
 
 
@@ -143,34 +146,49 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
             mbs.SetObjectParameter(index, "activeConnector", True)
 
 
-def projected_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """M, K, C in z, (n, n), and the basis S, (n_full, n)."""
-    geared = _geared_springs(mbs)
+def projected_matrices(mbs: Any, allowed: float = ASYMMETRY) -> tuple[Checked, np.ndarray]:
+    """M, K, C in z, (n, n), and the basis S, (n_full, n); allowed: see ``checked_matrices``.
+
+    What is round-off of the stiffness before constraints take directions out, or of a force over the system's size, is
+    none: it would be a frequency, or an instability.
+    """
+    geared, geometric = _geared_springs(mbs), geometric_stiffness(mbs)
     with _slack(mbs, geared):
         result = mbs.ComputeLinearizedSystem(
             projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
         )
+        sizes = np.abs(np.array(mbs.ComputeLinearizedSystem()[1])) + np.abs(geometric)
+        sizes += np.max(np.abs(forces(mbs))) / (_largest_coordinate(mbs) or math.inf)
     mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
     basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
+    if basis.shape[1] == 0:
+        raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
+    stiffness += basis.T @ geometric @ basis
+    stiffness = drop_round_off(stiffness, np.abs(basis).T @ sizes @ np.abs(basis))
     for item in geared.values():
         first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
         row = (item["factor1"] * second - item["factor0"] * first) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    stiffness += basis.T @ geometric_stiffness(mbs) @ basis
-    if basis.shape[1] == 0:
-        raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
-    return (*checked_matrices(mbs, mass, stiffness, damping, basis), basis)
+    return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis
 
 
 def linearised(mbs: Any, time: float) -> Linearisation:
     """The system about its initial state, at a time [s], without contacts and loads by functions of time."""
-    mass, stiffness, damping, basis = projected_matrices(mbs)
+    found, basis = projected_matrices(mbs, SYMMETRISED)
+    mass, stiffness, damping = found.mass, found.stiffness, found.damping
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
     static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
-    largest = float(np.max(np.abs(data.GetODE2Coordinates(exu.ConfigurationType.Reference) + displacement)))
-    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest)
+    largest = _largest_coordinate(mbs)
+    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told)
+
+
+def _largest_coordinate(mbs: Any) -> float:
+    """Of the system at its initial state, where it stands [m, rad]."""
+    kinds = exu.ConfigurationType
+    places = (mbs.systemData.GetODE2Coordinates(kind) for kind in (kinds.Reference, kinds.Initial))
+    return float(np.max(np.abs(sum(places))))
 
 
 def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:

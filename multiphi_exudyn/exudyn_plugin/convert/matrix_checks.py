@@ -6,6 +6,7 @@ the largest part in S z names the cause: by its node, its number there and the b
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -15,18 +16,33 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import complete_modes
 
-__all__ = ["checked_matrices", "coordinate_name"]
+__all__ = ["ASYMMETRY", "Checked", "checked_matrices", "coordinate_name"]
 
 ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
 MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
 
 
+@dataclass(frozen=True)
+class Checked:
+    """M, K, C (n, n), symmetric to the bit; told: of what was not, a sentence each."""
+
+    mass: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    told: tuple[str, ...]
+
+
 def checked_matrices(
-    mbs: Any, mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, basis: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, K, C (n, n), made symmetric to the bit; raises MultiPhiValueError that names items and coordinates."""
-    given = {"mass": mass, "stiffness": stiffness, "damping": damping}
-    mass, stiffness, damping = (_symmetric(mbs, name, matrix, basis) for name, matrix in given.items())
+    mbs: Any, mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, basis: np.ndarray, allowed: float
+) -> Checked:
+    """The matrices, made symmetric; raises MultiPhiValueError that names items and coordinates.
+
+    allowed: of the largest entry of stiffness or damping, up to which entries may differ from their mirror images.
+    """
+    told: list[str] = []
+    mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
+    stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)
+    damping = _symmetric(mbs, "damping", damping, basis, allowed, told)
     values, vectors = scipy.linalg.eigh(mass)
     if values[0] <= MASSLESS * values[-1]:
         where = _of_largest(mbs, basis @ vectors[:, 0])
@@ -41,24 +57,42 @@ def checked_matrices(
             f"stiffness: got a negative one (omega^2 = {values[0]:.3g} 1/s2), mainly of "
             f"{_of_largest(mbs, basis @ vectors[:, 0])}, need a state that is stable"
         ) from error
-    return mass, stiffness, damping
+    return Checked(mass, stiffness, damping, tuple(told))
 
 
 def _kind(lowest: float, largest: float) -> str:
     return "a negative" if lowest < -MASSLESS * largest else "no"
 
 
-def _symmetric(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> np.ndarray:
+def _symmetric(
+    mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray, allowed: float, told: list[str]
+) -> np.ndarray:
     skew = matrix - matrix.T
-    if np.max(np.abs(skew)) > ASYMMETRY * np.max(np.abs(matrix)):
+    away = float(np.max(np.abs(skew)) / (np.max(np.abs(matrix)) or 1.0))
+    if away > ASYMMETRY:
         full = np.abs(basis @ skew @ basis.T)
-        first, second = (coordinate_name(mbs, int(i)) for i in np.unravel_index(np.argmax(full), full.shape))
-        raise MultiPhiValueError(
-            f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), got entries that differ by "
-            f"{np.max(np.abs(skew)) / np.max(np.abs(matrix)):.2g} of the largest between {first} and {second}, need a "
-            "symmetric one"
-        )
+        first, second = (int(i) for i in np.unravel_index(np.argmax(full), full.shape))
+        places = f"between {coordinate_name(mbs, first)} and {coordinate_name(mbs, second)}"
+        acting = ", ".join(_acting_on(mbs, {first, second})) or "none"
+        where = f"{places}, on both of which act: {acting}"
+        if away > allowed:
+            raise MultiPhiValueError(
+                f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), got entries that differ by "
+                f"{away:.2g} of the largest {where}; need a symmetric one"
+            )
+        told.append(f"{name} matrix, of which entries differ by {away:.2g} of the largest {where}")
     return (matrix + matrix.T) / 2
+
+
+def _acting_on(mbs: Any, coordinates: set[int]) -> list[str]:
+    """Objects that have all of these ODE2 coordinates."""
+    count = mbs.systemData.NumberOfObjects()
+    found = [i for i in range(count) if coordinates <= set(mbs.systemData.GetObjectLTGODE2(exu.ObjectIndex(i)))]
+    return [_called(mbs.GetObject(exu.ObjectIndex(i))) for i in found]
+
+
+def _called(item: Any) -> str:
+    return f"Object{item['objectType']} {item['name']!r}"
 
 
 def _of_largest(mbs: Any, vector: np.ndarray) -> str:
@@ -81,4 +115,4 @@ def coordinate_name(mbs: Any, index: int) -> str:
 def _bodies(mbs: Any, node: int) -> list[str]:
     items = [mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())]
     found = [item for item in items if node in [int(n) for n in item.get("nodeNumbers", [item.get("nodeNumber", -1)])]]
-    return [f"Object{item['objectType']} {item['name']!r}" for item in found]
+    return [_called(item) for item in found]

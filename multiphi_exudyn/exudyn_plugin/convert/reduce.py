@@ -31,6 +31,7 @@ from multiphi_exudyn.exudyn_plugin.convert.items import (
     has_stops,
     left_out_functions,
     left_out_objects,
+    linearised_functions,
     load_item,
     missing_parts,
     taken_objects,
@@ -51,6 +52,7 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Item", "Reduction", "reduce"]
 
+SMALL = 100  # coordinates up to which all modes are kept unless told: a run then has the accuracy of the system's own
 HELD = 1e-9  # of a row's largest entry before projection: a contact that moves less is held by constraints
 
 
@@ -60,7 +62,9 @@ class Reduction(Shown):
 
     model: structure, contacts, modes. velocity: z'(0), (n,); the displacement z(0) is zero. loads: p, none if zero,
     and those by functions of time.
-    taken: every item of the model. left_out: what is no part of it, with the reason.
+    taken: every item of the model. left_out: what is no part of it, with the reason. symmetrised: matrices that were
+    not symmetric, by how much and between which coordinates; their symmetric part is taken, and what the other part
+    does is found by ``check``.
     """
 
     model: MultiPhiModel
@@ -68,6 +72,7 @@ class Reduction(Shown):
     loads: tuple[Load, ...]
     taken: tuple[Item, ...]
     left_out: tuple[tuple[Item, str], ...]
+    symmetrised: tuple[str, ...] = ()
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "degrees of freedom", str(self.structure.n)
@@ -91,7 +96,8 @@ class Reduction(Shown):
         size = f"{self.structure.n} degrees of freedom, {elements}, modes: {self.model.modes}"
         taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
         left = [f"  {line}" for line in grouped(self.left_out)]
-        return "\n".join([size, "taken", *taken, "left out", *(left or ["  nothing"])])
+        made = ["made symmetric", *(f"  {sentence}" for sentence in self.symmetrised)] if self.symmetrised else []
+        return "\n".join([size, "taken", *taken, *made, "left out", *(left or ["  nothing"])])
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """How far a trajectory of this model left the linear range (linear_range.py); its warnings say so too."""
@@ -116,14 +122,15 @@ class Reduction(Shown):
 
 def reduce(
     mbs: Any,
-    modes: int | str | UpTo | Tolerance = 12,
+    modes: int | str | UpTo | Tolerance | None = None,
     points: Mapping[str, Any] | None = None,
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
     strict: bool = False,
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
-    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them.
+    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them. None: all
+    of a small system, else chosen from static shares.
     points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
     ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``; friction is that of
     the latter where it is the law of ``mp.Friction``, with the object's name.
@@ -164,7 +171,7 @@ def reduce(
     if strict and missing:
         raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
     linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed)
-    validity = LinearRange(mbs, linear, missing)
+    validity = LinearRange(mbs, linear, missing, linearised_functions(left_out))
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
         linear.basis.T @ linear.velocity,
@@ -174,6 +181,7 @@ def reduce(
         ),
         taken,
         left_out,
+        linear.symmetrised,
     )
 
 
@@ -186,7 +194,9 @@ def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) ->
             yield load_item(i, load, f"constant load{held}")
 
 
-def _modes(modes: int | str | UpTo | Tolerance, most: int) -> int | str | UpTo | Tolerance:
+def _modes(modes: int | str | UpTo | Tolerance | None, most: int) -> int | str | UpTo | Tolerance | None:
+    if modes is None:
+        return "all" if most <= SMALL else None
     return "all" if isinstance(modes, int) and modes > most else modes
 
 

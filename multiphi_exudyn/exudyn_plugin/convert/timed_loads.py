@@ -34,7 +34,8 @@ def timed_loads(mbs: Any, loads: Sequence[Mapping[str, Any]], start: float) -> d
 
     The user functions have to be switched off.
     """
-    found = {i: _value(load, start) for i, load in enumerate(loads) if user_function(load)}
+    known = _NoSystem(dict(mbs.variables))
+    found = {i: _value(load, start, known) for i, load in enumerate(loads) if user_function(load)}
     return {i: value if isinstance(value, str) else TimedLoad(_rows(mbs, i), value) for i, value in found.items()}
 
 
@@ -49,7 +50,7 @@ def _component(value: Callable[[float], np.ndarray], k: int) -> Callable[[Any], 
     return lambda t: float(value(t)[k])
 
 
-def _value(load: Mapping[str, Any], start: float) -> Callable[[float], np.ndarray] | str:
+def _value(load: Mapping[str, Any], start: float, known: _NoSystem) -> Callable[[float], np.ndarray] | str:
     """u(t), or why it is none of time alone."""
     present, held = load[value_key(load)], load[user_function(load)]
     if held["type"] != "Python":
@@ -57,7 +58,7 @@ def _value(load: Mapping[str, Any], start: float) -> Callable[[float], np.ndarra
     function, size = held["function"], np.size(present)
 
     def value(t: float) -> np.ndarray:
-        return np.array(function(_NO_SYSTEM, start + float(t), present), dtype=float).reshape(size)
+        return np.array(function(known, start + float(t), present), dtype=float).reshape(size)
 
     try:
         value(0.0)
@@ -67,13 +68,16 @@ def _value(load: Mapping[str, Any], start: float) -> Callable[[float], np.ndarra
 
 
 class _NoSystem:
-    """What a load's user function gets instead of the system, which is not there in the model's run."""
+    """What a load's user function gets instead of the system, which is not there in the model's run.
+
+    variables: what the system's are at the reduction.
+    """
+
+    def __init__(self, variables: dict[str, Any]) -> None:
+        self.variables = variables
 
     def __getattr__(self, name: str) -> Any:
         raise MultiPhiValueError(f"it reads mbs.{name}")
-
-
-_NO_SYSTEM = _NoSystem()
 
 
 def _rows(mbs: Any, index: int) -> np.ndarray:

@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import exudyn as exu
 import numpy as np
@@ -40,7 +40,9 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
-__all__ = ["Interface"]
+__all__ = ["Interface", "Look"]
+
+Look: TypeAlias = Mapping[str, Any]  # show and color of items in the renderer
 
 
 @dataclass(frozen=True)
@@ -82,14 +84,20 @@ class Interface:
         self._mbs = mbs
 
     def add(
-        self, node: Any, stepped: SteppedLevel, held: np.ndarray, q: np.ndarray, q_t: np.ndarray, show: bool
+        self,
+        node: Any,
+        stepped: SteppedLevel,
+        held: np.ndarray,
+        q: np.ndarray,
+        q_t: np.ndarray,
+        look: Mapping[str, Any],
     ) -> None:
         """Add nodes and ties for a body whose node holds q, q' (s,) in a level, with places that links hold (h,)."""
         found, mbs = self.of(stepped), self._mbs
         own, offsets = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)), found.offset(held)
         for given, part in zip(self._given, self._parts, strict=True):
             rows, offset, called = found.rows[part], offsets[part], f"{self._name}.{given.name}"
-            point = mbs.AddNode(given.item(f"Node:{called}", rows @ q + offset, rows @ q_t, show))
+            point = mbs.AddNode(given.item(f"Node:{called}", rows @ q + offset, rows @ q_t, look))
             tie = ObjectConnectorCoordinateVector(
                 name=called,
                 markerNumbers=[own, mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=point))],

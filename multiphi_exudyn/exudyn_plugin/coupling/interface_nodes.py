@@ -71,8 +71,8 @@ class InterfaceNode:
     position: tuple[float, ...] = ()
     angles: int = 0
 
-    def item(self, name: str, start: np.ndarray, start_t: np.ndarray, show: bool) -> Any:
-        """Exudyn's node with coordinates and velocities (k,) at the start."""
+    def item(self, name: str, start: np.ndarray, start_t: np.ndarray, look: Mapping[str, Any]) -> Any:
+        """Exudyn's node with coordinates and velocities (k,) at the start; look: show and color."""
         places = [*self.position, *[0.0] * self.angles]
         if not places:
             return NodeGenericODE2(
@@ -84,7 +84,7 @@ class InterfaceNode:
             )
         kind: Any = _KINDS[len(self.position), self.angles]
         found = kind(name=name, referenceCoordinates=places, initialCoordinates=start, initialVelocities=start_t)
-        found.visualization = {**found.visualization, "show": show}
+        found.visualization = {**found.visualization, **look}
         return found
 
 

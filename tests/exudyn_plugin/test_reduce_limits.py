@@ -1,0 +1,213 @@
+"""What reduce takes though it is not quite linear or symmetric, what it says of it, and where it stops."""
+
+import warnings
+
+import exudyn as exu
+import exudyn.itemInterface as eii
+import exudyn.utilities
+import numpy as np
+import pytest
+from test_reduce import Mass
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+from reference_models.published_systems import OwnRun, PublishedSystem
+
+pytestmark = pytest.mark.usefixtures("quiet_exudyn")
+
+GRAVITY, LENGTH = 9.81, 1.0  # m/s2, m
+END = 0.5  # s
+
+
+def simulated(reduction, end=END):
+    """The run and its warnings, none of them issued."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        return mp.simulate(reduction.model, end, velocity=reduction.velocity, loads=reduction.loads)
+
+
+def off(system, reduction, trajectory, end=END, step=1e-4):
+    """Largest distance from Exudyn's own run at the marker "m1", of its largest motion there."""
+    own = OwnRun.of(PublishedSystem(system.container, system.mbs, "m1", end, step))
+    theirs = own.of_row(reduction.structure.coordinates @ reduction.structure.row("m1"))
+    found = trajectory.at("m1", np.minimum(own.time, end))
+    return np.max(np.abs(found - theirs)) / np.max(np.abs(theirs))
+
+
+@pytest.mark.parametrize("kind", ["RotationEulerParameters", "RotationRxyz"])
+def test_a_pendulum_let_go_where_it_is_level_falls(kind):
+    """Its stiffness is zero there, and round-off of a joint's forces of 20 N is neither a frequency nor instability."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    inertia = exu.utilities.InertiaCuboid(2000, (LENGTH, 0.1, 0.1))
+    place = [LENGTH / 2, 0.0, 0.0]
+    bar = mbs.CreateRigidBody(
+        referencePosition=place, inertia=inertia, gravity=[0, -GRAVITY, 0], nodeType=getattr(exu.NodeType, kind)
+    )
+    ground = mbs.CreateGround()
+    ends = (ground, [0.0] * 3), (bar, [-LENGTH / 2, 0.0, 0.0])
+    markers = [mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body, localPosition=at)) for body, at in ends]
+    mbs.AddObject(eii.GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 1, 1, 1, 0]))
+    mbs.AddMarker(eii.MarkerBodyPosition(name="tip", bodyNumber=bar, localPosition=[LENGTH / 2, 0.0, 0.0]))
+    mbs.Assemble()
+    reduction = reduce(mbs)
+    assert np.all(reduction.structure.stiffness == 0)
+    fallen = simulated(reduction, 0.1).at("tip.y", 0.1)
+    mass, about = inertia.Mass(), inertia.Translated([-LENGTH / 2, 0, 0]).Inertia()[2, 2]
+    turning = mass * GRAVITY * LENGTH / 2 / about
+    assert fallen == pytest.approx(-0.5 * turning * LENGTH * 0.1**2, rel=1e-6)
+
+
+def coupled(part, spin):
+    """Two coordinates by matrices, one of which is not symmetric."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    start = {"initialCoordinates": [1e-3, 0.0], "initialCoordinates_t": [0.0, 0.0]}
+    node = mbs.AddNode(
+        eii.NodeGenericODE2(name="pair", referenceCoordinates=[0.0, 0.0], numberOfODE2Coordinates=2, **start)
+    )
+    given = {"stiffnessMatrix": 100 * np.eye(2), "dampingMatrix": 0.4 * np.eye(2)}
+    given[part] = given[part] + spin * np.max(given[part]) * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    mbs.AddObject(eii.ObjectGenericODE2(name="own", nodeNumbers=[node], massMatrix=np.eye(2), **given))
+    mbs.AddMarker(eii.MarkerNodeCoordinate(name="m1", nodeNumber=node, coordinate=0))
+    mbs.Assemble()
+    system = Mass.__new__(Mass)
+    system.container, system.mbs = container, mbs
+    return system
+
+
+@pytest.mark.parametrize("part", ["stiffnessMatrix", "dampingMatrix"])
+def test_a_matrix_that_is_nearly_symmetric_is_taken_and_told(part):
+    system = coupled(part, 0.002)
+    reduction = reduce(system.mbs)
+    name = part.removesuffix("Matrix")
+    (sentence,) = reduction.symmetrised
+    assert f"{name} matrix, of which entries differ by 0.004 of the largest" in sentence
+    assert "ObjectGenericODE2 'own'" in sentence
+    assert sentence in reduction.report
+    trajectory = simulated(reduction)
+    assert trajectory.warnings == ()
+    assert off(system, reduction, trajectory) < 1e-3
+    with pytest.raises(mp.MultiPhiValueError, match=r"not symmetric .* ObjectGenericODE2 'own'"):
+        linear_structure_from(system.mbs)
+
+
+@pytest.mark.parametrize("part", ["stiffnessMatrix", "dampingMatrix"])
+def test_a_matrix_that_is_not_symmetric_is_refused_with_the_item(part):
+    with pytest.raises(mp.MultiPhiValueError, match=r"differ by 0\.1 of the largest .*ObjectGenericODE2 'own'; need"):
+        reduce(coupled(part, 0.05).mbs)
+
+
+def stepped(mbs, t, load):
+    return load if t < 0.1 else -2 * load if t < 0.3 else 0.0
+
+
+def test_a_load_that_steps_in_its_user_function_moves_the_model_as_it_does_the_system():
+    system = spring_mass()
+    marker = system.markers[1]
+    system.mbs.AddLoad(eii.LoadCoordinate(name="push", markerNumber=marker, load=3.0, loadUserFunction=stepped))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    assert reduction.left_out == ()
+    assert off(system, reduction, simulated(reduction)) < 1e-3
+
+
+def test_a_load_may_read_the_variables_of_the_system():
+    system = spring_mass()
+    system.mbs.variables["strength"] = 2.0
+
+    def push(mbs, t, load):
+        return load * mbs.variables["strength"] * t
+
+    marker = system.markers[1]
+    system.mbs.AddLoad(eii.LoadCoordinate(name="push", markerNumber=marker, load=3.0, loadUserFunction=push))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    system.mbs.variables["strength"] = 7.0  # later: the model is that of the reduction
+    load = reduction.loads[-1]
+    assert load.function(0.1) == pytest.approx(0.6)
+
+
+def spring_mass(**given):
+    """0.5 kg on 200 N/m; with a user function for its force if given."""
+    system = Mass(displacement=0.01, data=1)
+    system.mbs.AddObject(
+        eii.CoordinateSpringDamper(name="spring", markerNumbers=system.markers, stiffness=200.0, **given)
+    )
+    return system
+
+
+def test_a_user_function_that_is_linear_in_the_motion_is_not_warned_of():
+    system = spring_mass(springForceUserFunction=lambda mbs, t, i, u, v, k, d, offset: k * u + 0.3 * v)
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    trajectory = simulated(reduction)
+    assert [item.name for item, _ in reduction.left_out] == ["spring"]
+    assert trajectory.warnings == ()
+    assert off(system, reduction, trajectory) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda mbs, t, i, u, v, k, d, offset: k * u + 1e5 * u**3,
+        lambda mbs, t, i, u, v, k, d, offset: k * u + (1e4 * (u + 0.006) if u < -0.006 else 0.0),
+        lambda mbs, t, i, u, v, k, d, offset: k * u + (1.0 if 0.2 < t < 0.25 else 0.0),
+    ],
+    ids=["cubic", "stop", "in time"],
+)
+def test_a_user_function_that_does_more_is_warned_of_by_name(force):
+    system = spring_mass(springForceUserFunction=force)
+    system.mbs.Assemble()
+    told = simulated(reduce(system.mbs)).warnings
+    assert any(said.startswith("left out: ObjectConnectorCoordinateSpringDamper 'spring': what its") for said in told)
+    assert any(said.startswith("linear range: the motion has left it") for said in told)
+
+
+def test_small_errors_that_add_up_to_a_shift_are_told():
+    """Duffing's oscillator: omega^2 grows by 3/4 e for a force k u (1 + e (u / a)^2) at the amplitude a."""
+    e, amplitude, end = 0.004, 0.01, 60.0
+
+    def force(mbs, t, i, u, v, k, d, offset):
+        return k * u * (1 + e * (u / amplitude) ** 2)
+
+    system = Mass(velocity=amplitude * 20.0, data=1)
+    given = {"markerNumbers": system.markers, "stiffness": 200.0, "springForceUserFunction": force}
+    system.mbs.AddObject(eii.CoordinateSpringDamper(name="spring", **given))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    found = reduction.check(simulated(reduction, end))
+    assert found.error < 0.01
+    assert found.lag == pytest.approx(3 / 8 * e * 20.0 * end, rel=0.3)
+    assert not found.holds
+    assert "oscillations are off by some" in found.sentences[0]
+    assert reduction.check(simulated(reduction, 1.0)).holds
+
+
+def test_a_damped_contact_that_opens_is_warned_of():
+    system = spring_mass()
+    law = {"contactStiffness": 1e5, "contactDamping": 5.0, "offset": -0.005}
+    contact = eii.ObjectContactCoordinate(name="stop", markerNumbers=system.markers, nodeNumber=system.data, **law)
+    system.mbs.AddObject(contact)
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    (sentence,) = simulated(reduction).warnings
+    assert sentence.startswith("contact damper: at 'stop' it does not pull where the contact opens")
+    assert simulated(reduction, 0.05).warnings == ()
+
+
+def test_a_motion_that_only_stands_is_checked_too():
+    """The one mode that is kept is that of a mass which nothing acts on; the other answers its load at once."""
+    system = Mass()
+    ends = [system.markers[0], free_mass(system)]
+    system.mbs.AddObject(eii.CoordinateSpringDamper(markerNumbers=ends, stiffness=100.0))
+    system.mbs.AddLoad(eii.LoadCoordinate(markerNumber=ends[1], load=1.0))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs, modes=1)
+    assert reduction.check(simulated(reduction)).reason == ""
+
+
+def free_mass(system):
+    node = system.mbs.AddNode(eii.Node1D(referenceCoordinates=[0.0]))
+    system.mbs.AddObject(eii.ObjectMass1D(mass=1.0, nodeNumber=node))
+    return system.mbs.AddMarker(eii.MarkerNodeCoordinate(name="other", nodeNumber=node, coordinate=0))
