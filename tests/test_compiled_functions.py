@@ -425,7 +425,7 @@ def test_the_command_line_compiles_ahead_and_says_where(monkeypatch, capsys):
 
 def test_the_command_line_compiles_what_runs_samples_ledgers_and_coupled_bodies_need():
     code = """
-from multiphi_exudyn.cli import main
+from multiphi_exudyn.cli import compile_command
 from multiphi_exudyn.mathematics import compiled
 print(*sorted(one.function.__name__ for one in compiled._entries))
 """

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import sys
 
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
 from multiphi_exudyn.mathematics.compiled import available, compile_entries
+from multiphi_exudyn.time.simulate import simulate
 
 __all__ = ["run_compile"]
 
 
+USERS = (simulate, CreateMultiPhiBody)  # whose modules bring the entries that are compiled
+
+
 def run_compile() -> bool:
-    """Compile what a run would compile, and say where it is kept; True if it is kept."""
+    """Compile what a run, and a body in Exudyn, would compile, and say where it is kept; True if it is kept."""
     path = compile_entries() if available() else None
     if path is None:
         why = "no folder is writable; NUMBA_CACHE_DIR names one" if available() else "numba is not installed"

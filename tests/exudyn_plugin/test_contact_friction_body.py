@@ -139,6 +139,11 @@ class TestCoupled:
         given = model(floor("rigid", tangential_velocity=0.1))
         refused(ValueError, begins, lambda: CreateMultiPhiBody(system(), given, interface=("z",)))
 
+    def test_a_rigid_contact_with_friction_has_no_interface(self, refused):
+        given = model(mp.UnilateralContact("stop", "z", 0.1, friction=0.2, tangential="x"))
+        begins = "friction: got rigid contacts with it (stop) and an interface, need compliant ones"
+        refused(ValueError, begins, lambda: CreateMultiPhiBody(system(), given, interface=("z",)))
+
 
 def assert_converges(whole, kind, point, add):
     still = np.zeros(whole.n - 3)

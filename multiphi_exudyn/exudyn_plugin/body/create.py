@@ -23,6 +23,7 @@ from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.simulate import Run, started
@@ -93,6 +94,10 @@ def CreateMultiPhiBody(
     if nodes and moving:
         name, speed = moving[0].name, moving[0].velocity
         raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")
+    rough = [c.name for c in model.contacts if isinstance(c, UnilateralContact) and c.rigid and c.friction]
+    if nodes and rough:
+        given = f"rigid contacts with it ({', '.join(rough)}) and an interface"
+        raise MultiPhiValueError(f"friction: got {given}, need compliant ones")
     if nodes and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
