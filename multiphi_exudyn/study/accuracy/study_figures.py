@@ -196,7 +196,7 @@ def _heading(result: StudyResult, at: Mapping[str, Any]) -> str:
     untimed = sum(setting.online_s is None for setting in failed)
     count = f"; × failed: {len(failed)}" if failed else ""
     hidden = f", {untimed} of them without a time" if untimed else ""
-    return f"Lower left is better. Faint: every setting{count}{hidden}{f'; {words(at)}' if at else ''}"
+    return f"Lower left is better. Faint: every setting{count}{hidden}"
 
 
 def _convergence(axes: Axes, result: StudyResult, axis: str, lines: Sequence[Series]) -> None:

@@ -28,6 +28,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.accuracy.indicator import Correlation, indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
+from multiphi_exudyn.study.accuracy.overview import over_all_points, response_figure
 from multiphi_exudyn.study.accuracy.stiff_errors import StiffError, stiff_errors
 from multiphi_exudyn.study.accuracy.study_findings import (
     choices,
@@ -94,6 +95,8 @@ def render_study(result: StudyResult) -> str:
         full=full_methods(result),
         error_words=error_words,
         timing=timing_words(result),
+        overall=over_all_points(result).to_dict("records") if len(points(result)) > 1 else [],
+        response=_response(result),
         along=[(axis, _along(result, axis), tables_along(result, axis)) for axis in _axes(result)],
         indicator=_indicator(result),
         correlations=_correlations(result),
@@ -160,6 +163,11 @@ def _along(result: StudyResult, axis: str) -> Picture:
 
 def _references(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
     return [setting for setting in references(result) if setting.at == at]
+
+
+def _response(result: StudyResult) -> Picture | None:
+    figure = response_figure(result)
+    return None if figure is None else _picture(figure, "The reference, at the points of the scene's axes.")
 
 
 def _indicator(result: StudyResult) -> Picture | None:
