@@ -100,9 +100,14 @@ def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
     )
     doubts = " ".join(found.distrust)
     assert "coarser copy of itself by 1.00 % to 0.1 s" in doubts
-    assert "rigid-r6 2.91 % (from the reference 20.0 %) from all linear modes on stops of 100 MN/m and more" in doubts
-    assert "which themselves differ by up to 1.98 %" in doubts
-    assert "more modes do not remove it" in doubts
+    assert "Rigid levels are the limit of stiff stops" in doubts
+
+
+def test_rigid_levels_are_measured_against_stiff_stops_in_a_table(page):
+    text = text_of(page)
+    assert "Rigid levels against stiff stops" in text
+    assert re.search(r"rigid-r6 [\d.]+ % 2.91 %", text)
+    assert re.search(r"own uncertainty [\d.]+ % 1.98 %", text)
 
 
 def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):

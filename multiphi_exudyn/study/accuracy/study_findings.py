@@ -25,11 +25,11 @@ from multiphi_exudyn.study.accuracy.analysis import (
     times_faster,
     uncertainty,
 )
-from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
 from multiphi_exudyn.study.accuracy.overview import over_all_points
-from multiphi_exudyn.study.accuracy.stiff_errors import stiff_words
+from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence, times
+from multiphi_exudyn.study.sweep.store import Row
 
 __all__ = [
     "Choice",
@@ -120,9 +120,19 @@ def timing_words(result: StudyResult) -> str:
 
 
 def _asked(result: StudyResult) -> str:
-    if not result.study.methods:
-        return budget_asked(result)
-    return _asked_of_errors(result)
+    if result.study.methods:
+        return _asked_of_errors(result)
+    return (
+        "Where does the difference between the full and the reduced model come from? One run per rung of a ladder from "
+        f"one to the other, one cause per difference. Scene: {result.study.scene}, {len(result.budgets)} budgets."
+    )
+
+
+def _explained(row: Row) -> bool:
+    """Whether a budget's parts explain all of its differences that are known."""
+    groups = [each["all"] for ladders in row.values.get("windows", {}).values() for each in ladders.values()]
+    known = [group["explained"] for group in groups if group is not None]
+    return bool(known) and all(known)
 
 
 def _asked_of_errors(result: StudyResult) -> str:
@@ -143,7 +153,10 @@ def _outcome(result: StudyResult) -> Iterable[str]:
         yield from _outcome_at(result, points(result)[0])
     elif settings(result):
         yield from _over_all(result)
-    yield from budget_outcome(result)
+    if result.budgets:
+        explained = sum(_explained(row) for row in result.budgets)
+        whole = len(result.budgets)
+        yield f"Of {whole} error budgets {explained} are explained by their parts; the table below has them."
 
 
 def _over_all(result: StudyResult) -> Iterable[str]:
@@ -199,8 +212,8 @@ def _distrust(result: StudyResult) -> Iterable[str]:
     yield from map(sentence, warned(result))
     at = max(points(result) or [{}], key=lambda each: uncertainty(result, each) or 0.0)
     yield _own_uncertainty(result, at)
-    for each in shown_points(result):
-        yield from stiff_words(result, each)
+    if any(stiff_errors(result, each) for each in shown_points(result)):
+        yield "Rigid levels are the limit of stiff stops; a table below measures them against some as well."
     yield from _failures(result)
     yield from _times(result)
     if result.timings:

@@ -13,7 +13,6 @@ from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.rigid_limit import rigid_limit
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, times
 from multiphi_exudyn.study.measures import metrics
@@ -182,7 +181,7 @@ def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from map(sentence, warned(comparison))
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
-    yield from rigid_limit(comparison)
+    yield from _rigid_levels(comparison)
     yield from _force_laws(comparison)
     if comparison.bench.overrides:
         yield (
@@ -210,6 +209,17 @@ def _own_uncertainty(comparison: Comparison) -> Iterable[str]:
         f"The reference is uncertain itself: it differs from a coarser copy of itself by {known}. "
         "Smaller differences say nothing."
     )
+
+
+def _rigid_levels(comparison: Comparison) -> Iterable[str]:
+    if comparison.stiff is not None and not comparison.stiff.ok:
+        cause = comparison.stiff.message
+        yield f"Rigid levels are the limit of stiff stops, but nothing with stiff stops ran: {cause}."
+    elif comparison.rigid:
+        yield (
+            "Rigid levels are the limit of stiff stops: from a soft one they differ by its softness, which no number "
+            "of modes removes. The table “Rigid levels against stiff stops” measures them against their limit."
+        )
 
 
 def _sensitivity(comparison: Comparison) -> Iterable[str]:
