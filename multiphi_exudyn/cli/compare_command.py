@@ -17,7 +17,6 @@ from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.comparison.rigid_limit import from_stiff_stops
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment
@@ -66,8 +65,8 @@ def _tell(comparison: Comparison, folder: Path) -> None:
     print(f"{'model':{width}}  {'status':6}  {'online':>9}  {'faster':>10}  NRMSE to {until:g} s")
     for name, run in comparison.runs.items():
         error = percent(comparison.worst_error(run, until)) if name in comparison.measured else "the reference"
-        stiff = from_stiff_stops(comparison, name)
-        error += f", from stiff stops {stiff}" if stiff else ""
+        if name in comparison.rigid:
+            error += f", from stiff stops {percent(comparison.stiff_error(run, until))}"
         line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
         print(f"{name:{width}}  {run.status:6}  {line}")
     print(f"\n{findings(comparison).outcome}")

@@ -5,6 +5,7 @@ import io
 import math
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 from small_study import result_of, row, small_study, timing
 
@@ -150,13 +151,13 @@ def test_along_the_scene_methods_and_the_reference_stand_side_by_side():
     tables = {(table.quantity, table.contact): table for table in tables_along(result, "start.displacement")}
     assert set(tables) == {("error", ""), ("first_contact", "stop"), ("inner_losses", "stop"), ("impulse", "stop")}
     error = tables["error", ""]
-    assert error.values == (-0.01, 0.02)
-    assert "reference" not in error.columns
-    assert error.columns["coarser"] == (0.001, 0.001)
-    assert error.columns["Multi-Phi"] == pytest.approx((1.4 * 1.2 * 16**-2.5, 1.8 * 1.2 * 16**-2.5))
-    losses = tables["inner_losses", "stop"].columns
-    assert losses["reference"] == (0, 0)
-    assert losses["Multi-Phi, rigid"] == tuple(round(40 * (0.06 + 12**-2) * grown) for grown in (1.4, 1.8))
+    assert list(error.frame.columns) == [-0.01, 0.02]
+    assert "reference" not in error.frame.index
+    assert list(error.frame.loc["coarser"]) == [0.001, 0.001]
+    assert list(error.frame.loc["Multi-Phi"]) == pytest.approx([1.4 * 1.2 * 16**-2.5, 1.8 * 1.2 * 16**-2.5])
+    losses = tables["inner_losses", "stop"].frame
+    assert list(losses.loc["reference"]) == [0, 0]
+    assert list(losses.loc["Multi-Phi, rigid"]) == [round(40 * (0.06 + 12**-2) * grown) for grown in (1.4, 1.8)]
     slope = series(settings(result), "Multi-Phi", "start.displacement").orders
     assert slope == (None,)  # a value that changes its sign
 
@@ -169,27 +170,31 @@ def test_a_value_that_a_method_lacks_is_an_empty_cell():
         row("b", 0.4, {"load": 3.0}),
     ]
     (error,) = tables_along(result_of(rows), "load")
-    assert error.columns == {"a": (0.1, 0.2, None), "b": (None, 0.3, 0.4)}
+    assert error.frame.loc["a"].tolist() == pytest.approx([0.1, 0.2, math.nan], nan_ok=True)
+    assert error.frame.loc["b"].tolist() == pytest.approx([math.nan, 0.3, 0.4], nan_ok=True)
 
 
-def test_the_rank_correlation_sees_order_only_and_says_what_it_left_out():
-    assert rank_correlation([1, 2, 3, 4], [1e-4, 1e-3, 1e-2, 0.5]).coefficient == pytest.approx(1)
-    assert rank_correlation([1, 2, 3, 4], [4, 3, 2, 1]).coefficient == pytest.approx(-1)
-    mixed = rank_correlation([None, 1, 2, 3, 4, 5], [1, None, 1e-10, 2, 1, 3])
-    assert mixed.coefficient == pytest.approx(0.5)  # ranks 1 2 3 against 2 1 3
-    assert mixed.runs == 3
-    assert mixed.left_out == {"no indicator": 1, "no error": 1, "error below 1e-9": 1}
+def paired(indicator, error):
+    return pd.DataFrame({"indicator": indicator, "error": error}, dtype=float)
+
+
+def test_the_rank_correlation_sees_order_only_and_leaves_out_what_says_nothing():
+    assert rank_correlation(paired([1, 2, 3, 4], [1e-4, 1e-3, 1e-2, 0.5])) == (pytest.approx(1), 4)
+    assert rank_correlation(paired([1, 2, 3, 4], [4, 3, 2, 1])) == (pytest.approx(-1), 4)
+    mixed = paired([1, 2, 3, 4, 5], [None, 1e-10, 2, 1, 3])
+    assert rank_correlation(mixed) == (pytest.approx(0.5), 3)  # ranks 1 2 3 against 2 1 3
 
 
 @pytest.mark.parametrize("pairs", [[], [(1, 1), (2, 2)], [(1, 1), (1, 2), (1, 3)]])
 def test_too_few_or_equal_values_have_no_correlation(pairs):
-    assert rank_correlation([a for a, _ in pairs], [b for _, b in pairs]).coefficient is None
+    assert rank_correlation(paired([a for a, _ in pairs], [b for _, b in pairs])) == (None, len(pairs))
 
 
 def test_every_run_with_an_indicator_counts():
     found = indicators(small_study())
-    assert {name: len(pairs) for name, pairs in found.items()} == {"Multi-Phi": 6, "Multi-Phi, rigid": 5}
-    assert found["Multi-Phi"][0] == pytest.approx(((1.2 * 3**-2.5) ** 1.2, 1.2 * 3**-2.5))
+    assert dict(found.method.value_counts()) == {"Multi-Phi": 6, "Multi-Phi, rigid": 5}
+    first = found.iloc[0]
+    assert (first.indicator, first.error) == pytest.approx(((1.2 * 3**-2.5) ** 1.2, 1.2 * 3**-2.5))
 
 
 def test_pointwise_comparison_ends_where_the_coarser_copy_leaves():

@@ -246,6 +246,23 @@ def test_a_run_that_is_missing_in_page_and_index_is_noticed(tmp_path, sound, ref
     refused(ValueError, begins, Store, tmp_path / "runs.db")
 
 
+def test_a_full_disk_is_told_as_that_and_what_has_finished_is_kept(store):
+    (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+    store._connection.execute(f"PRAGMA max_page_count = {pages + 4}")
+
+    def fill():
+        for x in range(50):
+            store.add("pass", {"x": x}, row({"x": x}), pack({"y": np.random.default_rng(x).random(1000)}))
+
+    with pytest.raises(MultiPhiValueError, match=r"the disk is full.*make room and start again"):
+        fill()
+    kept = len(store.rows("pass"))
+    assert 0 < kept < 50
+    with Store(store.path) as again:
+        assert [found.parameters["x"] for found in again.rows("pass")] == list(range(kept))
+        assert again.add("pass", {"x": kept}, row({"x": kept}))
+
+
 def test_a_store_of_an_earlier_format_is_refused_with_what_can_be_done(tmp_path, refused):
     with Store(tmp_path / "runs.db"):
         pass

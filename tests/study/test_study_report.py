@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
 from small_study import METHODS, coarser, contact, map_pairs, result_of, row, small_study, timing
 
 from multiphi_exudyn.study.accuracy import study_report
+from multiphi_exudyn.study.accuracy.analysis import settings
 from multiphi_exudyn.study.accuracy.direct_labels import Label, place_labels
 from multiphi_exudyn.study.accuracy.figure_style import styles
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
+from multiphi_exudyn.study.accuracy.overview import over_all_points, response_figure
 from multiphi_exudyn.study.accuracy.study_figures import (
     along_figure,
     convergence_figure,
@@ -26,6 +29,7 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     timing_words,
 )
 from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.comparison.wording import percent
 
 AXIS = {"start.displacement": [-0.01, 0.02]}
 STEP = {"step": 1e-4}
@@ -154,9 +158,7 @@ def test_rigid_levels_stand_beside_a_stiff_stop():
     rows = [row("reference"), coarser({}), row("Multi-Phi, rigid", 0.12, setting={"modes": 6}, stiff_stops=stiff)]
     result = result_of([*rows, row("Multi-Phi", 0.01, setting={"modes": 6})])
     told = " ".join(findings(result).distrust)
-    assert (
-        "rigid (r = 6) is 1.10 % from stops of 100 MN/m and more, which themselves differ by up to 1.00 %, and" in told
-    )
+    assert "Rigid levels are the limit of stiff stops" in told
     assert "Multi-Phi, rigid r = 6 12.0 % 1.10 % own uncertainty 0.10 % 1.00 %" in text_of(render_study(result))
 
 
@@ -222,10 +224,31 @@ def test_along_the_scene_every_quantity_has_a_table():
     assert "first contact, stop -0.01 0.02 reference 30.000 ms 30.000 ms" in text
 
 
-def test_every_point_of_the_scene_has_its_line():
-    found = findings(small_study(AXIS, METHODS[:1]))
-    assert [line.split(": The")[0] for line in found.outcome] == [f"At start.displacement = {x}" for x in (-0.01, 0.02)]
-    assert "The cheapest that reaches 10 % is Multi-Phi (r = 4): 300 µs." in found.outcome[0]
+def test_with_several_points_every_method_has_one_line_its_best_setting_over_all_of_them():
+    result = small_study(AXIS, METHODS[:1])
+    errors = {s.at["start.displacement"]: s.error for s in settings(result) if s.setting == {"modes": 16}}
+    (line,) = findings(result).outcome
+    assert line.startswith("Multi-Phi (r = 16): error ")
+    assert f"at most {percent(max(errors.values()))}, at all 2 points; 600 µs in the median" in line
+    table = over_all_points(result)
+    worst = table[table.setting == "r = 16"].iloc[0]
+    assert (worst.points, worst.worst) == (2, max(errors.values()))
+    assert worst["median"] == pytest.approx(sum(errors.values()) / 2)
+    assert "Every setting, over all 2 points" in headings(render_study(result))
+
+
+def test_the_picture_of_the_response_has_a_line_for_each_value_of_the_second_axis():
+    places = [{"gap": g, "stiffness": k, "load": f} for g in (1.0, 2.0) for k in (1.0, 10.0, 100.0) for f in (3.0, 4.0)]
+    rows = [
+        row("reference", at=at, largest={"node3": at["gap"]}, largest_force={"stop": at["stiffness"]}) for at in places
+    ]
+    figure = response_figure(result_of([*rows, row("a", 0.1, places[0])]))
+    assert len(figure.axes) == 4
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["load = 3", "load = 4"]
+    displacement, _, force, _ = figure.axes
+    assert [list(line.get_ydata()) for line in displacement.lines] == 3 * [[1e3, 2e3]]
+    assert [list(line.get_ydata()) for line in force.lines] == [[1.0, 1.0], [10.0, 10.0], [100.0, 100.0]]
+    assert response_figure(small_study(AXIS, METHODS[:1])) is None
 
 
 def test_many_points_are_cut_short_and_counted():
@@ -352,7 +375,8 @@ def test_lasting_settings_have_a_table_of_their_own():
     assert "where every finer setting has to hold it too" in told
 
 
-def test_budgets_without_methods_are_told_in_words():
+def test_budgets_without_methods_have_a_table(monkeypatch):
+    monkeypatch.setattr(study_report, "budget_figure", lambda values: Figure())  # drawn in test_budget.py
     parts = [
         {"cause": "contact law", "size": 0.1, "share": 0.8, "uncertainty": 1e-6},
         {"cause": "modal truncation", "size": 0.04, "share": 0.204, "uncertainty": 1e-6},
@@ -368,9 +392,8 @@ def test_budgets_without_methods_are_told_in_words():
     ]
     told = findings(result_of([], budgets=tuple(rows), methods=[]))
     assert told.asked.startswith("Where does the difference between the full and the reduced model come from?")
-    assert [line.partition(": ")[2] for line in told.outcome] == [
-        "rigid levels, to 0.3 s: 12.0 % in all, of which contact law 80 %, modal truncation 20 %; "
-        "the parts explain it.",
-        "rigid levels, to 0.1 s: fewer than two of the models ran.",
-        "failed, why.",
-    ]
+    assert told.outcome == ("Of 3 error budgets 1 are explained by their parts; the table below has them.",)
+    text = text_of(render_study(result_of([], budgets=tuple(rows[:1]), methods=[])))
+    parts = "contact law 80 %, modal truncation 20 %, time integration -0 %"
+    assert f"start.displacement = 0.02 rigid 0.3 s 12.0 % {parts} yes" in text
+    assert "rigid 0.1 s fewer than two of its models ran" in text

@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
+
 from multiphi_exudyn.study.accuracy.analysis import (
     REFERENCE,
     Setting,
@@ -75,13 +77,12 @@ class Series:
 
 @dataclass(frozen=True)
 class Table:
-    """One quantity along a scene's axis: method -> one cell for each value; contact: or point, "" for none."""
+    """One quantity along a scene's axis: a row for each method, a column for each value; contact: or point, or ""."""
 
     quantity: str
     contact: str
     axis: str
-    values: tuple[float, ...]
-    columns: Mapping[str, tuple[float | None, ...]]
+    frame: pd.DataFrame
 
 
 def series(settings: Sequence[Setting], method: str, axis: str) -> Series | None:
@@ -114,14 +115,10 @@ def tables_along(result: StudyResult, axis: str) -> list[Table]:
     """Error, and what each point and contact does, along a scene's axis, by method."""
     everything = [*references(result), *settings(result)]
     lines = [line for name in names_of(everything) if (line := series(everything, name, axis))]
-    values = tuple(sorted({value for line in lines for value in line.values}))
     found = [setting.values for line in lines for setting in line.settings]
     named = {q: dict.fromkeys(name for values in found for name in values.get(q, {})) for q in QUANTITIES}
     wanted = [("error", ""), *((quantity, name) for quantity, names in named.items() for name in names)]
-    return [
-        Table(quantity, contact, axis, values, _columns(lines, values, quantity, contact))
-        for quantity, contact in wanted
-    ]
+    return [Table(quantity, name, axis, _frame(lines, quantity, name)) for quantity, name in wanted]
 
 
 def _fields(setting: Setting) -> dict[str, Any]:
@@ -150,18 +147,14 @@ def _order(h1: float, e1: float | None, h2: float, e2: float | None, sign: float
     return sign * math.log(e1 / e2) / math.log(h1 / h2)
 
 
-def _columns(
-    lines: Sequence[Series], values: Sequence[float], quantity: str, contact: str
-) -> dict[str, tuple[float | None, ...]]:
-    found = {line.method: dict(zip(line.values, line.settings, strict=True)) for line in lines}
-    return {
-        name: tuple(_cell(of_value.get(value), quantity, contact) for value in values)
-        for name, of_value in found.items()
-        if not (quantity == "error" and name == REFERENCE)
+def _frame(lines: Sequence[Series], quantity: str, name: str) -> pd.DataFrame:
+    shown = [line for line in lines if (quantity, line.method) != ("error", REFERENCE)]
+    cells = {
+        line.method: pd.Series([_cell(each, quantity, name) for each in line.settings], line.values, dtype=float)
+        for line in shown
     }
+    return pd.DataFrame(cells).sort_index().T
 
 
-def _cell(setting: Setting | None, quantity: str, contact: str) -> float | None:
-    if setting is None:
-        return None
-    return setting.error if quantity == "error" else setting.values.get(quantity, {}).get(contact)
+def _cell(setting: Setting, quantity: str, name: str) -> float | None:
+    return setting.error if quantity == "error" else setting.values.get(quantity, {}).get(name)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, named, settings_at
-from multiphi_exudyn.study.comparison.wording import engineering, percent
+from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, settings_at
 
-__all__ = ["StiffError", "stiff_errors", "stiff_words"]
+__all__ = ["StiffError", "stiff_errors"]
 
 
 @dataclass(frozen=True)
@@ -31,18 +30,6 @@ def stiff_errors(result: StudyResult, at: Mapping[str, Any]) -> list[StiffError]
         if (error := _worst(result, kept.get("errors", {}))) is not None
         and (uncertainty := _worst(result, kept.get("uncertainty", {}))) is not None
     ]
-
-
-def stiff_words(result: StudyResult, at: Mapping[str, Any]) -> Iterable[str]:
-    """The best of them in a sentence; none without any."""
-    best = min(stiff_errors(result, at), key=lambda each: each.error, default=None)
-    if best is not None:
-        yield (
-            "Rigid levels are the limit of stiff stops, and are measured against some too: "
-            f"{named(best.setting)} is {percent(best.error)} from stops of {engineering(best.stiffness)}N/m and more, "
-            f"which themselves differ by up to {percent(best.uncertainty)}, and {percent(best.setting.error)} from the "
-            "reference."
-        )
 
 
 def _worst(result: StudyResult, table: Mapping[str, Any]) -> float | None:

@@ -96,20 +96,19 @@ def convergence_figure(result: StudyResult, at: Mapping[str, Any]) -> Figure | N
 def indicator_figure(result: StudyResult) -> Figure | None:
     """A model's own prediction of its error against its error, every run."""
     pairs = indicators(result)
-    everything = [pair for found in pairs.values() for pair in found]
-    if not everything:
+    if pairs.empty:
         return None
-    correlation = rank_correlation(*zip(*everything, strict=True))
+    coefficient, runs = rank_correlation(pairs)
     figure, axes = single(4.6)
     axes.set(xscale="log", yscale="log")
-    for name, found in pairs.items():
-        known = np.array([(100 * i, 100 * e) for i, e in found if i and e]).reshape(-1, 2)
-        if len(known):
-            axes.plot(*known.T, linestyle="None", **marks(styles(result)[name]), label=name)
+    for name, found in pairs[(pairs.indicator > 0) & (pairs.error > 0)].groupby("method", sort=False):
+        axes.plot(
+            100 * found.indicator, 100 * found.error, linestyle="None", **marks(styles(result)[str(name)]), label=name
+        )
     line = axes.dataLim.intervalx if axes.has_data() else (1.0, 1.0)
     axes.plot(line, line, color=LINE, lw=1, label="equal", zorder=0)
-    coefficient = "unknown" if correlation.coefficient is None else f"{correlation.coefficient:.2f}"
-    axes.set_title(f"Spearman's rank correlation {coefficient}, {correlation.runs} runs", fontsize=11, loc="left")
+    size = "unknown" if coefficient is None else f"{coefficient:.2f}"
+    axes.set_title(f"Spearman's rank correlation {size}, {runs} runs", fontsize=11, loc="left")
     axes.set_xlabel("indicator: the model's own prediction of its error")
     axes.set_ylabel(error_label(result))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
@@ -125,9 +124,9 @@ def along_figure(result: StudyResult, axis: str) -> Figure:
     for axes, table in zip(panels, tables, strict=True):
         label, scale = DRAWN[table.quantity]
         for name, style in styles(result).items():
-            cells = table.columns.get(name, ())
-            heights = [np.nan if cell is None else scale * cell for cell in cells]
-            axes.plot(table.values[: len(cells)], heights, style.line, **marks(style), label=name)
+            if name in table.frame.index:
+                heights = scale * table.frame.loc[name]
+                axes.plot(heights.index, heights, style.line, **marks(style), label=name)
         axes.grid(color=GRID)
         if table.quantity == "error":
             axes.set_yscale("log")
@@ -136,7 +135,7 @@ def along_figure(result: StudyResult, axis: str) -> Figure:
         else:
             axes.set_ylabel(f"{label}\n{table.contact}")
             axes.yaxis.set_major_locator(MaxNLocator(integer=table.quantity == "inner_losses"))
-    value_axis(panels[-1], axis, tables[-1].values)
+    value_axis(panels[-1], axis, [float(value) for value in tables[-1].frame.columns])
     legend_below(figure, panels)
     return figure
 
@@ -196,7 +195,7 @@ def _heading(result: StudyResult, at: Mapping[str, Any]) -> str:
     untimed = sum(setting.online_s is None for setting in failed)
     count = f"; × failed: {len(failed)}" if failed else ""
     hidden = f", {untimed} of them without a time" if untimed else ""
-    return f"Lower left is better. Faint: every setting{count}{hidden}{f'; {words(at)}' if at else ''}"
+    return f"Lower left is better. Faint: every setting{count}{hidden}"
 
 
 def _convergence(axes: Axes, result: StudyResult, axis: str, lines: Sequence[Series]) -> None:

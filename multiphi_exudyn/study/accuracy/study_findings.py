@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -23,12 +24,12 @@ from multiphi_exudyn.study.accuracy.analysis import (
     settings_at,
     times_faster,
     uncertainty,
-    words,
 )
-from multiphi_exudyn.study.accuracy.budget_findings import budget_asked, budget_outcome
-from multiphi_exudyn.study.accuracy.stiff_errors import stiff_words
+from multiphi_exudyn.study.accuracy.overview import over_all_points
+from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence, times
+from multiphi_exudyn.study.sweep.store import Row
 
 __all__ = [
     "Choice",
@@ -119,9 +120,19 @@ def timing_words(result: StudyResult) -> str:
 
 
 def _asked(result: StudyResult) -> str:
-    if not result.study.methods:
-        return budget_asked(result)
-    return _asked_of_errors(result)
+    if result.study.methods:
+        return _asked_of_errors(result)
+    return (
+        "Where does the difference between the full and the reduced model come from? One run per rung of a ladder from "
+        f"one to the other, one cause per difference. Scene: {result.study.scene}, {len(result.budgets)} budgets."
+    )
+
+
+def _explained(row: Row) -> bool:
+    """Whether a budget's parts explain all of its differences that are known."""
+    groups = [each["all"] for ladders in row.values.get("windows", {}).values() for each in ladders.values()]
+    known = [group["explained"] for group in groups if group is not None]
+    return bool(known) and all(known)
 
 
 def _asked_of_errors(result: StudyResult) -> str:
@@ -137,15 +148,30 @@ def _asked_of_errors(result: StudyResult) -> str:
 
 
 def _outcome(result: StudyResult) -> Iterable[str]:
-    """One sentence per tolerance, or with several points one line per point; the budgets."""
-    shown = shown_points(result)
-    for at in shown:
-        found = list(_outcome_at(result, at))
-        if len(shown) == 1:
-            yield from found
-        elif found:
-            yield f"At {words(at)}: {' '.join(found)}"
-    yield from budget_outcome(result)
+    """One sentence per tolerance, or with several points one per method; the budgets."""
+    if len(points(result)) == 1:
+        yield from _outcome_at(result, points(result)[0])
+    elif settings(result):
+        yield from _over_all(result)
+    if result.budgets:
+        explained = sum(_explained(row) for row in result.budgets)
+        whole = len(result.budgets)
+        yield f"Of {whole} error budgets {explained} are explained by their parts; the table below has them."
+
+
+def _over_all(result: StudyResult) -> Iterable[str]:
+    """Every method at the setting whose largest error over all points is the smallest."""
+    table = over_all_points(result)
+    count = len(points(result))
+    for method, of_method in table.groupby("method", sort=False):
+        best = of_method.sort_values(["points", "worst"], ascending=[False, True]).iloc[0]
+        if best.points == 0:
+            yield f"{method}: no error is known."
+            continue
+        where = f"all {count} points" if best.points == count else f"{best.points} of {count} points"
+        time = f"; {seconds(best.online_s)} in the median" if math.isfinite(best.online_s) else ""
+        error = f"{percent(best['median'])} in the median, at most {percent(best.worst)}"
+        yield f"{method} ({best.setting}): error {error}, at {where}{time}."
 
 
 def _outcome_at(result: StudyResult, at: Mapping[str, Any]) -> Iterable[str]:
@@ -184,9 +210,10 @@ def _distrust(result: StudyResult) -> Iterable[str]:
     if result.quick:
         yield "This is the study's short form: few settings. It shows that everything runs, no more."
     yield from map(sentence, warned(result))
-    for at in shown_points(result):
-        yield _own_uncertainty(result, at)
-        yield from stiff_words(result, at)
+    at = max(points(result) or [{}], key=lambda each: uncertainty(result, each) or 0.0)
+    yield _own_uncertainty(result, at)
+    if any(stiff_errors(result, each) for each in shown_points(result)):
+        yield "Rigid levels are the limit of stiff stops; a table below measures them against some as well."
     yield from _failures(result)
     yield from _times(result)
     if result.timings:
@@ -196,13 +223,13 @@ def _distrust(result: StudyResult) -> Iterable[str]:
 
 
 def _own_uncertainty(result: StudyResult, at: Mapping[str, Any]) -> str:
-    own, the = uncertainty(result, at), f"At {words(at)}, the" if at else "The"
+    own, most = uncertainty(result, at), " at most, over all points" if len(points(result)) > 1 else ""
     if own is None:
-        return f"{the} reference's own uncertainty is unknown: no coarser copy of it ran."
+        return "The reference's own uncertainty is unknown: no coarser copy of it ran."
     below = [share(tolerance) for tolerance in result.study.tolerances if tolerance < own]
     undecided = f" Who reaches {', '.join(below)} is not decided here." if below else ""
     return (
-        f"{the} reference differs from a coarser copy of itself by {percent(own)}. Smaller errors say nothing."
+        f"The reference differs from a coarser copy of itself by {percent(own)}{most}. Smaller errors say nothing."
         f"{undecided}{_pointwise(result, at)}"
     )
 

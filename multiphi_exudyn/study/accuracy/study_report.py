@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,8 +27,9 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-from multiphi_exudyn.study.accuracy.indicator import Correlation, indicators, rank_correlation
+from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
+from multiphi_exudyn.study.accuracy.overview import over_all_points, response_figure
 from multiphi_exudyn.study.accuracy.stiff_errors import StiffError, stiff_errors
 from multiphi_exudyn.study.accuracy.study_findings import (
     choices,
@@ -94,6 +96,8 @@ def render_study(result: StudyResult) -> str:
         full=full_methods(result),
         error_words=error_words,
         timing=timing_words(result),
+        overall=over_all_points(result).to_dict("records") if len(points(result)) > 1 else [],
+        response=_response(result),
         along=[(axis, _along(result, axis), tables_along(result, axis)) for axis in _axes(result)],
         indicator=_indicator(result),
         correlations=_correlations(result),
@@ -107,7 +111,7 @@ def render_study(result: StudyResult) -> str:
 
 def cell_words(value: float | None, quantity: str) -> str:
     """A cell of a table along an axis, with its unit."""
-    if value is None:
+    if value is None or math.isnan(value):
         return "–"
     if quantity == "error":
         return percent(value)
@@ -162,6 +166,11 @@ def _references(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
     return [setting for setting in references(result) if setting.at == at]
 
 
+def _response(result: StudyResult) -> Picture | None:
+    figure = response_figure(result)
+    return None if figure is None else _picture(figure, "The reference, at the points of the scene's axes.")
+
+
 def _indicator(result: StudyResult) -> Picture | None:
     figure = study_figures.indicator_figure(result)
     caption = (
@@ -171,12 +180,11 @@ def _indicator(result: StudyResult) -> Picture | None:
     return None if figure is None else _picture(figure, caption)
 
 
-def _correlations(result: StudyResult) -> dict[str, Correlation]:
-    """By method, then of all together."""
+def _correlations(result: StudyResult) -> dict[str, tuple[float | None, int, int]]:
+    """By method, then of all together: the rank correlation, of how many runs, how many have an indicator."""
     pairs = indicators(result)
-    found = {name: rank_correlation(*zip(*own, strict=True)) for name, own in pairs.items()}
-    everything = [pair for own in pairs.values() for pair in own]
-    return found | ({"all": rank_correlation(*zip(*everything, strict=True))} if len(pairs) > 1 else {})
+    found = {str(name): (*rank_correlation(own), len(own)) for name, own in pairs.groupby("method", sort=False)}
+    return found | ({"all": (*rank_correlation(pairs), len(pairs))} if len(found) > 1 else {})
 
 
 def _budget(result: StudyResult) -> Picture | None:

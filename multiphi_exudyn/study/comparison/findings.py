@@ -13,7 +13,6 @@ from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED
 from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.rigid_limit import rigid_limit
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, times
 from multiphi_exudyn.study.measures import metrics
@@ -24,6 +23,7 @@ from multiphi_exudyn.study.scene.scene_loads import described_loads
 
 __all__ = ["Findings", "findings"]
 
+HONEST = 0.01  # NRMSE that the headline's model holds, where any does and the reference can tell
 GONE = 0.05  # NRMSE above which a pointwise comparison says little
 
 
@@ -135,21 +135,44 @@ def _outcome(comparison: Comparison) -> str:
 
 
 def _headline_runs(comparison: Comparison) -> list[ModelRun]:
-    return [run for kind in ("reduced", "user-object") if (run := first_of(comparison, kind))]
+    """Of each kind the fastest accurate one, or else the most accurate; then the scene's first, if it is another."""
+    runs = [best for kind in ("reduced", "user-object") if (best := _honest(comparison, kind)) is not None]
+    first = first_of(comparison, "reduced")
+    return runs if first is None or any(run is first for run in runs) else [*runs, first]
+
+
+def _honest(comparison: Comparison, kind: str) -> ModelRun | None:
+    def error(run: ModelRun) -> float:
+        return comparison.worst_error(run, comparison.headline_window)
+
+    runs = [run for run in comparison.measured.values() if run.kind == kind]
+    own = comparison.coarser
+    floor = max(HONEST, error(own) if own is not None and own.name in comparison.measured else 0.0)
+    accurate = [run for run in runs if error(run) <= floor]
+    if accurate:
+        return min(accurate, key=lambda run: run.online_s)
+    return min(runs, key=error, default=None)
 
 
 def _answer(comparison: Comparison, run: ModelRun) -> str:
     return (
         f"{run.label} differs from the reference by {_error(comparison, run)} to {comparison.headline_window:g} s "
-        f"(NRMSE{_judged(comparison)}) and takes {seconds(run.online_s)} instead of "
-        f"{seconds(comparison.reference.online_s)}: {times(comparison.speedup(run))} faster."
+        f"(NRMSE{_judged(comparison)}) and takes {seconds(run.online_s)}: {_cheapest_words(comparison, run)}"
+        f"{times(comparison.speedup(run))} faster than the reference."
     )
+
+
+def _cheapest_words(comparison: Comparison, run: ModelRun) -> str:
+    cheapest = [each for each in comparison.cheapest if each.ok]
+    if not cheapest:
+        return ""
+    return f"{times(cheapest[0].online_s / run.online_s)} faster than the cheapest fair full model, "
 
 
 def _most_accurate(comparison: Comparison) -> Iterable[str]:
     runs = [run for run in comparison.measured.values() if run.kind == "reduced"]
     best = min(runs, key=lambda run: comparison.worst_error(run, comparison.headline_window), default=None)
-    if best is not None and best is not first_of(comparison, "reduced"):
+    if best is not None and not any(run is best for run in _headline_runs(comparison)):
         error, speed = _error(comparison, best), times(comparison.speedup(best))
         yield f"The most accurate reduced model is {best.label}: {error}, {speed} faster."
 
@@ -158,7 +181,7 @@ def _distrust(comparison: Comparison) -> Iterable[str]:
     yield from map(sentence, warned(comparison))
     yield from _own_uncertainty(comparison)
     yield from _sensitivity(comparison)
-    yield from rigid_limit(comparison)
+    yield from _rigid_levels(comparison)
     yield from _force_laws(comparison)
     if comparison.bench.overrides:
         yield (
@@ -186,6 +209,17 @@ def _own_uncertainty(comparison: Comparison) -> Iterable[str]:
         f"The reference is uncertain itself: it differs from a coarser copy of itself by {known}. "
         "Smaller differences say nothing."
     )
+
+
+def _rigid_levels(comparison: Comparison) -> Iterable[str]:
+    if comparison.stiff is not None and not comparison.stiff.ok:
+        cause = comparison.stiff.message
+        yield f"Rigid levels are the limit of stiff stops, but nothing with stiff stops ran: {cause}."
+    elif comparison.rigid:
+        yield (
+            "Rigid levels are the limit of stiff stops: from a soft one they differ by its softness, which no number "
+            "of modes removes. The table “Rigid levels against stiff stops” measures them against their limit."
+        )
 
 
 def _sensitivity(comparison: Comparison) -> Iterable[str]:

@@ -16,13 +16,14 @@ from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.comparison.zoom import embedded, zoom_data
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from reference_models.rig import rig
 
 __all__ = ["render"]
 
-TEMPLATE = "report.html.j2"
+TEMPLATE, SCRIPT = "report.html.j2", "zoom.js"
 ON_THE_PAGE = (
     "nrmse",
     "stiff_nrmse",
@@ -61,6 +62,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
     end = ROUND_OFF * comparison.bench.t_end
     until = {"until": lambda given: "whole run" if given >= end else f"{given:.3f} s"}
     environment.filters |= {"percent": percent, "seconds": seconds, "times": times} | until
+    zoom = zoom_data(comparison)
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,
         bench=comparison.bench,
@@ -72,6 +74,9 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
         definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
         pictures=list(_pictures(comparison, levels)),
         totals=_totals(comparison),
+        zoom=zoom,
+        zoom_json=embedded(zoom),
+        zoom_script=environment.get_template(SCRIPT).render(),
         contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
     )
 

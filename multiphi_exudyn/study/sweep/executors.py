@@ -5,6 +5,9 @@ leaves Ctrl-C to its parent, and ends with its parent however that ends: it hold
 writing end only the parent has. When that is closed, a thread that waits for it ends the worker, and on Linux the
 signal SIGIO does, also inside compiled code that keeps the interpreter's lock, as Exudyn's solvers do.
 
+Why not a library's pool: workers of pebble, loky and concurrent.futures outlive a parent that is killed while they
+compute in compiled code, and only pebble limits the time of one call, neither in this process nor on a cluster.
+
 Worker processes are spawned: a script that opens them needs ``if __name__ == "__main__":``.
 """
 

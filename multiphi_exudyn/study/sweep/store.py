@@ -162,6 +162,9 @@ class Store:
         try:
             yield
         except READING as error:
+            if FULL in str(error):
+                kept = "what has finished is kept; make room and start again"
+                raise MultiPhiValueError(f"path: {self.path}: the disk is full; {kept}") from error
             raise _unusable(self.path, f"is damaged ({error})") from error
 
 
@@ -169,6 +172,7 @@ class _Damaged(Exception):
     """What was stored is not there any more; the message says what."""
 
 
+FULL = "database or disk is full"  # SQLite's words for it
 READING = (sqlite3.Error, UnicodeDecodeError, _Damaged)  # raised where a file is damaged
 
 
