@@ -38,7 +38,7 @@ class LinearStructure:
     points: name -> DoF index or (n,) row; afterwards name -> row, of which only what is not zero is kept.
 
     Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
-    of its coordinates, r + 8 and some for each contact and point, a few times while it is computed, and once the factors
+    of its coordinates, r + 8 and some for each contact and point, a few times while it is computed, once the factors
     of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.5 GB for matrices and mesh, at most 0.8 GB in all.
 
     Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
