@@ -32,6 +32,8 @@ MODELS = [
     {"kind": "craig-bampton", "name": "component", "modes": 12, "step": 1e-5},
     {"kind": "solve-ivp", "name": "stepwise", "method": "DOP853", "rtol": 1e-9},
     {"kind": "global-basis", "name": "one-basis", "modes": 8},
+    {"kind": "pod-basis", "name": "pod", "modes": 8},
+    {"kind": "splitting", "name": "splitting", "modes": 6, "step": 2e-6},
     {"kind": "global-basis", "name": "one-rigid-basis", "modes": 8, "contact": "rigid"},
 ]
 
@@ -97,6 +99,8 @@ def test_the_baselines_answer_as_the_models_they_replace(runs):
         ("stepwise", "compliant", 1e-7),
         ("component", "all", 1e-4),
         ("one-basis", "all", 1e-5),
+        ("pod", "all", 1e-3),
+        ("splitting", "all", 2e-3),
         ("one-rigid-basis", "rigid", 0.05),
     ):
         assert difference(runs, one, other) < tolerance, one

@@ -25,6 +25,7 @@ SHIPPED = (
     "modes",
     "modes-rigid",
     "pareto",
+    "pareto-stiff",
     "sets",
     "support",
 )

@@ -43,7 +43,16 @@ __all__ = [
 
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#8A6D00", "#7F3C8D")
 REFERENCE, FULL, CONTACT = "#000000", "#7A7A7A", "#E3E3E3"
-MARKERS = {"reduced": "o", "user-object": "D", "full": "s", "craig-bampton": "^", "solve-ivp": "v", "global-basis": "P"}
+MARKERS = {
+    "reduced": "o",
+    "user-object": "D",
+    "full": "s",
+    "craig-bampton": "^",
+    "solve-ivp": "v",
+    "global-basis": "P",
+    "pod-basis": "X",
+    "splitting": "<",
+}
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
 APART = 2.3  # between beams drawn over each other, of the largest value of a mode

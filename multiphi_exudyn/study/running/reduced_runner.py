@@ -15,12 +15,13 @@ from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.model_kinds import GlobalBasisModel, ReducedModel
+from multiphi_exudyn.study.scene.model_kinds import GlobalBasisModel, ReducedModel, TrainedBasisModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
 from reference_models.global_basis import global_basis
+from reference_models.pod_basis import pod_basis
 
 __all__ = [
     "ENERGY_INTERVAL",
@@ -30,6 +31,8 @@ __all__ = [
     "reduced_label",
     "run_global_basis",
     "run_reduced",
+    "run_trained_basis",
+    "trained_label",
 ]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
@@ -73,9 +76,20 @@ def run_global_basis(bench: Workbench, spec: GlobalBasisModel, label: str, how: 
     return _run(bench, spec, label, model, start, building, how)[0]
 
 
+def trained_label(bench: Workbench, spec: TrainedBasisModel) -> str:
+    """How tables and figures call it."""
+    return f"POD basis of {spec.training:g} s, {level_words(bench, spec.rigid)}, r = {spec.modes}"
+
+
+def run_trained_basis(bench: Workbench, spec: TrainedBasisModel, label: str, how: How) -> ModelRun:
+    """The structure on a basis of snapshots; the training run is part of what is done offline."""
+    (model, start), building = timed(lambda: _trained_start(bench, spec))
+    return _run(bench, spec, label, model, start, building, how)[0]
+
+
 def _run(
     bench: Workbench,
-    spec: ReducedModel | GlobalBasisModel,
+    spec: ReducedModel | GlobalBasisModel | TrainedBasisModel,
     label: str,
     model: MultiPhiModel,
     start: Equilibrium,
@@ -122,6 +136,15 @@ def _global_start(bench: Workbench, spec: GlobalBasisModel) -> tuple[MultiPhiMod
     contacts = bench.contacts(spec.rigid)
     assert spec.modes is not None, "filled in where the scene lists its models"
     projected = global_basis(bench.structure, contacts, spec.modes)
+    model = MultiPhiModel(projected, bench.nonlinearities(spec.rigid), modes="all")
+    return model, start_of(replace(bench, structure=projected), model)
+
+
+def _trained_start(bench: Workbench, spec: TrainedBasisModel) -> tuple[MultiPhiModel, Equilibrium]:
+    assert spec.modes is not None, "filled in where the scene lists its models"
+    whole = MultiPhiModel(bench.structure, bench.nonlinearities(spec.rigid), modes="all")
+    training = simulate(whole, min(spec.training, bench.t_end), start=start_of(bench, whole), loads=bench.loads)
+    projected = pod_basis(training, spec.modes)
     model = MultiPhiModel(projected, bench.nonlinearities(spec.rigid), modes="all")
     return model, start_of(replace(bench, structure=projected), model)
 

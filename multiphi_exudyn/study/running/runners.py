@@ -15,8 +15,16 @@ from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.study.running.body_runner import body_label, run_user_object
 from multiphi_exudyn.study.running.craig_bampton_runner import craig_bampton_label, run_craig_bampton
 from multiphi_exudyn.study.running.full_runner import full_label, run_full
-from multiphi_exudyn.study.running.reduced_runner import global_label, reduced_label, run_global_basis, run_reduced
+from multiphi_exudyn.study.running.reduced_runner import (
+    global_label,
+    reduced_label,
+    run_global_basis,
+    run_reduced,
+    run_trained_basis,
+    trained_label,
+)
 from multiphi_exudyn.study.running.runs import How, ModelRun
+from multiphi_exudyn.study.running.splitting_runner import run_splitting, splitting_label
 from multiphi_exudyn.study.running.stepwise_runner import run_stepwise, stepwise_label
 from multiphi_exudyn.study.scene.workbench import Workbench
 from multiphi_exudyn.time.warning_groups import kept_back
@@ -39,6 +47,8 @@ RUNNERS: Mapping[str, Runner] = {
     "craig-bampton": Runner(craig_bampton_label, run_craig_bampton),
     "solve-ivp": Runner(stepwise_label, run_stepwise),
     "global-basis": Runner(global_label, run_global_basis),
+    "pod-basis": Runner(trained_label, run_trained_basis),
+    "splitting": Runner(splitting_label, run_splitting),
 }
 
 

@@ -5,6 +5,7 @@ A step size control that is asked for too little can feed energy to the highest 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,9 +17,9 @@ from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.model_kinds import StepwiseModel
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
-from reference_models.stepwise import StepwiseRun, solve_stepwise
+from reference_models.stepwise import StepwiseHistories, StepwiseRun, solve_stepwise
 
-__all__ = ["run_stepwise", "stepwise_label"]
+__all__ = ["run_stepwise", "sampled", "stepwise_label"]
 
 
 def stepwise_label(bench: Workbench, spec: StepwiseModel) -> str:
@@ -47,14 +48,22 @@ def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str, how: How) ->
         first_s=first,
         repeats_s=repeats,
     )
-    return _sampled(bench, solved, run) if run.ok else run
+    return sampled(bench, run, solved.histories, solved.contact_intervals) if run.ok else run
 
 
-def _sampled(bench: Workbench, solved: StepwiseRun, run: ModelRun) -> ModelRun:
-    """The run with its histories, or failed for an energy gain."""
-    histories, sampling = timed(lambda: solved.histories(bench.points, bench.time))
+def sampled(
+    bench: Workbench,
+    run: ModelRun,
+    histories_of: Callable[[Sequence[str], np.ndarray], StepwiseHistories],
+    intervals_of: Callable[[str], list[tuple[float, float]]],
+) -> ModelRun:
+    """A run of a method with steps with its histories, or failed for an energy gain.
+
+    histories_of: points at times (k,) [s]; intervals_of: when a contact is closed [s].
+    """
+    histories, sampling = timed(lambda: histories_of(bench.points, bench.time))
     energy_time = np.linspace(0.0, bench.t_end, round(bench.t_end / ENERGY_INTERVAL) + 1)
-    energy = solved.histories((), energy_time).energy
+    energy = histories_of((), energy_time).energy
     gained = energy_gain(energy_time, energy)
     if gained:
         return replace(run, status="failed", message=gained)
@@ -64,7 +73,7 @@ def _sampled(bench: Workbench, solved: StepwiseRun, run: ModelRun) -> ModelRun:
         "points": histories.points,
         "gaps": histories.gaps,
         "contact_force": forces,
-        "contact_intervals": {name: interval_array(solved.contact_intervals(name)) for name in forces},
+        "contact_intervals": {name: interval_array(intervals_of(name)) for name in forces},
         "impulse": {name: float(np.trapezoid(force, bench.time)) for name, force in forces.items()},
     }
     return replace(run, energy_time=energy_time, energy=energy, sampling_s=sampling, **fields)

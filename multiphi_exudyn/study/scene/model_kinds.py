@@ -31,7 +31,9 @@ __all__ = [
     "GlobalBasisModel",
     "ModelSpec",
     "ReducedModel",
+    "SplittingModel",
     "StepwiseModel",
+    "TrainedBasisModel",
     "UserObjectModel",
 ]
 
@@ -262,7 +264,37 @@ class GlobalBasisModel(_Model):
     lacks: ClassVar[tuple[Lack, ...]] = (_weight, _friction)
 
 
-ModelSpec = ReducedModel | UserObjectModel | FullModel | CraigBamptonModel | StepwiseModel | GlobalBasisModel
+class TrainedBasisModel(_Model):
+    """One basis for all levels from snapshots of a run with all modes (POD), without time steps."""
+
+    kind: Literal["pod-basis"]
+    modes: Annotated[int, Field(ge=1)] | None = None
+    training: Positive = 0.1  # s, of the scene's own motion from its start
+
+    lacks: ClassVar[tuple[Lack, ...]] = (_weight, _friction, _laws)
+
+
+class SplittingModel(_Model):
+    """A Craig-Bampton component in its modes, free motion exact, penalty forces by Strang splitting, compiled."""
+
+    kind: Literal["splitting"]
+    modes: Annotated[int, Field(ge=0)]  # with the interface held
+    step: Positive  # s
+
+    lacks: ClassVar[tuple[Lack, ...]] = (_sparse, _loads, _friction, _damping, _laws)
+    penalty: ClassVar[bool] = True
+
+
+ModelSpec = (
+    ReducedModel
+    | UserObjectModel
+    | FullModel
+    | CraigBamptonModel
+    | StepwiseModel
+    | GlobalBasisModel
+    | TrainedBasisModel
+    | SplittingModel
+)
 
 
 def _not_round(demands: Demands) -> Iterator[str]:
