@@ -31,7 +31,11 @@ INSTANTS = 1001  # of a history where no times are given
 
 
 class Histories(Shown, ABC):
-    """See the module's docstring. Times [s] are scalars or (k,); at an event ``side`` is "right" or "left"."""
+    """What can be asked of a motion, of a run or of one that was saved.
+
+    Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or the "left".
+    MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for a name that there is not.
+    """
 
     segments: Sequence[Segment]
     events: Sequence[Event]
@@ -150,10 +154,30 @@ class Histories(Shown, ABC):
         """Histories as a pandas table: a row for each time [s], which is the index.
 
         Columns: displacement [m] of every point by its name, of every contact "gap NAME" [m] and "force NAME" [N], of
-        what has friction "friction NAME" [N] and "slip NAME" [m]. points: names, None for all of the structure's.
-        times: (k,) [s], None for 1001 that are evenly spaced.
+        what has friction "friction NAME" [N] and "slip NAME" [m].
 
-        Raises MultiPhiValueError for a name or a time that there is not.
+        Parameters
+        ----------
+        points : sequence of str, default None
+            Names of points, None for all of the structure's.
+        times : array (k,), default None
+            Times [s], None for 1001 that are evenly spaced.
+
+        Raises
+        ------
+        MultiPhiValueError
+            For a name or a time that there is not.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+        >>> tr = mp.simulate(model, 0.5, displacement=model.static_equilibrium({"tip": 100.0}))
+        >>> list(tr.to_dataframe().columns)
+        ['tip', 'gap stop', 'force stop']
         """
         from pandas import DataFrame, Index
 
@@ -168,8 +192,12 @@ class Histories(Shown, ABC):
     def plot(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> Figure:
         """A matplotlib figure: displacements of points, and below them the forces of contacts and frictions.
 
-        points, times: as in ``to_dataframe``. Grey: while a contact is closed; where there are none, while friction
-        sticks.
+        Grey: while a contact is closed; where there are none, while friction sticks.
+
+        Parameters
+        ----------
+        points, times
+            As in ``to_dataframe``.
         """
         at = self._shown_times(times)
         forces: dict[str, Any] = {name: self.contact_force(name, at) for name in self.contacts}
