@@ -41,12 +41,45 @@ def read_structure(
     damping: str | os.PathLike[str] | Matrix | ModalDamping | RayleighDamping | None = None,
     points: Mapping[str, int | np.ndarray] | None = None,
 ) -> LinearStructure:
-    """A linear structure of matrices in files; see the module's docstring for their kinds.
+    """A linear structure of matrices in files, as finite element programs write them.
 
-    mass [kg, kg m2], stiffness [N/m, N m]: paths, (n, n) each; sparse ones stay sparse.
-    damping [N s/m, N m s]: a path, or what ``LinearStructure`` takes. points: as there, DoFs counted from 0.
+        .mtx, .mtx.gz   Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
+        .npz            one sparse matrix, as scipy.sparse.save_npz writes it
+        .npy            one dense array, as numpy.save writes it
 
-    Raises MultiPhiValueError naming the file that cannot be read, and what ``LinearStructure`` raises.
+    Parameters
+    ----------
+    mass : path
+        M (n, n) [kg, kg m2]; a sparse one stays sparse.
+    stiffness : path
+        K (n, n) [N/m, N m].
+    damping : path, array (n, n), ModalDamping, RayleighDamping or None, default None
+        C (n, n) [N s/m, N m s] in a file, or what LinearStructure takes.
+    points : mapping of str to int or array (n,), default None
+        Name to degree of freedom, counted from 0, or to row.
+
+    Returns
+    -------
+    LinearStructure
+        Of these matrices.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no path.
+    MultiPhiValueError
+        Naming the file that cannot be read and why; and what LinearStructure raises.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> np.save("M.npy", chain.mass)
+    >>> np.save("K.npy", chain.stiffness)
+    >>> mp.read_structure("M.npy", "K.npy", mp.ModalDamping(0.01), points={"tip": 2})
+    <LinearStructure: degrees of freedom 3; matrices dense; damping ModalDamping; points tip>
     """
     if isinstance(damping, (str, os.PathLike)):
         damping = read_array("damping", damping)

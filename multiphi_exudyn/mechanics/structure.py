@@ -32,19 +32,43 @@ ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating poin
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinearStructure(Shown):
-    """A linear structure; see the module's docstring for the equation.
+    """A linear structure: mass, damping and stiffness matrices with named points (eq. 38.1).
 
-    mass, stiffness: (n, n), dense or scipy.sparse, symmetric; kept as given, never modified.
-    damping: None | (n, n) | ModalDamping | RayleighDamping.
-    points: name -> DoF index or (n,) row; afterwards name -> row, of which only what is not zero is kept.
+        M x'' + C x' + K x = f(t),   x in R^n
+
+    A point is a row p of n numbers: its value is p.x, and a force F at it acts as p F. Two structures are equal only if
+    they are the same object.
 
     Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
     of its modes and static shapes, 4 r + 40 + contacts + points, a few times while it is computed, and once the factors
     of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.4 GB for matrices and mesh, at most 1.1 GB in all.
 
-    Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
-    asymmetric matrix, a mass that is not positive definite, a negative diagonal of stiffness or damping.
-    Two structures are equal only if they are the same object.
+    Parameters
+    ----------
+    mass : array (n, n)
+        M [kg, kg m2], dense or scipy.sparse, symmetric positive definite; kept as given, never modified.
+    stiffness : array (n, n)
+        K [N/m, N m], dense or scipy.sparse, symmetric positive semidefinite; rigid-body modes are welcome.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        C [N s/m, N m s], symmetric positive semidefinite, or how it is made; None for no damping.
+    points : mapping of str to int or array (n,), default empty
+        Name to degree of freedom, counted from 0, or to row p; afterwards name to row.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers or no names.
+    MultiPhiValueError
+        For a wrong shape, a value that is not finite, an asymmetric matrix, a mass that is not positive definite, a
+        negative diagonal of stiffness or damping, and a degree of freedom that there is not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), points={"tip": 2})
+    <LinearStructure: degrees of freedom 3; matrices dense; damping ModalDamping; points tip>
     """
 
     mass: Matrix
@@ -76,7 +100,10 @@ class LinearStructure(Shown):
         yield "points", names(list(self.points))
 
     def row(self, at: At) -> np.ndarray:
-        """The row p, (n,), of a point name, of {point: coefficient}, or of a row given as such."""
+        """The row p (n,) of a point name, of {point: coefficient}, or of a row given as such.
+
+        MultiPhiValueError for a point that there is not, MultiPhiTypeError for coefficients that are no numbers.
+        """
         if isinstance(at, str):
             if at not in self.points:
                 known = ", ".join(sorted(self.points)) or "none"
