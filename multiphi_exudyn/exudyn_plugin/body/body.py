@@ -53,9 +53,58 @@ ROUND_OFF = 1e-12  # of the energy at the start: an impact that takes less is no
 
 
 class MultiPhiBody:
-    """One body: its items, its present state, and what happened to it.
+    """One Multi-Phi body of an Exudyn system: its items, its present state, and what happened to it.
 
-    name, model; items: typed indices; matched_step: h [s] or None; coordinates: its part of the system.
+    Made by ``CreateMultiPhiBody``, and found as ``mbs.variables["multiPhi"][name]``.
+
+    Parameters
+    ----------
+    name : str
+        Of the body.
+    motion : Motion
+        Of the model, at its start.
+    loads : sequence of loads
+        Its own, as of ``simulate``.
+    end : float
+        Of the run [s] that they are prepared for.
+    matched_step : float or None
+        Step [s] that its modes are matched to.
+
+    Attributes
+    ----------
+    model : MultiPhiModel
+        What it moves by.
+    items : dict
+        Typed indices of its items in the system.
+    coordinates : Coordinates
+        Its part of the system's coordinates.
+
+    Raises
+    ------
+    MultiPhiValueError
+        For loads at points or contacts that there are not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
+    >>> settings.solution.file.write = False
+    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> body = mbs.variables["multiPhi"]["chain"]
+    >>> body.events[0].contact, body.warnings
+    ('stop', ())
     """
 
     def __init__(

@@ -46,24 +46,81 @@ def CreateMultiPhiBody(
     drawing: Drawing | None = None,
     start: Trajectory | Equilibrium | None = None,
 ) -> dict[str, Any]:
-    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
+    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``; also ``mbs.CreateMultiPhiBody(...)``.
 
-    mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``. start: as there; where it
-    is a trajectory its final state is handed on whole, and time begins anew.
-    matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
-    with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
-    stepped_level.py. interface: names of points, or {name: point or row}, that connectors, loads and sensors act on
-    (interface.py); needs TrapezoidalIndex2 and constant loads. Where an ObjectContactCoordinate acts on them, set
-    ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps than the others are no gain, and
-    with matchedStepSize an error. show: as in other Create functions. drawing: None, or
-    how the renderer shows the body.
+        M q'' + D q' + K q = drive + (loads and connectors of the system),   q = eta of the present level
 
-    Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, one coordinate each, and
-    {name: SensorIndex}, the force on it), nGenericODE2, oGenericODE2, nGenericData (not without contacts),
-    sCoordinates, sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into
-    displacements and forces; ``mbs.variables['multiPhi'][name]`` has the ``events`` with times inside steps, and the
-    ``warnings``: what to distrust in the run so far; at its end a MultiPhiWarning is issued for each of them.
+    A body on which nothing acts but its own loads follows the motion of ``simulate``; beside others its steps are of
+    second order, and its events are found inside them.
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        The system.
+    model : MultiPhiModel
+        Structure, contacts and numbers of modes.
+    name : str, default ""
+        Of the body, and of its items with a prefix; empty for "multiPhi0" and so on.
+    displacement, velocity : array (n,), default None
+        x [m, rad] and x' [m/s, rad/s] at the start, None for zero.
+    loads : sequence of loads, default ()
+        As of ``simulate``.
+    matchedStepSize : float, default None
+        The fixed step size [s] of the solver, to which modes are matched: the body alone is then exact at that step
+        with TrapezoidalIndex2, or GeneralizedAlpha of spectralRadius 1; velocities of the node are those of the matched
+        modes.
+    interface : iterable of str, or mapping of str to point or array (n,), default ()
+        Points that connectors, loads and sensors of the system act on; needs TrapezoidalIndex2 and constant ``loads``.
+        Where an ObjectContactCoordinate acts on them, set
+        ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps are no gain, and with
+        matchedStepSize an error.
+    show : bool, default True
+        As in other Create functions.
+    drawing : Drawing, default None
+        How the renderer shows the body; None for nothing.
+    start : Trajectory or Equilibrium, default None
+        As of ``simulate``, instead of a displacement; the final state of a trajectory is handed on whole, and time
+        begins anew.
+
+    Returns
+    -------
+    dict
+        Typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates, sCoordinates_t,
+        sCoordinates_tt and sLevel; with an interface nInterface {name: NodeIndex}, one coordinate each, and sInterface
+        {name: SensorIndex}, the force on it. ``body_histories(mbs, items)`` turns the sensors into displacements and
+        forces; ``mbs.variables["multiPhi"][name]`` has the ``events``, with times inside steps, and the ``warnings``,
+        for each of which a MultiPhiWarning is issued at the end of a run.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For a name that is taken, a model with a Tolerance or with friction at contacts, a step that is not > 0, loads
+        that vary or moving counter-surfaces beside an interface, and what ``simulate`` refuses.
+    NumericalFailure
+        For a start that cannot be carried through.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
+    >>> settings.solution.file.write = False
+    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> mbs.variables["multiPhi"]["chain"].events[0].kind
+    'close'
     """
     if not isinstance(mbs, exu.MainSystem):
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an Exudyn MainSystem")

@@ -38,10 +38,58 @@ RECORDED = {
 class BodyHistories:
     """What a body's sensors recorded: k samples at ``sensors.writePeriod``; for an event list exact times.
 
-    time (k,) [s]; points: name -> displacement (k,) [m]; velocities: name -> (k,) [m/s]; gaps: contact -> (k,) [m];
-    contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> [(closed at, opened at), ...] [s];
-    closed: contact -> (k,) bool; friction_force: friction -> T (k,) [N]; slip: friction -> (k,) [m];
-    stick_intervals: friction -> (m, 2) [s]; events and warnings as in a Trajectory.
+    Made by ``body_histories``.
+
+    Attributes
+    ----------
+    time : array (k,)
+        [s].
+    points : mapping of str to array (k,)
+        Point to displacement [m].
+    velocities : mapping of str to array (k,)
+        Point to velocity [m/s].
+    gaps : mapping of str to array (k,)
+        Contact to gap [m].
+    contact_force : mapping of str to array (k,)
+        Contact to lambda [N].
+    contact_intervals : mapping of str to list of (float, float)
+        Contact to (closed at, opened at) [s].
+    closed : mapping of str to array (k,)
+        Contact to whether it is closed.
+    friction_force : mapping of str to array (k,)
+        Friction to T [N].
+    slip : mapping of str to array (k,)
+        Friction to the way [m] of its patch.
+    stick_intervals : mapping of str to array (m, 2)
+        Friction to (sticks from, slips from) [s].
+    events : tuple of Event
+        In order of time, with times inside steps.
+    warnings : tuple of str
+        What to distrust in the run.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
+    >>> settings.solution.file.write = False
+    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> histories = body_histories(mbs, items)
+    >>> histories.time.shape == histories.points["tip"].shape
+    True
+    >>> histories.events[0].contact, histories.events[0].kind, round(histories.events[0].time, 4)
+    ('stop', 'close', 0.0197)
     """
 
     time: np.ndarray
@@ -79,9 +127,50 @@ def _sensor(mbs: Any, body: MultiPhiBody, key: str, node: str, kind: Any) -> Any
 
 
 def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | None = None) -> BodyHistories:
-    """Histories of a body from the sensors of the last run; ``items`` as returned when it was created.
+    """Histories of a body from its sensors of the last run.
 
-    points: names to rebuild, None for all of the structure.
+        x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        After SolveDynamic.
+    items : mapping
+        As ``CreateMultiPhiBody`` returned it.
+    points : iterable of str, default None
+        Names to rebuild, None for all of the structure's.
+
+    Returns
+    -------
+    BodyHistories
+        Displacements, velocities, gaps, forces, events and warnings.
+
+    Raises
+    ------
+    MultiPhiValueError
+        For items of no body of this system, a system that has not run, and points that there are not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
+    >>> settings.solution.file.write = False
+    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> histories = body_histories(mbs, items)
+    >>> print(1e3 * histories.points["tip"][:1].round(6))  # mm
+    [7.5]
     """
     body = _body_of(mbs, items)
     on_points = [mbs.GetSensorStoredData(sensor)[:, 1] for sensor in items.get("sInterface", {}).values()]
