@@ -125,10 +125,12 @@ class Event:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-    >>> tr = mp.simulate(model, 0.5, displacement=model.static_equilibrium({"tip": 100.0}))
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
     >>> first = tr.events[0]
     >>> first.contact, first.kind, round(first.time, 4)
     ('stop', 'close', 0.0197)

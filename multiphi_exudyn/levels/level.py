@@ -63,9 +63,10 @@ class LevelOverride:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, overrides={(): mp.LevelOverride(frequencies=[14.5])})
+    >>> measured = mp.LevelOverride(frequencies=[14.5])
+    >>> model = mp.MultiPhiModel(chain, overrides={(): measured})
     >>> print(model.level(()).frequencies.round(1))
     [14.5 39.7 57.4]
     """
@@ -139,9 +140,10 @@ class Level(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> for closed in ((), ("stop",)):
     ...     print(model.level(closed).frequencies.round(1))
     [14.2 39.7 57.4]

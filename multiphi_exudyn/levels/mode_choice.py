@@ -69,7 +69,7 @@ class UpTo:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> model = mp.MultiPhiModel(chain, modes=mp.UpTo(50.0))
     >>> print(model.level(()).frequencies.round(1))
@@ -105,10 +105,11 @@ class Tolerance:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> model = mp.MultiPhiModel(chain, modes=mp.Tolerance(0.01))
-    >>> tr = mp.simulate(model, 0.5, displacement=model.static_equilibrium({"tip": 100.0}))
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
     >>> model.decided.modes
     'all'
     """

@@ -74,9 +74,10 @@ class MultiPhiModel(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> model.levels_possible
     2
     >>> print(model.level(("stop",)).frequencies.round(1))
@@ -384,9 +385,10 @@ class MultiPhiModel(Shown):
         --------
         >>> import numpy as np
         >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
         >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
         >>> x = model.static_equilibrium({"tip": 100.0})
         >>> print(1e3 * x)  # mm: three springs of 4e4 N/m in series
         [2.5 5.  7.5]

@@ -49,12 +49,14 @@ class Equilibrium:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> ring = mp.Friction("ring", "tip", limit=20.0, stiffness=1e5)
     >>> rest = mp.MultiPhiModel(chain, [ring]).equilibrium({"tip": 100.0})
-    >>> print(1e3 * rest.displacement.round(6), round(1e3 * rest.stretches["ring"], 3))  # mm
-    [2. 4. 6.] 0.2
+    >>> print(1e3 * rest.displacement.round(6))  # mm
+    [2. 4. 6.]
+    >>> round(1e3 * rest.stretches["ring"], 3)  # mm
+    0.2
     """
 
     displacement: np.ndarray

@@ -59,7 +59,7 @@ class Assembly(LinearStructure):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> pair = mp.assemble({"a": chain, "b": chain}, ties=[{"a.tip": 1.0, "b.tip": -1.0}])
     >>> pair.n, list(pair.points)
@@ -115,9 +115,9 @@ def assemble(
     ----------
     parts : mapping of str to LinearStructure
         By names without a dot; the point "tip" of the part "a" becomes "a.tip".
-    ties : sequence of {point: coefficient}, default ()
-        Each a sum that is held at zero: {"a.tip": 1.0, "b.tip": -1.0} ties two points, {"a.tip": 1.0} one to the
-        ground.
+    ties : sequence of mapping, default ()
+        Each {point: coefficient, ...}, a sum that is held at zero: {"a.tip": 1.0, "b.tip": -1.0} ties two points,
+        {"a.tip": 1.0} one to the ground.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         None keeps what the parts have; anything else takes its place, ratios being of the modes of the assembly.
 
@@ -140,7 +140,7 @@ def assemble(
 
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> pair = mp.assemble({"a": chain, "b": chain}, ties=[{"a.tip": 1.0, "b.tip": -1.0}])
     >>> print(mp.MultiPhiModel(pair).level(()).frequencies[:2].round(1))

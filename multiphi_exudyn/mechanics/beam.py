@@ -125,8 +125,9 @@ class Beam:
     Examples
     --------
     >>> import multiphi_exudyn as mp
-    >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, youngs_modulus=2.1e11, density=7850.0)
-    >>> beam = mp.Beam([strip], points={"tip": 0.3}, masses=[mp.PointMass(at=0.3, mass=0.05)])
+    >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0}
+    >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, **steel)
+    >>> beam = mp.Beam([strip], {"tip": 0.3}, [mp.PointMass(at=0.3, mass=0.05)])
     >>> beam.length
     0.3
     """
@@ -238,7 +239,8 @@ def planar_beam(
     Examples
     --------
     >>> import multiphi_exudyn as mp
-    >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, youngs_modulus=2.1e11, density=7850.0)
+    >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0}
+    >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, **steel)
     >>> cantilever = mp.planar_beam(mp.Beam([strip], points={"tip": 0.3}), elements=20)
     >>> print(mp.MultiPhiModel(cantilever, modes=3).level(()).frequencies.round(0))  # Hz
     [ 46. 290. 812.]

@@ -59,25 +59,26 @@ __all__ = ["UnilateralContact"]
 class UnilateralContact:
     """One unilateral contact: a gap that may not close further than zero, or only against a stiffness.
 
-        g(x) = h.x + gap,   open where g > 0;   the contact force lambda >= 0 [N] acts along +h.
+        g(x) = h.x + gap,   open where g > 0;   force lambda >= 0 [N] along +h
 
-        rigid      0 <= lambda, g >= 0, lambda g = 0, and where it strikes with g'- < 0: g'+ >= -e g'-  (Moreau)
+        rigid      lambda >= 0, g >= 0, lambda g = 0;  struck g'+ >= -e g'-  (Moreau)
         compliant  lambda = k max(0, -g)
         viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
 
-        stick      T = k_t (h_t.x - v_t t - w), without a spring h_t.x - v_t t = w and T its reaction,   |T| <= mu_s N
-        slip       T = s mu N,   N = lambda,   s (h_t.x' - v_t - T' / k_t) >= 0,   s = +1 or -1
+        stick      T = k_t (h_t.x - v_t t - w), or the reaction;  |T| <= mu_s N
+        slip       T = s mu N,  N = lambda,  s (h_t.x' - v_t - T' / k_t) >= 0,  s = 1 or -1
 
-    The force on the structure is h N - h_t T. A stop 1.35 mm below a beam that bends upward has h = +e_tip and gap =
-    1.35e-3; a stop above it has h = -e_tip; two bodies that face each other have one coefficient each. Two contacts are
-    equal only if they are the same object.
+    The force on the structure is h N - h_t T. What sticks without a spring holds its place w, h_t.x - v_t t = w, and T
+    is the reaction. A stop 1.35 mm below a beam that bends upward has h = +e_tip and gap = 1.35e-3; a stop above it has
+    h = -e_tip; two bodies that face each other have one coefficient each. Two contacts are equal only if they are the
+    same object.
 
     Parameters
     ----------
     name : str
         How levels, events and results refer to it.
-    direction : point name, {point: coefficient} or array (n,)
-        h, along which the gap opens.
+    direction : str, mapping or array (n,)
+        h, along which the gap opens: a point name, {point: coefficient} or a row.
     gap : float
         Distance [m] in the undeformed structure; negative is a preload.
     stiffness : float, default inf
@@ -86,8 +87,8 @@ class UnilateralContact:
         c [N s/m] beside a finite stiffness, >= 0.
     friction : float, default 0.0
         mu while it slides, >= 0.
-    tangential : point name, {point: coefficient} or array (n,), default None
-        h_t, along which it slides; needed where there is friction.
+    tangential : str, mapping or array (n,), default None
+        h_t, along which it slides, given as h is; needed where there is friction.
     static_friction : float, default None
         mu_s >= mu up to which it sticks; None: the same.
     tangential_stiffness : float, default inf
@@ -109,13 +110,14 @@ class UnilateralContact:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> below = mp.UnilateralContact("below", "tip", gap=1e-3)  # rigid
-    >>> above = mp.UnilateralContact("above", {"tip": -1.0}, gap=2e-3, stiffness=1e6, damping=50.0)
+    >>> above = mp.UnilateralContact("above", {"tip": -1.0}, gap=2e-3, stiffness=1e6)
     >>> below.rigid, above.rigid
     (True, False)
-    >>> tr = mp.simulate(mp.MultiPhiModel(chain, [below, above]), 0.1, velocity=np.array([0.0, 0.0, 0.5]))
+    >>> model = mp.MultiPhiModel(chain, [below, above])
+    >>> tr = mp.simulate(model, 0.1, velocity=np.array([0.0, 0.0, 0.5]))
     >>> tr.events[0].contact
     'above'
     """

@@ -100,8 +100,9 @@ class RayleighDamping:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.RayleighDamping(alpha=1.0, beta=1e-4), {"tip": 2})
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> rayleigh = mp.RayleighDamping(alpha=1.0, beta=1e-4)
+    >>> chain = mp.LinearStructure(np.eye(3), K, rayleigh, {"tip": 2})
     >>> print(mp.MultiPhiModel(chain).level(()).ratios.round(4))
     [0.0101 0.0145 0.0194]
     """

@@ -45,7 +45,8 @@ class ForceLaw:
 
         force on the structure -F(q) along p,   q = p.x
 
-        F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q),   q_j >= q_m >= q'_j
+        F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q)
+        q_j >= q_m >= q'_j
 
     F is followed by straight segments between knots that lie on it, which is a sum of one-sided springs dk_j [N/m],
     negative where the law softens. q_m is the zero of F nearest to q = 0. Beyond the span its last segments go on. Two
@@ -53,8 +54,8 @@ class ForceLaw:
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, along which it acts.
+    at : str, mapping or array (n,)
+        p, along which it acts: a point name, {point: coefficient} or a row.
     law : callable, or two arrays (k,)
         F [N] as a function of q [m], of a number or of (k,) numbers; or a table, q [m] ascending and F [N], whose lines
         are the segments.
@@ -90,12 +91,13 @@ class ForceLaw:
 
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> cubic = mp.ForceLaw("tip", lambda q: 1e9 * q**3, tolerance=0.01, span=(-0.01, 0.01))
     >>> cubic.levels, cubic.error <= 0.01
     (12, True)
-    >>> mp.simulate(mp.MultiPhiModel(chain, [cubic]), 0.1, velocity=np.array([0.0, 0.0, 0.5])).status
+    >>> model = mp.MultiPhiModel(chain, [cubic])
+    >>> mp.simulate(model, 0.1, velocity=np.array([0.0, 0.0, 0.5])).status
     'ok'
     """
 

@@ -28,19 +28,20 @@ __all__ = ["Friction"]
 class Friction:
     """Dry friction with a constant limit: a block on a counter-surface, or with a spring in series a Jenkins element.
 
-        stick   T = k (h.x - w - v t),  |T| <= static limit;   without a spring h.x - w - v t = 0, T its reaction
+        stick   T = k (h.x - w - v t), or the reaction;  |T| <= static limit
         slip    T = s limit,  s the sign of h.x' - v
 
-    The force on the structure is -h T; w is the place of the contact patch on the counter-surface. Stick ends where |T|
-    reaches the static limit, slip where its speed falls to zero. Two of them are equal only if they are the same
-    object. Source: W. D. Iwan, Trans. ASME J. Appl. Mech. 33 (1966).
+    The force on the structure is -h T; w is the place of the contact patch on the counter-surface. Without a spring it
+    is held, h.x - w - v t = 0, and T is the reaction. Stick ends where |T| reaches the static limit, slip where its
+    speed falls to zero. Two of them are equal only if they are the same object. Source: W. D. Iwan, Trans. ASME J.
+    Appl. Mech. 33 (1966).
 
     Parameters
     ----------
     name : str
         How levels, events and results refer to it.
-    direction : point name, {point: coefficient} or array (n,)
-        h, along which it acts.
+    direction : str, mapping or array (n,)
+        h, along which it acts: a point name, {point: coefficient} or a row.
     limit : float
         |T| [N] while it slips, > 0.
     static_limit : float, default None
@@ -61,7 +62,7 @@ class Friction:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> model = mp.MultiPhiModel(chain, [mp.Friction("ring", "tip", limit=20.0)])
     >>> tr = mp.simulate(model, 0.5, displacement=np.array([2.5, 5.0, 7.5]) * 1e-3)

@@ -58,8 +58,8 @@ class ConstantLoad:
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, where it acts.
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
     force : float
         [N], [N m] on a rotation.
 
@@ -74,9 +74,10 @@ class ConstantLoad:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> tr = mp.simulate(model, 0.5, loads=[mp.ConstantLoad("tip", -50.0)])
     >>> tr.events[0].kind
     'close'
@@ -99,8 +100,9 @@ class Gravity:
 
     Parameters
     ----------
-    direction : array (n,), {point: coefficient} or point name
-        e, what a unit of rigid-body motion along gravity moves every degree of freedom by.
+    direction : str, mapping or array (n,)
+        e, what a unit of rigid-body motion along gravity moves every degree of freedom by: a row, {point: coefficient}
+        or a point name.
     acceleration : float, default 9.81
         [m/s2].
 
@@ -115,7 +117,7 @@ class Gravity:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> mp.Gravity(-np.ones(3)).row(chain).tolist()
     [-9.81, -9.81, -9.81]
@@ -155,8 +157,8 @@ class HarmonicLoad(VaryingLoad):
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, where it acts.
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
     amplitude : float
         [N], [N m] on a rotation.
     frequency_hz : float
@@ -175,10 +177,12 @@ class HarmonicLoad(VaryingLoad):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-    >>> tr = mp.simulate(model, 0.5, loads=[mp.HarmonicLoad("tip", amplitude=20.0, frequency_hz=12.0)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> shaker = mp.HarmonicLoad("tip", amplitude=20.0, frequency_hz=12.0)
+    >>> tr = mp.simulate(model, 0.5, loads=[shaker])
     >>> tr.status
     'ok'
     """
@@ -201,8 +205,8 @@ class SampledLoad(VaryingLoad):
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, where it acts.
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
     time : array (k,)
         Ascending times [s], two or more.
     force : array (k,)
@@ -220,9 +224,10 @@ class SampledLoad(VaryingLoad):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> pulse = mp.SampledLoad("tip", time=[0.0, 0.01, 0.02], force=[0.0, -50.0, 0.0])
     >>> tr = mp.simulate(model, 0.5, loads=[pulse])
     >>> tr.events[0].kind
@@ -252,8 +257,8 @@ class FunctionLoad(VaryingLoad):
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, where it acts.
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
     function : callable
         Force [N] of time [s], of (k,) times or of single ones.
     tolerance : float, default 1e-9
@@ -272,9 +277,10 @@ class FunctionLoad(VaryingLoad):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> burst = mp.FunctionLoad("tip", lambda t: 50.0 * np.exp(-20 * t) * np.sin(80 * t))
     >>> mp.simulate(model, 0.5, loads=[burst]).status
     'ok'
@@ -299,8 +305,8 @@ class SweepLoad(VaryingLoad):
 
     Parameters
     ----------
-    at : point name, {point: coefficient} or array (n,)
-        p, where it acts.
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
     amplitude : float
         [N], [N m] on a rotation.
     start_hz, end_hz : float
@@ -323,9 +329,10 @@ class SweepLoad(VaryingLoad):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> sweep = mp.SweepLoad("tip", 20.0, start_hz=5.0, end_hz=25.0, duration=1.0)
     >>> mp.simulate(model, 1.0, loads=[sweep]).status
     'ok'
@@ -368,9 +375,10 @@ class StopMotion:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> tr = mp.simulate(model, 0.5, loads=[mp.StopMotion("stop", mp.Harmonic(2e-3, 8.0))])
     >>> tr.events[0].contact
     'stop'
@@ -392,8 +400,9 @@ class BaseMotion:
 
     Parameters
     ----------
-    direction : array (n,), {point: coefficient} or point name
-        e, what a unit of rigid-body motion along the base's moves every degree of freedom by.
+    direction : str, mapping or array (n,)
+        e, what a unit of rigid-body motion along the base's moves every degree of freedom by: a row, {point:
+        coefficient} or a point name.
     course : Harmonic, Smooth or Sweep
         z(t) [m], twice differentiable.
     fixed_stops : sequence of str, default ()
@@ -410,9 +419,10 @@ class BaseMotion:
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> shaken = mp.BaseMotion(np.ones(3), mp.Harmonic(1e-3, 12.0))
     >>> mp.simulate(model, 0.5, loads=[shaken]).status
     'ok'

@@ -74,7 +74,7 @@ def read_structure(
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
     >>> np.save("M.npy", chain.mass)
     >>> np.save("K.npy", chain.stiffness)

@@ -50,8 +50,8 @@ class Section:
     Examples
     --------
     >>> import multiphi_exudyn as mp
-    >>> strip = mp.Section(0.0, 0.3, youngs_modulus=2.1e11, density=7850.0, area=1e-4, second_moment=8.3e-10,
-    ...                    shear_modulus=8.1e10)
+    >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0, "shear_modulus": 8.1e10}
+    >>> strip = mp.Section(0.0, 0.3, area=1e-4, second_moment=2.08e-10, **steel)
     >>> round(strip.shear_factor, 3)
     0.833
     """
@@ -102,7 +102,8 @@ class Section:
         Examples
         --------
         >>> import multiphi_exudyn as mp
-        >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, youngs_modulus=2.1e11, density=7850.0)
+        >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0}
+        >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, **steel)
         >>> print(f"{strip.second_moment:.3g} m4")
         2.08e-10 m4
         """

@@ -66,7 +66,7 @@ class LinearStructure(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), points={"tip": 2})
     <LinearStructure: degrees of freedom 3; matrices dense; damping ModalDamping; points tip>
     """

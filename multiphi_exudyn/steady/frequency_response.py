@@ -40,10 +40,12 @@ class FrequencyResponse(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-    >>> response = mp.frequency_response(model, mp.HarmonicLoad("tip", 2.0, 10.0), [10.0, 12.0])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> load = mp.HarmonicLoad("tip", 2.0, 10.0)
+    >>> response = mp.frequency_response(model, load, [10.0, 12.0])
     >>> response.orders.tolist(), response.duty("stop").tolist()
     ([1, 1], [0.0, 0.0])
     """
@@ -138,10 +140,12 @@ def frequency_response(
 
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-    >>> response = mp.frequency_response(model, mp.HarmonicLoad("tip", 2.0, 10.0), [10.0, 12.0])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> load = mp.HarmonicLoad("tip", 2.0, 10.0)
+    >>> response = mp.frequency_response(model, load, [10.0, 12.0])
     >>> print((1e3 * response.amplitude("tip")).round(3))  # mm
     [0.287 0.499]
     """

@@ -85,9 +85,10 @@ class SteadyState(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> state = mp.steady_state(model, mp.HarmonicLoad("tip", 20.0, 12.0))
     >>> state.status, state.order
     ('periodic', 1)
@@ -191,9 +192,10 @@ def steady_state(
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> state = mp.steady_state(model, mp.HarmonicLoad("tip", 20.0, 12.0))
     >>> state.status, round(1e3 * state.amplitude("tip"), 2)  # mm
     ('periodic', 1.76)

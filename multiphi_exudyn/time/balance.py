@@ -56,12 +56,14 @@ class Ledger(Shown):
     --------
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-    >>> tr = mp.simulate(model, 0.5, displacement=model.static_equilibrium({"tip": 100.0}))
-    >>> print(f"{tr.ledger.initial:.3f} J = {tr.ledger.final:.3f} J + {tr.ledger.damping:.3f} J of damping")
-    0.375 J = 0.065 J + 0.310 J of damping
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> print(f"{tr.ledger.initial:.3f} J, of which damping took {tr.ledger.damping:.3f} J")
+    0.375 J, of which damping took 0.310 J
     >>> abs(tr.ledger.residual) < 1e-12 * tr.ledger.initial
     True
     """

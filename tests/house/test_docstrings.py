@@ -30,7 +30,7 @@ RESULTS = {  # handed out, never made by a user: what they hold stands under Att
 }
 MEMBERS = FunctionType, classmethod, property, functools.cached_property
 HEADING = re.compile(r"^(\w+)\n-+\n", re.MULTILINE)
-ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : .+)?$", re.MULTILINE)
+ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : [^:\n]+)?$", re.MULTILINE)  # name, name : type
 POINTER = re.compile(r"\bsee (the module|\w+\.py)", re.IGNORECASE)
 
 

@@ -48,7 +48,9 @@ def CreateMultiPhiBody(
 ) -> dict[str, Any]:
     """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``; also ``mbs.CreateMultiPhiBody(...)``.
 
-        M q'' + D q' + K q = drive + (loads and connectors of the system),   q = eta of the present level
+        M q'' + D q' + K q = drive + (loads and connectors of the system)
+
+    q are the modal coordinates eta of the present level.
 
     A body on which nothing acts but its own loads follows the motion of ``simulate``; beside others its steps are of
     second order, and its events are found inside them.
@@ -107,18 +109,22 @@ def CreateMultiPhiBody(
     >>> import exudyn as exu
     >>> import multiphi_exudyn as mp
     >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> container = exu.SystemContainer()
     >>> mbs = container.AddSystem()
     >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
     >>> mbs.Assemble()
     >>> settings = exu.SimulationSettings()
-    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
     >>> settings.solution.file.write = False
-    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
     >>> mbs.variables["multiPhi"]["chain"].events[0].kind
     'close'
     """

@@ -40,7 +40,8 @@ BODY, OPEN, CLOSED = (0.0, 0.447, 0.698, 1.0), (0.6, 0.6, 0.6, 1.0), (0.835, 0.3
 class Drawing:
     """How a body looks in Exudyn's renderer: a line of thick bars, and a block for every stop.
 
-        p_j = P_j + scale (w_j.x) d,      stop of contact i at point j:  P_j - scale (gap_i / c) d   where h_i = c w_j
+        point j                       p_j = P_j + scale (w_j.x) d
+        stop of contact i at point j  P_j - scale (gap_i / c) d,  where h_i = c w_j
 
     Contacts whose direction is not that of one point have no block; a stop that moves is drawn where it is at rest.
 
@@ -68,7 +69,8 @@ class Drawing:
     --------
     >>> import numpy as np
     >>> from multiphi_exudyn.exudyn_plugin import Drawing
-    >>> drawing = Drawing(np.array([[0.1, 0, 0], [0.2, 0, 0], [0.3, 0, 0]]), np.eye(3), np.array([0, 1, 0]), scale=10.0)
+    >>> places = [[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]
+    >>> drawing = Drawing(places, rows=np.eye(3), direction=[0.0, 1.0, 0.0], scale=10.0)
     >>> print(drawing.line(np.array([0.0, 0.0, 1e-3]))[2])  # where the tip is drawn [m]
     [0.3  0.01 0.  ]
     """

@@ -73,22 +73,27 @@ class BodyHistories:
     >>> import exudyn as exu
     >>> import multiphi_exudyn as mp
     >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> container = exu.SystemContainer()
     >>> mbs = container.AddSystem()
     >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
     >>> mbs.Assemble()
     >>> settings = exu.SimulationSettings()
-    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
     >>> settings.solution.file.write = False
-    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
     >>> histories = body_histories(mbs, items)
     >>> histories.time.shape == histories.points["tip"].shape
     True
-    >>> histories.events[0].contact, histories.events[0].kind, round(histories.events[0].time, 4)
+    >>> first = histories.events[0]
+    >>> first.contact, first.kind, round(first.time, 4)
     ('stop', 'close', 0.0197)
     """
 
@@ -156,18 +161,22 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     >>> import exudyn as exu
     >>> import multiphi_exudyn as mp
     >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # three masses of 1 kg in a row
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
     >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
     >>> container = exu.SystemContainer()
     >>> mbs = container.AddSystem()
     >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> items = CreateMultiPhiBody(mbs, model, name="chain", displacement=pulled, matchedStepSize=1e-3)
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
     >>> mbs.Assemble()
     >>> settings = exu.SimulationSettings()
-    >>> settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.1, 100
     >>> settings.solution.file.write = False
-    >>> done = mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
     >>> histories = body_histories(mbs, items)
     >>> print(1e3 * histories.points["tip"][:1].round(6))  # mm
     [7.5]

@@ -75,7 +75,8 @@ def linear_structure_from_fem(
     >>> fem = FEMinterface()
     >>> fem.nodes = {"Position": np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])}
     >>> fem.massMatrix = scipy.sparse.eye_array(6, format="csr")
-    >>> fem.stiffnessMatrix = scipy.sparse.csr_array(4e4 * np.kron([[1, -1], [-1, 1]], np.diag([1, 0, 0])))
+    >>> K = 4e4 * np.kron([[1, -1], [-1, 1]], np.diag([1, 0, 0]))
+    >>> fem.stiffnessMatrix = scipy.sparse.csr_array(K)
     >>> linear_structure_from_fem(fem, fixed=[0], points={"tip": (1, 0)})
     <LinearStructure: degrees of freedom 3; matrices sparse; damping none; points tip>
     """

@@ -78,15 +78,24 @@ class Reduction(Shown):
     >>> import multiphi_exudyn as mp
     >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
     >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, with a stop 1 mm below it
-    >>> ground, node = mbs.AddNode(eii.NodePointGround()), mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
     >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0)) for n in (ground, node)]
-    >>> spring = mbs.AddObject(eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4))
-    >>> data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1))
-    >>> law = eii.ObjectContactCoordinate(
-    ...     name="stop", markerNumbers=ends, nodeNumber=data, contactStiffness=1e6, offset=-1e-3)
-    >>> stop = mbs.AddObject(law)
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
     >>> mbs.Assemble()
     >>> print(reduce(mbs).report)
     1 degrees of freedom, 1 contacts, modes: all
@@ -161,8 +170,8 @@ def reduce(
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
-        q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T
-        v_0
+        q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction)
+        p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
     q_0, v_0 are the current coordinates and velocities, f the forces there, S the directions that constraints leave
     free. A state out of balance has a constant load p and starts to move as the system does. Contacts are
@@ -202,18 +211,28 @@ def reduce(
     >>> import multiphi_exudyn as mp
     >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
     >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, with a stop 1 mm below it
-    >>> ground, node = mbs.AddNode(eii.NodePointGround()), mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
     >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0)) for n in (ground, node)]
-    >>> spring = mbs.AddObject(eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4))
-    >>> data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1))
-    >>> law = eii.ObjectContactCoordinate(
-    ...     name="stop", markerNumbers=ends, nodeNumber=data, contactStiffness=1e6, offset=-1e-3)
-    >>> stop = mbs.AddObject(law)
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
     >>> mbs.Assemble()
     >>> reduction = reduce(mbs)
-    >>> tr = mp.simulate(reduction.model, 0.1, velocity=reduction.velocity, loads=reduction.loads)
+    >>> given = {"velocity": reduction.velocity, "loads": reduction.loads}
+    >>> tr = mp.simulate(reduction.model, 0.1, **given)
     >>> tr.events[0].contact, tr.events[0].kind
     ('stop', 'close')
     """
