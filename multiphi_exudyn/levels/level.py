@@ -197,7 +197,7 @@ class Level(Shown):
 
     @property
     def coupling(self) -> np.ndarray:
-        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide (sliding.py)."""
+        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide."""
         return np.zeros((self.modes, self.modes))
 
     @property

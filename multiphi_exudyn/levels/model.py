@@ -172,7 +172,7 @@ class MultiPhiModel(Shown):
 
     @functools.cached_property
     def links(self) -> tuple[AnyLink, ...]:
-        """The links of all elements, the first ones first (element.py)."""
+        """The links of all elements, the first ones first: a direction with a gap, a stiffness and a damping each."""
         return links_of(self.contacts)
 
     @functools.cached_property

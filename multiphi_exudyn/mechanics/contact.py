@@ -220,7 +220,7 @@ class UnilateralContact:
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """Open and closed (element.py); where there is friction, open, stick, slip+ and slip-."""
+        """Open and closed; where there is friction, open, stick, slip+ and slip-."""
         plain = contact_states(self.rigid, self.damping > 0)
         if not self.further:
             return plain

@@ -119,7 +119,7 @@ class Friction:
 
     @property
     def states(self) -> tuple[ElementState, ...]:
-        """Stick, slip+ and slip- (element.py)."""
+        """Stick, slip+ and slip-."""
         exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")
         return ElementState("stick", "stick", exits, holds=(0,)), self._slip("+"), self._slip("-")
 

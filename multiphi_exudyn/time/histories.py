@@ -83,29 +83,74 @@ class Histories(Shown, ABC):
         """x_inf,l (n,) [m, rad]."""
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""
+        """x [m, rad] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> print(1e3 * tr.displacement(0.0).round(6))  # mm
+        [2.5 5.  7.5]
+        """
         return self._configurations(t, side, 0)
 
     def velocity(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x' [m/s, rad/s]: (n,) or (n, k)."""
+        """x' [m/s, rad/s] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
         return self._configurations(t, side, 1)
 
     def acceleration(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x'' [m/s2, rad/s2]: (n,) or (n, k)."""
+        """x'' [m/s2, rad/s2] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
         return np.asarray(
             self._evaluate(t, side, lambda segment, times: self._motion(segment.level, segment.modal(times, 2)))
         )
 
     def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,)."""
+        """Displacement [m] of a point (name, {point: coefficient} or row): a float for a scalar t, (k,) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
+        7.5
+        """
         return self._values("at", point, t, side)
 
     def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Gap [m] of a contact: a float, or (k,)."""
+        """Gap [m] of a contact: a float for a scalar t, (k,) for (k,) times."""
         return self._values("gap", contact, t, side)
 
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
+        """Contact force lambda >= 0 [N]: a float for a scalar t, (k,) for (k,) times.
+
+        Impacts of rigid contacts are impulses, not forces: ``contact_impulse``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> force = tr.contact_force("stop", np.linspace(0.0, 0.5, 2001))
+        >>> print(f"{force.max():.0f} N")
+        484 N
+        """
         return self._values("contact_force", contact, t, side)
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
@@ -125,11 +170,25 @@ class Histories(Shown, ABC):
         return float(pushed + struck)
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
-        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
+        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> [round(t, 4) for t in tr.contact_intervals("stop")[0]]
+        [0.0197, 0.0229]
+        """
         return self._intervals(self._holds("contact_intervals", contact))
 
     def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """T [N] of a friction, whose force on the structure is -h T: a float, or (k,)."""
+        """T [N] of a friction, whose force on the structure is -h T: a float for a scalar t, (k,) for (k,) times."""
         return self._values("friction_force", name, t, side)
 
     def slip(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
@@ -147,7 +206,7 @@ class Histories(Shown, ABC):
         return np.array(self._intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Kinetic + strain energy [J], that of closed compliant contacts and of force laws included."""
+        """Kinetic + strain energy [J], closed compliant contacts and force laws included: a float, or (k,)."""
         return self._evaluate(t, side, lambda segment, times: segment.energy(times))
 
     def to_dataframe(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> DataFrame:

@@ -69,12 +69,16 @@ def is_error(thing: object) -> bool:
     return isinstance(thing, type) and issubclass(thing, (Exception, Warning))
 
 
+def bases(thing: type) -> list[type]:
+    """A class and what it inherits from in this package."""
+    return [base for base in thing.__mro__ if base.__module__.startswith("multiphi_exudyn")]
+
+
 def members(thing: type) -> dict[str, object]:
     """Public methods and properties that this package defines, by their names."""
     found = {
         name: inspect.getattr_static(base, name)
-        for base in reversed(thing.__mro__)
-        if base.__module__.startswith("multiphi_exudyn")
+        for base in reversed(bases(thing))
         for name in vars(base)
         if not name.startswith("_")
     }
@@ -82,8 +86,12 @@ def members(thing: type) -> dict[str, object]:
 
 
 def examples(name: str) -> list[doctest.DocTest]:
-    """The examples of a public thing and of its methods."""
-    return [test for test in doctest.DocTestFinder().find(PUBLIC[name], name, globs={}) if test.examples]
+    """The examples of a public thing, of its methods, and of those that it inherits."""
+    thing, finder = PUBLIC[name], doctest.DocTestFinder()
+    found = finder.find(thing, name, globs={})
+    for base in bases(thing)[1:] if isinstance(thing, type) else ():
+        found += finder.find(base, globs={})
+    return [test for test in found if test.examples]
 
 
 @pytest.mark.parametrize("name", PUBLIC)
@@ -126,12 +134,9 @@ def test_what_it_raises_is_an_error_of_this_package(name):
 
 @pytest.mark.parametrize("name", [name for name in PUBLIC if isinstance(PUBLIC[name], type)])
 def test_its_public_methods_say_what_they_give(name):
-    silent = [
-        member
-        for member, given in members(PUBLIC[name]).items()
-        if not (inspect.getdoc(given) or "").partition("\n")[0].strip()
-    ]
-    assert silent == []
+    texts = {member: inspect.getdoc(given) or "" for member, given in members(PUBLIC[name]).items()}
+    assert [member for member, text in texts.items() if not text.partition("\n")[0].strip()] == []
+    assert [member for member, text in texts.items() if POINTER.search(text)] == []
 
 
 @pytest.mark.parametrize("name", [name for name in PUBLIC if isinstance(PUBLIC[name], type)])
