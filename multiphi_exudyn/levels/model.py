@@ -31,6 +31,7 @@ __all__ = ["MultiPhiModel"]
 
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
+WIDER = 2  # models with a base for other loads that a model keeps, each with n numbers for every coordinate
 LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
@@ -97,7 +98,9 @@ class MultiPhiModel(Shown):
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
     )
     _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
-    _wider: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
+    _wider: BoundedCache[bytes, MultiPhiModel] = field(
+        init=False, default_factory=lambda: BoundedCache(WIDER), repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
@@ -137,8 +140,8 @@ class MultiPhiModel(Shown):
         known = {"structure": self.structure, "contacts": self.contacts}
         if self._shared.get("structure") is not self.structure:
             return known
-        less = self._shared.get("base", self._shared.get("less"))
-        return {**known, "less": less, "further": self._shared.get("further")}
+        kept = {name: self._shared[name] for name in ("further", "narrow") if name in self._shared}
+        return {**known, **kept, "less": self._shared.get("base", self._shared.get("less"))}
 
     @staticmethod
     def _serves(base: ModalBase, modes: int | None) -> bool:
@@ -265,18 +268,18 @@ class MultiPhiModel(Shown):
         new = [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
         if not new:
             return self
-        for wider in self._wider:
-            if wider.holding(rows) is wider:
-                return wider
+        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(np.vstack([base.further, *new])))
+
+    def _widened(self, further: np.ndarray) -> MultiPhiModel:
+        """This model with a base that holds further rows (k, n)."""
         wider = replace(self)
-        shared = {**self._unbuilt, "further": np.vstack([base.further, *new]), "first": self.base.served}
-        object.__setattr__(wider, "_shared", shared)
-        self._wider.append(wider)
+        shared = {"further": further, "first": self.base.served, "narrow": self._shared.get("narrow", self)}
+        object.__setattr__(wider, "_shared", {**self._unbuilt, **shared})
         return wider
 
     def widened_to(self, other: MultiPhiModel) -> bool:
         """Whether another model is this one, but for rows of loads that its base holds."""
-        return any(other is (wider.decided or wider) or wider.widened_to(other) for wider in self._wider)
+        return other._shared.get("narrow") is self
 
     def outside(self, row: np.ndarray) -> float:
         """Share of the static flexibility at a row (n,) that the base does not hold."""

@@ -195,6 +195,22 @@ def test_jointed_body(capsys, monkeypatch, tmp_path):
     assert capsys.readouterr().out.count("apart") == 2
 
 
+def test_vary_a_body(capsys, monkeypatch, tmp_path):
+    example, picture = load("vary_a_body"), tmp_path / "varied.png"
+    monkeypatch.setattr(example, "TRIED", 3)
+    monkeypatch.setattr(example, "RANGE", (140.0, 180.0))
+    monkeypatch.setattr(example, "GENERATIONS", 2)
+    monkeypatch.setattr(example, "POPULATION", 4)
+    found = example.main([str(picture)])
+    assert found.again < 1e-9
+    assert 140 <= found.best <= 180
+    assert found.best_motion == pytest.approx(example.motion({"stiffness": found.best}), rel=1e-9)
+    assert found.best_motion < np.max(found.motion)
+    assert found.stiffness == pytest.approx([140.0, 160.0, 180.0])
+    assert picture.stat().st_size > 10_000
+    assert "taken up at half time" in capsys.readouterr().out
+
+
 def test_reduce_your_model(capsys, tmp_path):
     picture = tmp_path / "reduced.png"
     found = load("reduce_your_model").main([str(picture)])

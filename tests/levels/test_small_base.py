@@ -130,6 +130,23 @@ class TestRowsFirstSeenInARun:
         on = mp.simulate(model, 0.7, start=run)
         assert on.model is run.model
 
+    def test_a_tolerance_decides_for_the_base_that_holds_them(self):
+        model = mp.MultiPhiModel(membrane(), [stop("p", gap=0.001, stiffness=1e3)], modes=mp.Tolerance(0.05))
+        run = self.run(model)
+        assert run.model.outside(self.ROW) < 1e-12
+        assert model.decided is None
+        assert self.run(model).model is run.model
+        on = mp.simulate(model, 0.7, start=run)
+        assert on.model is run.model
+
+    def test_few_bases_are_kept_however_many_loads_there_are(self):
+        model = mp.MultiPhiModel(membrane(), modes=MODES)
+        loads = [mp.ConstantLoad(patch(i, i), 1.0) for i in range(1, 6)]
+        runs = [mp.simulate(model, 0.01, loads=[load]) for load in loads]
+        assert len({id(run.model) for run in runs}) == 5
+        assert len(model._wider) <= 2
+        assert mp.simulate(model, 0.02, start=runs[0]).model is runs[0].model
+
     def test_weight_bends_the_structure_as_much_as_it_does(self):
         structure = membrane()
         model = mp.MultiPhiModel(structure, modes=MODES)

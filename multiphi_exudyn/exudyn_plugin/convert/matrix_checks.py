@@ -6,6 +6,7 @@ the largest part in S z names the cause: by its node, its number there and the b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mathematics.modes import complete_modes
+from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 
 __all__ = ["ASYMMETRY", "Checked", "checked_matrices", "coordinate_name"]
 
@@ -37,12 +38,12 @@ def checked_matrices(
 ) -> Checked:
     """The matrices, made symmetric; raises MultiPhiValueError that names items and coordinates.
 
-    allowed: of the largest entry of stiffness or damping, up to which entries may differ from their mirror images.
+    allowed: of the largest entry of stiffness or damping, up to which entries may differ from their mirror images; of
+    damping also a ratio to critical damping.
     """
     told: list[str] = []
     mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
     stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)
-    damping = _symmetric(mbs, "damping", damping, basis, allowed, told)
     values, vectors = scipy.linalg.eigh(mass)
     if values[0] <= MASSLESS * values[-1]:
         where = _of_largest(mbs, basis @ vectors[:, 0])
@@ -50,13 +51,14 @@ def checked_matrices(
             f"mass: got {_kind(values[0], values[-1])} mass at {where}, need a mass there or a constraint that holds it"
         )
     try:
-        complete_modes(mass, stiffness)
+        modes = complete_modes(mass, stiffness)
     except MultiPhiValueError as error:
         values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
         raise MultiPhiValueError(
             f"stiffness: got a negative one (omega^2 = {values[0]:.3g} 1/s2), mainly of "
             f"{_of_largest(mbs, basis @ vectors[:, 0])}, need a state that is stable"
         ) from error
+    damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))
     return Checked(mass, stiffness, damping, tuple(told))
 
 
@@ -64,9 +66,24 @@ def _kind(lowest: float, largest: float) -> str:
     return "a negative" if lowest < -MASSLESS * largest else "no"
 
 
+def _critical(damping: np.ndarray, modes: Modes) -> float:
+    """The largest entry of the skew part in the modes, as a ratio to critical damping of the faster of the two."""
+    forces = np.abs(modes.shapes.T @ (damping - damping.T) @ modes.shapes) / 2
+    faster = 2 * np.maximum.outer(modes.omega, modes.omega)
+    ratios = np.divide(forces, faster, out=np.where(forces > 0, math.inf, 0.0), where=faster > 0)
+    return float(np.max(ratios, initial=0.0))
+
+
 def _symmetric(
-    mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray, allowed: float, told: list[str]
+    mbs: Any,
+    name: str,
+    matrix: np.ndarray,
+    basis: np.ndarray,
+    allowed: float,
+    told: list[str],
+    critical: float = math.inf,
 ) -> np.ndarray:
+    """The symmetric part; told: gets a sentence of what is left out. critical: of a damping matrix, see above."""
     skew = matrix - matrix.T
     away = float(np.max(np.abs(skew)) / (np.max(np.abs(matrix)) or 1.0))
     if away > ASYMMETRY:
@@ -75,12 +92,13 @@ def _symmetric(
         places = f"between {coordinate_name(mbs, first)} and {coordinate_name(mbs, second)}"
         acting = ", ".join(_acting_on(mbs, {first, second})) or "none"
         where = f"{places}, on both of which act: {acting}"
-        if away > allowed:
+        if min(away, critical) > allowed:
             raise MultiPhiValueError(
                 f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), got entries that differ by "
                 f"{away:.2g} of the largest {where}; need a symmetric one"
             )
-        told.append(f"{name} matrix, of which entries differ by {away:.2g} of the largest {where}")
+        ratio = f" (a ratio to critical damping of {critical:.2g})" if critical < math.inf else ""
+        told.append(f"{name} matrix, of which entries differ by {away:.2g} of the largest{ratio} {where}")
     return (matrix + matrix.T) / 2
 
 
