@@ -79,8 +79,8 @@ class SavedLevel:
 class SavedTrajectory(Histories):
     """A trajectory from a file: all histories, events and energies of a run, but no model, and no way to continue it.
 
-    Made by ``load_trajectory``. Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right"
-    (default) or the "left".
+    Made by ``load_trajectory``; its questions are those of a Trajectory. Times [s] are scalars or (k,); at an event
+    ``side`` chooses the limit from the "right" (default) or the "left".
 
     Attributes
     ----------

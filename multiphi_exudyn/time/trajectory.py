@@ -80,7 +80,10 @@ class Trajectory(Histories):
 
         x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
 
-    Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or the "left".
+    Ask it for ``displacement``, ``velocity``, ``acceleration``, ``at`` a point, ``gap``, ``contact_force``,
+    ``contact_impulse``, ``contact_intervals``, ``friction_force``, ``slip``, ``stick_intervals`` and ``energy``; for a
+    table by ``to_dataframe``, a figure by ``plot``. Times [s] are scalars or (k,); at an event ``side`` chooses the
+    limit from the "right" (default) or the "left".
 
     Attributes
     ----------
