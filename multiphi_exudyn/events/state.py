@@ -100,12 +100,42 @@ class Loss:
 
 @dataclass(frozen=True)
 class Event:
-    """A contact or a friction changed state.
+    """A contact or a friction changed its state at an instant.
 
-    time [s]; contact: its name; kind: "close" | "open", of friction "stick" | "slip"; loss: the energy [J] of the whole
-    instant, carried by its first event; impulse [N s] of the impact. A rebound within one instant is a "close" and an
-    "open" of equal time. shared: name and impulse of contacts that are closed and stay so in the impact, carried by its
-    first event. state: the one that is entered, as a contact that closes may stick or slip.
+    A rebound within one instant is a "close" and an "open" of equal time.
+
+    Attributes
+    ----------
+    time : float
+        When [s].
+    contact : str
+        Name of the contact or the friction.
+    kind : str
+        "close" or "open"; of friction "stick" or "slip".
+    loss : Loss
+        The energies [J] that the whole instant has taken, carried by its first event: ``impact``,
+        ``truncation_kinetic``, ``truncation_strain``, ``damping``, ``friction``, and ``stop_work``, which is what
+        moving stops put in by impulses and no loss.
+    impulse : float
+        Of the impact [N s], 0 without one.
+    shared : tuple of (str, float)
+        Name and impulse [N s] of contacts that are closed and stay so in the impact, carried by its first event.
+    state : str
+        The state that is entered, as a contact that closes may stick or slip.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> first = tr.events[0]
+    >>> first.contact, first.kind, round(first.time, 4)
+    ('stop', 'close', 0.0197)
     """
 
     time: float

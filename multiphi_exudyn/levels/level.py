@@ -39,11 +39,36 @@ __all__ = ["Asymptotic", "Level", "LevelOverride"]
 
 @dataclass(frozen=True)
 class LevelOverride:
-    """Frequencies [Hz] and damping ratios that replace the computed ones of a level's lowest modes.
+    """Frequencies and damping ratios that replace the computed ones of a level's lowest modes.
 
-    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical
-    (M, C, K): such a level does not interlace, and a transition into it need not lower the energy. Static deflections
-    stay the computed ones, also those that a slowly varying load goes through.
+    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical (M, C, K):
+    such a level does not interlace, and a transition into it need not lower the energy. Mode shapes and static
+    deflections stay the computed ones, also those that a slowly varying load goes through.
+
+    Parameters
+    ----------
+    frequencies : sequence of float, default None
+        Of the lowest modes [Hz], lowest first, as many as are known; None keeps the computed ones.
+    ratios : sequence of float, default None
+        Damping ratios of the lowest modes, 0.01 is 1 %; None keeps the computed ones.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For an array of numbers that is no list.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> measured = mp.LevelOverride(frequencies=[14.5])
+    >>> model = mp.MultiPhiModel(chain, overrides={(): measured})
+    >>> print(model.level(()).frequencies.round(1))
+    [14.5 39.7 57.4]
     """
 
     frequencies: Sequence[float] | None = None
@@ -77,16 +102,52 @@ class Asymptotic:
 
 @dataclass(frozen=True, repr=False)
 class Level(Shown):
-    """One level; see the module's docstring. Built by ``MultiPhiModel.level``.
+    """The linear system that holds while a set of contacts is closed, in its own r modes.
 
-    closed: names of its closed contacts. indices: the same as positions in the base. base: its coordinates.
-    squares: omega^2 (r,) [rad2/s2], ascending, negative for growing modes. vectors: modes in base coordinates (m, r),
-    orthonormal. damping: (r, r) [1/s].
-    gap_rows: (c, r), gap_i = gap_rows[i].eta + ... for every contact of the model.
-    force_rows, force_rate_rows: (k, r), contact force of the closed contacts from eta and eta'.
-    neutral: (m, z), the zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
-    computed: omega^2 (r,) of M and K themselves; ``squares`` differ where they are overridden.
-    kept_beyond: number of modes beyond those asked for, kept so that no cluster of modes of one frequency is cut.
+        x = Phi_l eta + x_inf,l                                                           (38.4)
+        eta'' + Phi_l^T C Phi_l eta' + diag(omega_l^2) eta = Phi_l^T (f - f_static)       (38.3)
+
+    Made by ``MultiPhiModel.level``. The arrays are in base coordinates (m,), which all levels of a model share; what is
+    of the structure (``shapes``, ``asymptotic_configuration``) has n rows. Springs of a force law may be negative: then
+    some omega^2 < 0, the square of a rate of growth, eta ~ exp(+-|omega| t).
+
+    Attributes
+    ----------
+    closed : tuple of str
+        Names of its closed contacts.
+    indices : tuple of int
+        The same as positions in the base.
+    base : ModalBase
+        The coordinates that all levels share.
+    squares : array (r,)
+        omega^2 [rad2/s2], ascending, negative for growing modes.
+    vectors : array (m, r)
+        Modes in base coordinates, orthonormal.
+    damping : array (r, r)
+        Phi_l^T C Phi_l [1/s].
+    gap_rows : array (c, r)
+        gap_i = gap_rows[i].eta + ... for every contact of the model.
+    force_rows, force_rate_rows : array (k, r)
+        Contact forces of the closed contacts from eta and eta'.
+    neutral : array (m, z)
+        The zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
+    computed : array (r,)
+        omega^2 [rad2/s2] of M and K themselves; ``squares`` differ where they are overridden.
+    kept_beyond : int
+        Number of modes beyond those asked for, kept so that no cluster of modes of one frequency is cut.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> for closed in ((), ("stop",)):
+    ...     print(model.level(closed).frequencies.round(1))
+    [14.2 39.7 57.4]
+    [ 31.5  54.9 162.4]
     """
 
     closed: tuple[str, ...]
@@ -136,7 +197,7 @@ class Level(Shown):
 
     @property
     def coupling(self) -> np.ndarray:
-        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide (sliding.py)."""
+        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide."""
         return np.zeros((self.modes, self.modes))
 
     @property
@@ -229,12 +290,21 @@ class Level(Shown):
         return replace(self, squares=squares, damping=damping)
 
     def plot_modes(self, count: int = 6, rows: np.ndarray | None = None, positions: np.ndarray | None = None) -> Figure:
-        """A matplotlib figure of the lowest ``count`` mode shapes, each scaled to 1.
+        """A matplotlib figure of the lowest mode shapes, each scaled to 1.
 
-        rows: (k, n), what is drawn of a shape, such as the deflections along a beam; None: every degree of freedom.
-        positions: (k,) [m] where; None: their numbers.
+        Parameters
+        ----------
+        count : int, default 6
+            How many are drawn.
+        rows : array (k, n), default None
+            What is drawn of a shape, such as the deflections along a beam; None for every degree of freedom.
+        positions : array (k,), default None
+            Where [m] each of them stands; None for their numbers.
 
-        Raises MultiPhiValueError for arrays of another shape.
+        Raises
+        ------
+        MultiPhiValueError
+            For arrays of another shape.
         """
         n = self.base.modes.shapes.shape[0]
         shown = np.eye(n) if rows is None else real_array("rows", rows, f"a (k, {n}) array of real numbers")

@@ -46,9 +46,33 @@ POINT_SHARE = 0.01  # of the open level's flexibility at a point
 
 @dataclass(frozen=True)
 class UpTo:
-    """Every level with its modes up to a cut-off frequency [Hz], at least one and at most ``most``.
+    """Choice of modes: every level has its modes up to a cut-off frequency, at least one.
 
     A closed contact raises frequencies, so no level has more modes than the open one.
+
+    Parameters
+    ----------
+    frequency : float
+        The cut-off [Hz], > 0.
+    most : int, default 60
+        Modes that a level is given at most.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a frequency that is no number, or a ``most`` that is no whole number.
+    MultiPhiValueError
+        For a frequency that is not finite and > 0, or most < 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, modes=mp.UpTo(50.0))
+    >>> print(model.level(()).frequencies.round(1))
+    [14.2 39.7]
     """
 
     frequency: float
@@ -60,10 +84,33 @@ class UpTo:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Wanted truncation error of a run, from which its cut-off frequency follows.
+    """Choice of modes: as many as a wanted truncation error of a run needs, decided by the first run of the model.
 
-    error: of ``truncation_indicator``, an estimate of the relative error of displacements; 0.01 is 1 %.
-    most: modes that a level is given at most.
+    Parameters
+    ----------
+    error : float
+        The wanted ``truncation_indicator``, an estimate of the relative error of displacements; 0.01 is 1 %.
+    most : int, default 60
+        Modes that a level is given at most.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For an error that is no number, or a ``most`` that is no whole number.
+    MultiPhiValueError
+        For an error that is not finite and > 0, or most < 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, modes=mp.Tolerance(0.01))
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> model.decided.modes
+    'all'
     """
 
     error: float

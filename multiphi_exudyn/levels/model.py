@@ -39,21 +39,53 @@ LOADS = 16  # keys of loads for which a model keeps what simulations have made o
 class MultiPhiModel(Shown):
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
-    structure: M, C, K and points. contacts: rigid or compliant, any number, and force laws, kept with every law by its
-    chain of springs; and friction. With c contacts there are 2^c levels, for every law as many times that as it has
-    segments, for every friction three times that, of which only those asked for are built.
-    modes: r of every level, all that it has where they are fewer, or "all"; or ``UpTo`` a frequency; None: chosen from
-    static responses, without a run (mode_choice.py); or a ``Tolerance``: the first run under ``simulate`` decides, once
-    for this model, and every later one has the modes of ``decided``. ``most_modes`` tells the number. Levels are
-    truncated from one larger basis: ``dataclasses.replace(model, modes=12)`` builds nothing anew.
-    overrides: closed contacts -> LevelOverride, measured frequencies or ratios of single levels.
-    validity: from a trajectory of this model to sentences, each "kind: ...", on where the linear structure does not
-    hold, none where it does; ``simulate`` asks it at the end of a run. None: nothing is known.
-    loaded: levels under loads, kept for later simulations, at most ``LOADS``.
+    With c contacts there are 2^c levels; every friction makes three times as many, every force law as many times as it
+    has segments. Only those that a run comes to are built, and kept up to 1 GiB, those used most recently. Levels are
+    truncated from one larger base: ``dataclasses.replace(model, modes=12)`` builds nothing anew. Where a number of
+    modes, or a cut-off, would part modes of one frequency, a level keeps all of them (``Level.kept_beyond``), and a run
+    says so.
 
-    Levels are kept up to ``CACHE_BYTES``, those used most recently; one that has been let go is built again when it is
-    asked for, to the bit. Where a number of modes, or a cut-off, would part modes of one frequency, a level keeps all
-    of them (``Level.kept_beyond``), and a run says so.
+    Parameters
+    ----------
+    structure : LinearStructure
+        M, C, K and points.
+    contacts : sequence of UnilateralContact, Friction and ForceLaw, default ()
+        Any number, each with its own name. A force law is kept as the chain of its springs.
+    modes : int, "all", UpTo, Tolerance or None, default None
+        Number r of modes of every level, all that it has where they are fewer. ``UpTo``: those up to a frequency.
+        ``Tolerance``: the first run under ``simulate`` decides, once for this model. None: as many as hold the static
+        response of contacts and points, chosen without a run; all of them up to 30 degrees of freedom. ``most_modes``
+        tells the number.
+    overrides : mapping of (name, ...) to LevelOverride, default empty
+        Measured frequencies or ratios of single levels, by the names of their closed contacts.
+    validity : callable, default None
+        From a trajectory of this model to sentences "kind: ..." on where the linear structure does not hold, none where
+        it does; ``simulate`` asks it at the end of a run. None: nothing is known.
+
+    Attributes
+    ----------
+    loaded : BoundedCache
+        Levels under loads, kept for later runs.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For modes < 1, two contacts of one name, a direction that is zero, and points or contacts that there are not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> model.levels_possible
+    2
+    >>> print(model.level(("stop",)).frequencies.round(1))
+    [ 31.5  54.9 162.4]
     """
 
     structure: LinearStructure
@@ -142,7 +174,7 @@ class MultiPhiModel(Shown):
 
     @functools.cached_property
     def links(self) -> tuple[AnyLink, ...]:
-        """The links of all elements, the first ones first (element.py)."""
+        """The links of all elements, the first ones first: a direction with a gap, a stiffness and a damping each."""
         return links_of(self.contacts)
 
     @functools.cached_property
@@ -310,8 +342,19 @@ class MultiPhiModel(Shown):
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
         """The level with these contacts closed, or with elements in these states, built on first use.
 
-        {name: state}: the others are in their first state, contacts open. States that differ by constant forces alone
-        have one level.
+        Parameters
+        ----------
+        closed : iterable of str, or mapping of str to str, default ()
+            Names of the closed contacts, all others open. Or {name: state}: "closed" of a contact, "stick", "slip+" or
+            "slip-" of friction; the others are in their first state, contacts open. States that differ by constant
+            forces alone have one level.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For what is neither.
+        MultiPhiValueError
+            For a name or a state that there is not.
         """
         if isinstance(closed, Mapping):
             return self.level_at(self.links_held(self._states(closed)))
@@ -359,22 +402,49 @@ class MultiPhiModel(Shown):
         return found
 
     def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
-        """Configuration x (n,) at rest under forces [N] at points, with the right contacts closed.
+        """Configuration x (n,) [m, rad] at rest under forces at points, with the right contacts closed.
 
         The configuration that the contacts admit nearest to the one without them, in the energy of structure and
-        contact springs: those that press make the level whose state of rest it is. With force laws or friction it is
-        the equilibrium that is reached when the forces are applied slowly (static_equilibrium.py); a run that starts
-        there with stretched springs of friction starts from ``equilibrium``. Raises NumericalFailure where the
-        structure snaps through on the way, or friction lets go with a jump.
+        contact springs. With force laws or friction it is the equilibrium that is reached when the forces are applied
+        slowly; a run that starts there with stretched springs of friction starts from ``equilibrium``.
 
-        Of a structure with rigid-body modes it is its deformation, M-orthogonal to them, under forces that balance each
-        other; with ``inertia_relief`` under any, while they accelerate it. Contacts then have to stay open, and there
-        may be neither force laws nor friction.
+        Parameters
+        ----------
+        forces : mapping of str to float
+            Point to force [N], along the point's positive displacement.
+        inertia_relief : bool, default False
+            Of a structure with rigid-body modes: whether the forces may accelerate it. The answer is its deformation,
+            M-orthogonal to those modes, with False under forces that balance each other.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For what is no mapping.
+        MultiPhiValueError
+            For forces that a structure with rigid-body modes does not balance, or beside its force laws, friction or
+            contacts that close; rigid contacts that exclude each other, and points that there are not.
+        NumericalFailure
+            Where the structure snaps through on the way, friction lets go with a jump, or contacts wedge.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> x = model.static_equilibrium({"tip": 100.0})
+        >>> print(1e3 * x)  # mm: three springs of 4e4 N/m in series
+        [2.5 5.  7.5]
         """
         return self.equilibrium(forces, inertia_relief).displacement
 
     def equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> Equilibrium:
-        """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``."""
+        """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``.
+
+        The arguments and errors are those of ``static_equilibrium``.
+        """
         y, stretches = self._at_rest(forces, inertia_relief)
         named = {self.links[k].name: float(stretches[k]) for k in self.held}
         return Equilibrium(self.base.modes.shapes @ y, named)

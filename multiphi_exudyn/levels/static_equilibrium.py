@@ -53,9 +53,29 @@ CHANGES = 20  # for every contact on the path: more is an exchange without end
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """At rest under slowly applied forces, as a start of a run: displacement x (n,) [m, rad].
+    """A structure at rest under slowly applied forces, as a start of a run; made by ``MultiPhiModel.equilibrium``.
 
-    stretches: of the links of friction [m], by name, at a contact NAME.tangential; zero without a spring.
+    The forces themselves are not part of it: a run that starts from it without them lets go.
+
+    Attributes
+    ----------
+    displacement : array (n,)
+        x [m, rad].
+    stretches : mapping of str to float
+        Of the springs of friction [m], by name, at a contact NAME.tangential; zero without a spring.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> ring = mp.Friction("ring", "tip", limit=20.0, stiffness=1e5)
+    >>> rest = mp.MultiPhiModel(chain, [ring]).equilibrium({"tip": 100.0})
+    >>> print(1e3 * rest.displacement.round(6))  # mm
+    [2. 4. 6.]
+    >>> round(1e3 * rest.stretches["ring"], 3)  # mm
+    0.2
     """
 
     displacement: np.ndarray

@@ -32,10 +32,44 @@ TIES_HOLD = 1e-9  # of the terms of a tie: above the round-off of displacements 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Assembly(LinearStructure):
-    """One structure made of parts; see the module's docstring for its matrices. Made by ``assemble``.
+    """One structure made of parts, tied to each other or to the ground; made by ``assemble``.
 
-    parts: name -> (first, last + 1) of its degrees of freedom among the N of all parts.
-    ties: (t, N) rows G. transformation: (N, n) sparse T. free: (n,) which of the N displacements z are.
+        M = T^T blockdiag(M_a, M_b, ...) T,   K and C alike,   (x_a, x_b, ...) = T z,   G T = 0
+
+    It is a LinearStructure in z, those of the N displacements of the parts that the t ties leave free; the point "tip"
+    of the part "a" is "a.tip".
+
+    Attributes
+    ----------
+    mass, stiffness : array (n, n)
+        M [kg, kg m2] and K [N/m, N m], sparse if those of any part are.
+    damping : array (n, n), ModalDamping, RayleighDamping or None
+        C [N s/m, N m s], or how it is made.
+    points : mapping of str to array (n,)
+        Rows of the parts' points in z.
+    dofs : None
+        Rows of an assembly have no nodes.
+    parts : mapping of str to (int, int)
+        Name to (first, last + 1) of its degrees of freedom among the N of all parts.
+    ties : array (t, N)
+        Rows G.
+    transformation : sparse array (N, n)
+        T.
+    free : array (n,)
+        Which of the N displacements z are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> pair = mp.assemble({"a": chain, "b": chain}, ties=[{"a.tip": 1.0, "b.tip": -1.0}])
+    >>> pair.n, list(pair.points)
+    (5, ['a.tip', 'b.tip'])
+    >>> x = mp.MultiPhiModel(pair).static_equilibrium({"a.tip": 100.0})
+    >>> print(1e3 * pair.part("b", x).round(6))  # mm: each carries half
+    [1.25 2.5  3.75]
     """
 
     parts: Mapping[str, tuple[int, int]]
@@ -60,7 +94,7 @@ class Assembly(LinearStructure):
     def together(self, displacements: Mapping[str, np.ndarray]) -> np.ndarray:
         """Displacements (or velocities) of the assembly, (n,), from those of its parts, (n_a,) each; absent ones rest.
 
-        Raises MultiPhiValueError where they break a tie.
+        MultiPhiValueError where they break a tie, and for a part that there is not.
         """
         united = np.zeros(self.ties.shape[1])
         for name, given in _mapping("displacements", displacements).items():
@@ -77,15 +111,47 @@ def assemble(
     ties: Sequence[Tie] = (),
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
 ) -> Assembly:
-    """One structure out of several.
+    """One structure out of several, side by side, tied to each other or to the ground.
 
-    parts: name -> structure; a name has no dot. The matrices are sparse if those of any part are.
-    ties: each {"a.tip": 1.0, "b.tip": -1.0}: the sum of coefficients times points is held at zero;
-        {"a.tip": 1.0} ties to the ground.
-    damping: None keeps what the parts have; anything else takes its place: (n, n), ModalDamping over the modes of
-        the assembly, RayleighDamping.
+        M = T^T blockdiag(M_a, M_b, ...) T,   K and C alike,   (x_a, x_b, ...) = T z,   G T = 0
 
-    Raises MultiPhiValueError or MultiPhiTypeError for unknown points, and for ties that follow from one another.
+    A tie is a linear combination of points that is held at zero, one row of G. T solves the ties for as many
+    displacements, so they hold exactly and need neither multipliers nor stiffness.
+
+    Parameters
+    ----------
+    parts : mapping of str to LinearStructure
+        By names without a dot; the point "tip" of the part "a" becomes "a.tip".
+    ties : sequence of mapping, default ()
+        Each {point: coefficient, ...}, a sum that is held at zero: {"a.tip": 1.0, "b.tip": -1.0} ties two points,
+        {"a.tip": 1.0} one to the ground.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        None keeps what the parts have; anything else takes its place, ratios being of the modes of the assembly.
+
+    Returns
+    -------
+    Assembly
+        A LinearStructure; sparse if any part is.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For parts that are no structures, and ties that are no mappings.
+    MultiPhiValueError
+        For no parts, names with a dot, unknown points, ties that follow from one another or hold everything, and ratios
+        of a sparse part.
+
+    Examples
+    --------
+    Two chains whose free ends are joined:
+
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> pair = mp.assemble({"a": chain, "b": chain}, ties=[{"a.tip": 1.0, "b.tip": -1.0}])
+    >>> print(mp.MultiPhiModel(pair).level(()).frequencies[:2].round(1))
+    [14.2 31.8]
     """
     _check_parts(parts)
     united = _side_by_side(parts)

@@ -70,20 +70,69 @@ __all__ = ["UnilateralContact"]
 
 @dataclass(frozen=True, eq=False)
 class UnilateralContact:
-    """One unilateral contact; see the module's docstring for its law.
+    """One unilateral contact: a gap that may not close further than zero, or only against a stiffness.
 
-    name: how levels, events and results refer to it.
-    direction: h as a point name, {point: coefficient} or an (n,) row.
-    gap: distance [m] in the undeformed structure; negative is a preload.
-    stiffness: k [N/m], infinite for a rigid contact.
-    damping: c [N s/m] beside a finite stiffness.
-    friction: mu while it slides; static_friction: mu_s >= mu up to which it sticks, None: the same.
-    tangential: h_t, as h is given; needed where there is friction.
-    tangential_stiffness: k_t [N/m] of the spring in series with the friction, infinite for none.
-    tangential_velocity: v_t [m/s] of the counter-surface along +h_t.
-    restitution: e from 0 to 1 of a rigid contact. Those that are struck together, and are coupled, need one e.
+        g(x) = h.x + gap,   open where g > 0;   force lambda >= 0 [N] along +h
 
-    Two contacts are equal only if they are the same object.
+        rigid      lambda >= 0, g >= 0, lambda g = 0;  struck g'+ >= -e g'-  (Moreau)
+        compliant  lambda = k max(0, -g)
+        viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
+
+        stick      T = k_t (h_t.x - v_t t - w), or the reaction;  |T| <= mu_s N
+        slip       T = s mu N,  N = lambda,  s (h_t.x' - v_t - T' / k_t) >= 0,  s = 1 or -1
+
+    The force on the structure is h N - h_t T. What sticks without a spring holds its place w, h_t.x - v_t t = w, and T
+    is the reaction. A stop 1.35 mm below a beam that bends upward has h = +e_tip and gap = 1.35e-3; a stop above it has
+    h = -e_tip; two bodies that face each other have one coefficient each. Two contacts are equal only if they are the
+    same object.
+
+    Parameters
+    ----------
+    name : str
+        How levels, events and results refer to it.
+    direction : str, mapping or array (n,)
+        h, along which the gap opens: a point name, {point: coefficient} or a row.
+    gap : float
+        Distance [m] in the undeformed structure; negative is a preload.
+    stiffness : float, default inf
+        k [N/m], > 0; infinite for a rigid contact.
+    damping : float, default 0.0
+        c [N s/m] beside a finite stiffness, >= 0.
+    friction : float, default 0.0
+        mu while it slides, >= 0.
+    tangential : str, mapping or array (n,), default None
+        h_t, along which it slides, given as h is; needed where there is friction.
+    static_friction : float, default None
+        mu_s >= mu up to which it sticks; None: the same.
+    tangential_stiffness : float, default inf
+        k_t [N/m] of the spring in series with the friction, of an elastic contact only; infinite for none.
+    restitution : float, default 0.0
+        e of a rigid contact, 0 to 1. Those that are struck together, and are coupled, need one e.
+    tangential_velocity : float, default 0.0
+        v_t [m/s] of the counter-surface along +h_t.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a name that is no text, and for what are no numbers.
+    MultiPhiValueError
+        For numbers out of these ranges; damping of a rigid contact, restitution of one that is not, friction without a
+        tangential direction, a tangential spring of a rigid or a viscous contact.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> below = mp.UnilateralContact("below", "tip", gap=1e-3)  # rigid
+    >>> above = mp.UnilateralContact("above", {"tip": -1.0}, gap=2e-3, stiffness=1e6)
+    >>> below.rigid, above.rigid
+    (True, False)
+    >>> model = mp.MultiPhiModel(chain, [below, above])
+    >>> tr = mp.simulate(model, 0.1, velocity=np.array([0.0, 0.0, 0.5]))
+    >>> tr.events[0].contact
+    'above'
     """
 
     name: str
@@ -184,7 +233,7 @@ class UnilateralContact:
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """Open and closed (element.py); where there is friction, open, stick, slip+ and slip-."""
+        """Open and closed; where there is friction, open, stick, slip+ and slip-."""
         plain = contact_states(self.rigid, self.damping > 0)
         if not self.further:
             return plain

@@ -19,14 +19,34 @@ __all__ = ["ModalDamping", "RayleighDamping"]
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """Damping ratios of the structure's modes, lowest first: C = M Phi diag(2 zeta omega) Phi^T M.
+    """Damping ratios of the structure's modes, lowest first.
 
-    Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are
-    those that it does not see.
+        C = M Phi diag(2 zeta omega) Phi^T M
 
-    ratios: fractions of critical damping (0.01 is 1 %), one per mode from the lowest, or a single number for all modes.
-    beyond: the ratio of every mode that is not listed; None: not said, they are undamped and a run that has such modes
-    warns of it.
+    Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are those
+    that it does not see.
+
+    Parameters
+    ----------
+    ratios : sequence of float, or float
+        zeta, fractions of critical damping (0.01 is 1 %), one per mode from the lowest, or a single number for all
+        modes.
+    beyond : float, default None
+        The ratio of every mode that is not listed; None: not said, they are undamped and a run that has such modes
+        warns of it.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For ratios that are negative or not finite, and ``beyond`` beside a single number.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> mp.ModalDamping([0.01, 0.02], beyond=0.03).of(4).tolist()
+    [0.01, 0.02, 0.03, 0.03]
     """
 
     ratios: Sequence[float] | float
@@ -60,7 +80,32 @@ class ModalDamping:
 
 @dataclass(frozen=True)
 class RayleighDamping:
-    """C = alpha M + beta K, alpha in 1/s, beta in s."""
+    """Damping by the matrices, C = alpha M + beta K.
+
+    Parameters
+    ----------
+    alpha : float, default 0.0
+        [1/s], >= 0.
+    beta : float, default 0.0
+        [s], >= 0.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For values that are negative or not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> rayleigh = mp.RayleighDamping(alpha=1.0, beta=1e-4)
+    >>> chain = mp.LinearStructure(np.eye(3), K, rayleigh, {"tip": 2})
+    >>> print(mp.MultiPhiModel(chain).level(()).ratios.round(4))
+    [0.0101 0.0145 0.0194]
+    """
 
     alpha: float = 0.0
     beta: float = 0.0

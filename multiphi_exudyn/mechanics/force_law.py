@@ -41,16 +41,64 @@ ZERO_FORCE = 1e-14  # of the largest force: the law vanishes there
 
 @dataclass(frozen=True, eq=False)
 class ForceLaw:
-    """A local force-displacement law; see the module's docstring.
+    """A local continuous force-displacement law as a chain of levels.
 
-    at: the row p, as a point name, {point: coefficient} or an (n,) row.
-    law: F(q) [N] as a function of q [m], of a number or of (k,) numbers; or a table, two (k,) arrays: q ascending, F.
-    tolerance: largest error of the segments, of the largest absolute F on the span; or segments: their number.
-    name: of the law. span: (q_lo, q_hi) [m] on which a function is followed.
-    A table's lines are the segments: it takes no tolerance, segments or span.
+        force on the structure -F(q) along p,   q = p.x
 
-    knots, forces: the ends of the segments (k,) and F there. centre: q_m. error: of the segments, relative as above.
-    Two laws are equal only if they are the same object.
+        F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q)
+        q_j >= q_m >= q'_j
+
+    F is followed by straight segments between knots that lie on it, which is a sum of one-sided springs dk_j [N/m],
+    negative where the law softens. q_m is the zero of F nearest to q = 0. Beyond the span its last segments go on. Two
+    laws are equal only if they are the same object.
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, along which it acts: a point name, {point: coefficient} or a row.
+    law : callable, or two arrays (k,)
+        F [N] as a function of q [m], of a number or of (k,) numbers; or a table, q [m] ascending and F [N], whose lines
+        are the segments.
+    tolerance : float, default None
+        Of a function: largest error of the segments, of the largest absolute F on the span; 0 < tolerance < 1.
+    name : str, default "law"
+        How levels and results refer to it.
+    span : (float, float), default None
+        Of a function: (q_lo, q_hi) [m] on which it is followed.
+    segments : int, default None
+        Of a function, instead of a tolerance: number of segments.
+
+    Attributes
+    ----------
+    knots, forces : array (k,)
+        Ends of the segments [m] and F [N] there.
+    centre : float
+        q_m [m].
+    error : float
+        Of the segments, relative as the tolerance is.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind, and a function that does not give numbers.
+    MultiPhiValueError
+        For a table that is not ascending, a law that is constant or not finite, and a span, a tolerance or a number of
+        segments that is missing, given twice or out of range.
+
+    Examples
+    --------
+    A cubic spring at the end of the chain, to 1 % of its largest force:
+
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> cubic = mp.ForceLaw("tip", lambda q: 1e9 * q**3, tolerance=0.01, span=(-0.01, 0.01))
+    >>> cubic.levels, cubic.error <= 0.01
+    (12, True)
+    >>> model = mp.MultiPhiModel(chain, [cubic])
+    >>> mp.simulate(model, 0.1, velocity=np.array([0.0, 0.0, 0.5])).status
+    'ok'
     """
 
     at: At

@@ -26,15 +26,48 @@ __all__ = ["Friction"]
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """One dry friction with a constant limit; see the module's docstring for its law.
+    """Dry friction with a constant limit: a block on a counter-surface, or with a spring in series a Jenkins element.
 
-    name: how levels, events and results refer to it.
-    direction: h as a point name, {point: coefficient} or an (n,) row.
-    limit: |T| [N] while it slips. static_limit: |T| [N] at which it begins to, >= limit; None: the same.
-    stiffness: k [N/m] of the spring in series, infinite for none.
-    velocity: v [m/s] of the counter-surface along +h.
+        stick   T = k (h.x - w - v t), or the reaction;  |T| <= static limit
+        slip    T = s limit,  s the sign of h.x' - v
 
-    Two of them are equal only if they are the same object.
+    The force on the structure is -h T; w is the place of the contact patch on the counter-surface. Without a spring it
+    is held, h.x - w - v t = 0, and T is the reaction. Stick ends where |T| reaches the static limit, slip where its
+    speed falls to zero. Two of them are equal only if they are the same object. Source: W. D. Iwan, Trans. ASME J.
+    Appl. Mech. 33 (1966).
+
+    Parameters
+    ----------
+    name : str
+        How levels, events and results refer to it.
+    direction : str, mapping or array (n,)
+        h, along which it acts: a point name, {point: coefficient} or a row.
+    limit : float
+        |T| [N] while it slips, > 0.
+    static_limit : float, default None
+        |T| [N] at which it begins to, >= limit; None: the same.
+    stiffness : float, default inf
+        k [N/m] of the spring in series, > 0; infinite for none.
+    velocity : float, default 0.0
+        v [m/s] of the counter-surface along +h.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a name that is no text, and for what are no numbers.
+    MultiPhiValueError
+        For numbers out of these ranges.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> model = mp.MultiPhiModel(chain, [mp.Friction("ring", "tip", limit=20.0)])
+    >>> tr = mp.simulate(model, 0.5, displacement=np.array([2.5, 5.0, 7.5]) * 1e-3)
+    >>> tr.events[-1].kind, round(1e3 * tr.slip("ring", 0.5), 1)  # mm from where it started
+    ('stick', -6.9)
     """
 
     name: str
@@ -86,7 +119,7 @@ class Friction:
 
     @property
     def states(self) -> tuple[ElementState, ...]:
-        """Stick, slip+ and slip- (element.py)."""
+        """Stick, slip+ and slip-."""
         exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")
         return ElementState("stick", "stick", exits, holds=(0,)), self._slip("+"), self._slip("-")
 

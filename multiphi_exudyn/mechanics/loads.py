@@ -53,9 +53,35 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ConstantLoad:
-    """f(t) = p force.
+    """A constant force at a point, f(t) = p force.
 
-    at: where, a point name, {point: coefficient} or an (n,) row p. force: N (N m on a rotation).
+    It belongs to the asymptotic configuration of every level, so it is exact for any number of modes.
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
+    force : float
+        [N], [N m] on a rotation.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a force that is no number.
+    MultiPhiValueError
+        For a force that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> tr = mp.simulate(model, 0.5, loads=[mp.ConstantLoad("tip", -50.0)])
+    >>> tr.events[0].kind
+    'close'
     """
 
     at: At
@@ -71,10 +97,31 @@ class ConstantLoad:
 
 @dataclass(frozen=True)
 class Gravity:
-    """f = M e acceleration: the weight of the whole structure.
+    """The weight of the whole structure, f = M e acceleration.
 
-    direction: e, what a unit of rigid-body motion along gravity moves every degree of freedom by, a row (n,),
-    {point: coefficient} or a point's name. acceleration: m/s2.
+    Parameters
+    ----------
+    direction : str, mapping or array (n,)
+        e, what a unit of rigid-body motion along gravity moves every degree of freedom by: a row, {point: coefficient}
+        or a point name.
+    acceleration : float, default 9.81
+        [m/s2].
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For an acceleration that is no number.
+    MultiPhiValueError
+        For an acceleration that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> mp.Gravity(-np.ones(3)).row(chain).tolist()
+    [-9.81, -9.81, -9.81]
     """
 
     direction: At
@@ -110,9 +157,40 @@ class VaryingLoad(ABC):
 
 @dataclass(frozen=True, eq=False)
 class HarmonicLoad(VaryingLoad):
-    """f(t) = p amplitude cos(2 pi frequency_hz t + phase). at: as in ConstantLoad. amplitude: N. phase: rad.
+    """A harmonic force at a point, f(t) = p amplitude cos(2 pi frequency_hz t + phase).
 
     Several of them make a sum of harmonics.
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
+    amplitude : float
+        [N], [N m] on a rotation.
+    frequency_hz : float
+        [Hz], >= 0.
+    phase : float, default 0.0
+        [rad].
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For values that are not finite, and a frequency < 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> shaker = mp.HarmonicLoad("tip", amplitude=20.0, frequency_hz=12.0)
+    >>> tr = mp.simulate(model, 0.5, loads=[shaker])
+    >>> tr.status
+    'ok'
     """
 
     amplitude: float
@@ -127,9 +205,39 @@ class HarmonicLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class SampledLoad(VaryingLoad):
-    """f(t) = p u(t), straight lines between samples: time (k,) [s], force (k,) [N]; zero outside them.
+    """A force at a point in straight lines between samples, zero outside them: f(t) = p u(t).
 
-    at: as in ConstantLoad. ``Sampled.from_csv`` reads samples from a file.
+    ``Sampled.from_csv`` reads samples from a file.
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
+    time : array (k,)
+        Ascending times [s], two or more.
+    force : array (k,)
+        u [N], [N m] on a rotation.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For fewer than two samples, as many times as forces not given, times that do not ascend, values that are not
+        finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulse = mp.SampledLoad("tip", time=[0.0, 0.01, 0.02], force=[0.0, -50.0, 0.0])
+    >>> tr = mp.simulate(model, 0.5, loads=[pulse])
+    >>> tr.events[0].kind
+    'close'
     """
 
     time: np.ndarray
@@ -148,7 +256,41 @@ class SampledLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class FunctionLoad(VaryingLoad):
-    """f(t) = p function(t), a function of time [s]; tolerance: of the response; breaks: where it jumps; see Smooth."""
+    """A force at a point that is a function of time, f(t) = p function(t).
+
+    It is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a function
+    of single times, unless ``breaks`` enclose it.
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
+    function : callable
+        Force [N] of time [s], of (k,) times or of single ones.
+    tolerance : float, default 1e-9
+        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+    breaks : sequence of float, default ()
+        Instants [s] at which the function or a derivative jumps; those that are seen are found without.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no function, no number, or no sequence of times.
+    MultiPhiValueError
+        For a tolerance out of range; in a run, for a function that does not give finite numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> burst = mp.FunctionLoad("tip", lambda t: 50.0 * np.exp(-20 * t) * np.sin(80 * t))
+    >>> mp.simulate(model, 0.5, loads=[burst]).status
+    'ok'
+    """
 
     function: Callable[[Any], Any]
     tolerance: float = 1e-9
@@ -162,7 +304,45 @@ class FunctionLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class SweepLoad(VaryingLoad):
-    """f(t) = p amplitude cos(phase(t)) from start_hz to end_hz in ``duration`` [s]; law, tolerance: see Sweep."""
+    """A swept sine at a point, f(t) = p amplitude cos(phase(t)), from start_hz to end_hz, then zero.
+
+        linear        f = start + (end - start) t / T
+        logarithmic   f = start (end / start)^(t / T)
+
+    Parameters
+    ----------
+    at : str, mapping or array (n,)
+        p, where it acts: a point name, {point: coefficient} or a row.
+    amplitude : float
+        [N], [N m] on a rotation.
+    start_hz, end_hz : float
+        Frequencies [Hz] at its begin and its end, > 0.
+    duration : float
+        T [s], > 0.
+    law : str, default "linear"
+        "linear" or "logarithmic".
+    tolerance : float, default 1e-9
+        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For numbers out of these ranges, and another law.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> sweep = mp.SweepLoad("tip", 20.0, start_hz=5.0, end_hz=25.0, duration=1.0)
+    >>> mp.simulate(model, 1.0, loads=[sweep]).status
+    'ok'
+    """
 
     amplitude: float
     start_hz: float
@@ -179,9 +359,35 @@ class SweepLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class StopMotion:
-    """A contact whose stop moves: g = h.x + gap - z(t). contact: its name. course: z(t) [m], away from the stop.
+    """A contact whose stop moves, g = h.x + gap - z(t).
 
-    The stop of a rigid contact may not jump in velocity, so its course is Harmonic, Smooth or Sweep.
+    The stop of a rigid contact may not jump in velocity: its course is Harmonic, Smooth or Sweep.
+
+    Parameters
+    ----------
+    contact : str
+        Name of the contact.
+    course : Harmonic, Sampled, Smooth or Sweep
+        z(t) [m] along +h, which closes the gap.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a name that is no text, and a course of another kind.
+    MultiPhiValueError
+        For an empty name.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> tr = mp.simulate(model, 0.5, loads=[mp.StopMotion("stop", mp.Harmonic(2e-3, 8.0))])
+    >>> tr.events[0].contact
+    'stop'
     """
 
     contact: str
@@ -194,10 +400,38 @@ class StopMotion:
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """A base that moves by e z(t); x is then relative to it, x_absolute = x + e z.
+    """A base that moves by e z(t) under the whole structure; x is then relative to it, x_absolute = x + e z.
 
-    direction: e, as in Gravity. course: z(t) [m], twice differentiable: Harmonic, Smooth or Sweep.
-    fixed_stops: names of the contacts whose stops stay where they are; all others move with the base.
+        M x'' + C x' + K x = f - M e z''(t)
+
+    Parameters
+    ----------
+    direction : str, mapping or array (n,)
+        e, what a unit of rigid-body motion along the base's moves every degree of freedom by: a row, {point:
+        coefficient} or a point name.
+    course : Harmonic, Smooth or Sweep
+        z(t) [m], twice differentiable.
+    fixed_stops : sequence of str, default ()
+        Names of the contacts whose stops stay where they are; all others move with the base.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For a course of another kind, and names that are no sequence of texts.
+    MultiPhiValueError
+        For an empty name.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> shaken = mp.BaseMotion(np.ones(3), mp.Harmonic(1e-3, 12.0))
+    >>> mp.simulate(model, 0.5, loads=[shaken]).status
+    'ok'
     """
 
     direction: At

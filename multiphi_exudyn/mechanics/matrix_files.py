@@ -70,17 +70,54 @@ def read_structure(
     dofs: str | os.PathLike[str] | DofTable | Sequence[tuple[int, int | str]] | None = None,
     fixed: Iterable[Place] = (),
 ) -> LinearStructure:
-    """A linear structure of matrices in files; see the module's docstring for their kinds.
+    """A linear structure of matrices in files, as finite element programs write them.
 
-    mass [kg, kg m2], stiffness [N/m, N m]: paths, (n, n) each; (path, name) of one array in a file of several. Sparse
-        ones stay sparse. Units are those of the files: lengths in mm need mass in t and stiffness in N/mm.
-    damping [N s/m, N m s]: a file, or what ``LinearStructure`` takes.
-    points: as ``LinearStructure`` takes them; DoFs count from 0.
-    dofs: (node, component) of every row, or a text file with both in each line ("17 3", "17,uz", CalculiX's "17.3").
+        .mtx, .mtx.gz          Matrix Market, and Abaqus *MATRIX OUTPUT
+        .sti, .mas             CalculiX, SOLVER=MATRIXSTORAGE
+        .rsa, .rua, .hb, .rb   Harwell-Boeing; Ansys HBMAT writes .matrix
+        .mat                   MATLAB
+        .op4                   Nastran OUTPUT4
+        .npz, .npy             NumPy arrays; one sparse matrix by scipy.sparse.save_npz
+
+    Parameters
+    ----------
+    mass : path, or (path, str)
+        M (n, n) [kg, kg m2]; with the name of one array in a file of several. A sparse one stays sparse. Units are
+        those of the files: lengths in mm need mass in t and stiffness in N/mm.
+    stiffness : path, or (path, str)
+        K (n, n) [N/m, N m].
+    damping : path, (path, str), array (n, n), ModalDamping, RayleighDamping or None, default None
+        C (n, n) [N s/m, N m s] in a file, or what LinearStructure takes.
+    points : mapping of str to int, (int, str) or array (n,), default None
+        As LinearStructure takes them; degrees of freedom count from 0.
+    dofs : path, or sequence of (int, str or int), default None
+        (node, component) of every row, or a text file with both in each line ("17 3", "17,uz", CalculiX's "17.3").
         Abaqus files with nodes (FORMAT=MATRIX INPUT) know it themselves; rows are then by node and component.
-    fixed: what the supports hold, in the numbering of the files, as ``LinearStructure`` takes it.
+    fixed : iterable of int or (int, str), default ()
+        What the supports hold, in the numbering of the files, as LinearStructure takes it.
 
-    Raises MultiPhiValueError naming the file that cannot be read, and what ``LinearStructure`` raises.
+    Returns
+    -------
+    LinearStructure
+        Of these matrices.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no path.
+    MultiPhiValueError
+        Naming the file that cannot be read and why; and what LinearStructure raises.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> np.save("M.npy", chain.mass)
+    >>> np.save("K.npy", chain.stiffness)
+    >>> mp.read_structure("M.npy", "K.npy", mp.ModalDamping(0.01), points={"tip": 2})
+    <LinearStructure: degrees of freedom 3; matrices dense; damping ModalDamping; points tip>
     """
     files = {"mass": mass, "stiffness": stiffness}
     if isinstance(damping, (str, os.PathLike, tuple)):

@@ -38,9 +38,31 @@ NOTHING = 1e-9  # of a point's flexibility: what the modes then miss of it is ro
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalStructure(LinearStructure):
-    """A structure of given modes; its coordinates are modal. Made by ``structure_from_modes``.
+    """A structure of given modes, whose coordinates are modal; made by ``structure_from_modes``.
 
-    highest: frequency [Hz] of the last mode. completed: the points whose static flexibility is known.
+    Attributes
+    ----------
+    mass, stiffness : array (n, n)
+        Modal masses and stiffnesses, diagonal.
+    damping : array (n, n) or None
+        The same of damping.
+    points : mapping of str to array (n,)
+        Displacements of the points in the modes, as rows.
+    dofs : None
+        Modal coordinates have no nodes.
+    free : array (n,)
+        0 to n - 1.
+    highest : float
+        Frequency [Hz] of the last mode.
+    completed : frozenset of str
+        The points whose static flexibility is known.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> tested = mp.structure_from_modes([10.0, 62.0], {"tip": [1.9, -1.8]}, ratios=0.01)
+    >>> tested.highest, sorted(tested.completed)
+    (62.0, [])
     """
 
     highest: float
@@ -54,20 +76,48 @@ def structure_from_modes(
     ratios: Sequence[float] | float = 0.0,
     flexibility: Mapping[str, float] | None = None,
 ) -> ModalStructure:
-    """A structure of r modes with named points; see the module's docstring for what modes alone leave out.
+    """A structure known by r modes alone: a modal test, or a finite element result without its matrices.
 
-    frequencies: (r,) [Hz], zero for rigid-body modes.
-    shapes: point -> (r,), the displacement (or rotation) of the point in every mode.
-    masses: (r,) modal masses [kg] of these shapes; None: shapes are mass-normalised [kg^-1/2].
-    ratios: (r,) fractions of critical damping below 1 (0.01 is 1 %), or one for all modes.
-    flexibility: point -> static displacement under a unit force there [m/N]; where it is not given, a run with a
-        contact there warns.
+        x_p = sum_j phi_pj q_j + z_p
+        m_j (q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j) = sum_p phi_pj F_p
+        z_p = rho_p F_p,   rho_p = flexibility_p - sum_j phi_pj^2 / (m_j omega_j^2)
 
-    Raises MultiPhiValueError or MultiPhiTypeError for what does not fit, and for a flexibility that is smaller than
-    that of the modes.
+    Modes that are not given would add to the flexibility of a point. Without it a contact acts on too stiff a
+    structure: its forces are too large and too short. Where it is known, z_p completes it by a coordinate of its own.
+    Source: R. H. MacNeal, Comput. Struct. 1 (1971) 581.
 
-    >>> s = structure_from_modes([10.0, 62.0], {"tip": [1.9, -1.8]}, ratios=0.01, flexibility={"tip": 9.4e-4})
-    >>> s.n, sorted(s.completed)
+    Parameters
+    ----------
+    frequencies : array (r,)
+        [Hz], zero for rigid-body modes.
+    shapes : mapping of str to array (r,)
+        Point to its displacement (or rotation) in every mode.
+    masses : array (r,), default None
+        Modal masses [kg] of these shapes; None: shapes are mass-normalised [kg^-1/2].
+    ratios : array (r,) or float, default 0.0
+        Fractions of critical damping below 1 (0.01 is 1 %), or one for all modes.
+    flexibility : mapping of str to float, default None
+        Point to its static displacement under a unit force there [m/N], of a free structure less its motion as a rigid
+        body. Where it is not given, a run with a contact there warns.
+
+    Returns
+    -------
+    ModalStructure
+        In modal coordinates, with a further one for each point that is completed.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For what does not fit, and for a flexibility that is smaller than that of the modes.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> known = {"tip": 9.4e-4}  # m/N
+    >>> tested = mp.structure_from_modes([10.0, 62.0], {"tip": [1.9, -1.8]}, flexibility=known)
+    >>> tested.n, sorted(tested.completed)
     (3, ['tip'])
     """
     hz = _numbers("frequencies", frequencies, None, least=0.0)

@@ -21,10 +21,39 @@ __all__ = ["Section", "check_numbers", "element_mass", "element_stiffness"]
 
 @dataclass(frozen=True)
 class Section:
-    """A prismatic piece of a beam, from ``start`` to ``end`` [m].
+    """A prismatic piece of a Timoshenko beam, from ``start`` to ``end``.
 
-    youngs_modulus, shear_modulus [Pa], density [kg/m3], area [m2], second_moment [m4];
-    shear_factor is k in the shear stiffness k G A.
+    Parameters
+    ----------
+    start, end : float
+        Where along the beam [m], start < end.
+    youngs_modulus : float
+        E [Pa].
+    density : float
+        rho [kg/m3].
+    area : float
+        A [m2].
+    second_moment : float
+        I [m4].
+    shear_modulus : float
+        G [Pa].
+    shear_factor : float, default 5/6
+        k in the shear stiffness k G A.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For start >= end, and for a property that is not finite and > 0.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0, "shear_modulus": 8.1e10}
+    >>> strip = mp.Section(0.0, 0.3, area=1e-4, second_moment=2.08e-10, **steel)
+    >>> round(strip.shear_factor, 3)
+    0.833
     """
 
     start: float
@@ -55,7 +84,29 @@ class Section:
         density: float,
         poisson_ratio: float = 0.3,
     ) -> Section:
-        """A rectangle, ``height`` along z; the shear modulus follows from the Poisson ratio."""
+        """A rectangle, whose shear modulus follows from the Poisson ratio: G = E / (2 (1 + nu)).
+
+        Parameters
+        ----------
+        start, end : float
+            Where along the beam [m].
+        width, height : float
+            Of the rectangle [m], height along z, in which the beam bends.
+        youngs_modulus : float
+            E [Pa].
+        density : float
+            rho [kg/m3].
+        poisson_ratio : float, default 0.3
+            nu, -1 < nu <= 0.5.
+
+        Examples
+        --------
+        >>> import multiphi_exudyn as mp
+        >>> steel = {"youngs_modulus": 2.1e11, "density": 7850.0}
+        >>> strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, **steel)
+        >>> print(f"{strip.second_moment:.3g} m4")
+        2.08e-10 m4
+        """
         check_numbers("rectangle", poisson_ratio=poisson_ratio)
         if not -1 < poisson_ratio <= 0.5:
             raise MultiPhiValueError(f"poisson_ratio: got {poisson_ratio!r}, need -1 < poisson_ratio <= 0.5")

@@ -33,25 +33,51 @@ ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating poin
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinearStructure(Shown):
-    """A linear structure; see the module's docstring for the equation.
+    """A linear structure: mass, damping and stiffness matrices with named points (eq. 38.1).
 
-    mass, stiffness: (n, n), dense or scipy.sparse, symmetric; kept as given, never modified.
-    damping: None | (n, n) | ModalDamping | RayleighDamping.
-    points: name -> DoF index, (node, component) or (n,) row; afterwards name -> row, of which only what is not zero is
-        kept.
-    dofs: what the rows of the matrices are, (node, component) of each: "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6;
-        None: not known. Afterwards a DofTable.
-    fixed: what the supports hold, DoF indices, (node, component) or (node, "all"). Matrices, points, dofs and fixed
-        itself are given in the numbering without supports; these rows and columns are then left out.
-    free: (n,) the degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
+        M x'' + C x' + K x = f(t),   x in R^n
+
+    A point is a row p of n numbers: its value is p.x, and a force F at it acts as p F. Two structures are equal only if
+    they are the same object.
 
     Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
     of its coordinates, r + 8 and some for each contact and point, a few times while it is computed, and once the
     factors of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.5 GB for matrices and mesh, at most 0.8 GB in all.
 
-    Raises MultiPhiValueError or MultiPhiTypeError for a wrong shape, a value that is not finite, an
-    asymmetric matrix, a mass that is not positive definite, a negative diagonal of stiffness or damping.
-    Two structures are equal only if they are the same object.
+    Parameters
+    ----------
+    mass : array (n, n)
+        M [kg, kg m2], dense or scipy.sparse, symmetric positive definite; kept as given, never modified.
+    stiffness : array (n, n)
+        K [N/m, N m], dense or scipy.sparse, symmetric positive semidefinite; rigid-body modes are welcome.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        C [N s/m, N m s], symmetric positive semidefinite, or how it is made; None for no damping.
+    points : mapping of str to int, (int, str) or array (n,), default empty
+        Name to degree of freedom, counted from 0, to (node, component) or to row p; afterwards name to row.
+    dofs : sequence of (int, str or int), default None
+        What the rows of the matrices are: (node, component) of each, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6.
+        None: not known. Afterwards a DofTable.
+    fixed : iterable of int or (int, str), default ()
+        What the supports hold: degrees of freedom, (node, component) or (node, "all"). Matrices, points, dofs and fixed
+        itself are given in the numbering without supports; these rows and columns are then left out.
+    free : array (n,), default empty
+        The degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers or no names.
+    MultiPhiValueError
+        For a wrong shape, a value that is not finite, an asymmetric matrix, a mass that is not positive definite, a
+        negative diagonal of stiffness or damping, and a degree of freedom that there is not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), points={"tip": 2})
+    <LinearStructure: degrees of freedom 3; matrices dense; damping ModalDamping; points tip>
     """
 
     mass: Matrix
@@ -97,7 +123,10 @@ class LinearStructure(Shown):
         yield "points", names(list(self.points))
 
     def row(self, at: At) -> np.ndarray:
-        """The row p, (n,), of a point name, of {point: coefficient}, or of a row given as such."""
+        """The row p (n,) of a point name, of {point: coefficient}, or of a row given as such.
+
+        MultiPhiValueError for a point that there is not, MultiPhiTypeError for coefficients that are no numbers.
+        """
         if isinstance(at, str):
             if at not in self.points:
                 raise MultiPhiValueError(f"point: got {at!r}, need {one_of(at, sorted(self.points))}")

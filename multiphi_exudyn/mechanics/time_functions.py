@@ -32,7 +32,30 @@ TIGHTEST = 1e-12  # tolerance of a course: below it lies the round-off of its po
 
 @dataclass(frozen=True)
 class Harmonic:
-    """u(t) = amplitude cos(2 pi frequency_hz t + phase)."""
+    """Function of time u(t) = amplitude cos(2 pi frequency_hz t + phase).
+
+    Parameters
+    ----------
+    amplitude : float
+        In the unit of what it moves: m of a stop or a base, N of a force.
+    frequency_hz : float
+        [Hz], >= 0.
+    phase : float, default 0.0
+        [rad].
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For values that are not finite, and a frequency < 0.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> mp.BaseMotion("tip", mp.Harmonic(1e-3, 12.0)).course
+    Harmonic(amplitude=0.001, frequency_hz=12.0, phase=0.0)
+    """
 
     amplitude: float
     frequency_hz: float
@@ -54,7 +77,30 @@ class Harmonic:
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Straight lines between samples: time (k,) ascending [s], values (k,); zero before the first, after the last."""
+    """Function of time in straight lines between samples; zero before the first and after the last.
+
+    Parameters
+    ----------
+    time : array (k,)
+        Ascending times [s], two or more.
+    values : array (k,)
+        In the unit of what it moves.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For fewer than two samples, as many times as values not given, times that do not ascend, values that are not
+        finite.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> pulse = mp.Sampled([0.0, 0.01, 0.02], [0.0, 50.0, 0.0])
+    >>> pulse.values.shape
+    (3,)
+    """
 
     time: np.ndarray
     values: np.ndarray
@@ -75,7 +121,24 @@ class Sampled:
 
     @classmethod
     def from_csv(cls, path: str | Path, column: int = 1) -> Sampled:
-        """Two or more columns of numbers, time [s] first; lines that begin with # are skipped."""
+        """Samples from a CSV file of two or more columns of numbers, time [s] first.
+
+        Lines that begin with # are skipped.
+
+        Parameters
+        ----------
+        path : str or path
+            Of the file.
+        column : int, default 1
+            Which column holds the values, counted from 0.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For a column that is no whole number.
+        MultiPhiValueError
+            For a file or a column that cannot be read.
+        """
         if not is_real(column) or int(column) != column:
             raise MultiPhiTypeError(f"samples: got column {column!r} of {path}, need a whole number >= 1")
         try:
@@ -97,12 +160,34 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Smooth:
-    """u(t) = function(t), a function of time [s] that takes (k,) times or single ones, smooth but for single instants.
+    """Function of time that is smooth but for single instants, given as a Python function.
 
-    tolerance: of the response, relative to its largest value; see simulate.
-    breaks: instants [s] at which the function or a derivative jumps; jumps and kinks that are seen are found without.
-    A function is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a
-    function of single times, unless ``breaks`` enclose it.
+    It is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a function
+    of single times, unless ``breaks`` enclose it.
+
+    Parameters
+    ----------
+    function : callable
+        u of time [s], of (k,) times or of single ones.
+    tolerance : float, default 1e-9
+        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+    breaks : sequence of float, default ()
+        Instants [s] at which the function or a derivative jumps; those that are seen are found without.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no function, no number, or no sequence of times.
+    MultiPhiValueError
+        For a tolerance out of range; in a run, for a function that does not give finite numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> burst = mp.Smooth(lambda t: 1e-3 * np.exp(-20 * t) * np.sin(80 * t))
+    >>> burst.tolerance
+    1e-09
     """
 
     function: Callable[[Any], Any]
@@ -158,12 +243,38 @@ class Smooth:
 
 @dataclass(frozen=True)
 class Sweep:
-    """u(t) = amplitude cos(phase(t)), whose frequency goes from start_hz to end_hz in ``duration`` [s], then zero.
+    """Function of time u(t) = amplitude cos(phase(t)) whose frequency goes from start_hz to end_hz, then zero.
 
         linear        f = start + (end - start) t / T
         logarithmic   f = start (end / start)^(t / T)
 
-    tolerance: of the response, relative to its largest value; see simulate.
+    Parameters
+    ----------
+    amplitude : float
+        In the unit of what it moves.
+    start_hz, end_hz : float
+        Frequencies [Hz] at its begin and its end, > 0.
+    duration : float
+        T [s], > 0.
+    law : str, default "linear"
+        "linear" or "logarithmic".
+    tolerance : float, default 1e-9
+        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no numbers.
+    MultiPhiValueError
+        For numbers out of these ranges, and another law.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> sweep = mp.Sweep(1e-3, start_hz=5.0, end_hz=45.0, duration=2.0)
+    >>> print(sweep.frequency(np.array([0.0, 1.0, 2.0])))
+    [ 5. 25. 45.]
     """
 
     amplitude: float

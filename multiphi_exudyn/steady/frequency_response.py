@@ -27,7 +27,28 @@ __all__ = ["FrequencyResponse", "frequency_response"]
 
 @dataclass(frozen=True, repr=False)
 class FrequencyResponse(Shown):
-    """Result of ``frequency_response``: frequencies (k,) [Hz] in the order in which they were run, k steady states."""
+    """Result of ``frequency_response``: steady states, one for each frequency.
+
+    Attributes
+    ----------
+    frequencies : array (k,)
+        In the order in which they were run [Hz].
+    states : tuple of SteadyState
+        k of them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> load = mp.HarmonicLoad("tip", 2.0, 10.0)
+    >>> response = mp.frequency_response(model, load, [10.0, 12.0])
+    >>> response.orders.tolist(), response.duty("stop").tolist()
+    ([1, 1], [0.0, 0.0])
+    """
 
     frequencies: np.ndarray
     states: tuple[SteadyState, ...]
@@ -74,13 +95,59 @@ def frequency_response(
     tolerance: float = 1e-6,
     start: Trajectory | Equilibrium | None = None,
 ) -> FrequencyResponse:
-    """Steady states at ``frequencies`` [Hz] in the order given, each from the one before, places held included.
+    """Steady states under a harmonic load, one frequency after the other.
 
-    The first from x, x' (n,), or from ``start``, as ``simulate`` has it.
+    Each starts from the state that the one before has reached, as a stepped-sine test does, so where several responses
+    attract the curve stays on its branch as long as there is one: going up and going down give different curves.
+    Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
 
-    load: whose frequency is replaced. The other arguments: see ``steady_state``. A frequency at which the run fails
-    is a state with that status; the next one starts where the failed one did. Issues a MultiPhiWarning for each kind of
-    warning that states have, not one for each state.
+    Parameters
+    ----------
+    model : MultiPhiModel
+        Structure and contacts; one with a ``Tolerance`` has to be decided, by a run of ``simulate``.
+    load : HarmonicLoad or BaseMotion
+        Whose frequency is replaced.
+    frequencies : array (k,)
+        In the order in which they are run [Hz], > 0.
+    displacement, velocity : array (n,), default None
+        x [m, rad] and x' [m/s, rad/s] that the first one starts from, None for zero.
+    other_loads : sequence of ConstantLoad and Gravity, default ()
+        That act as well.
+    periods : int, default 400
+        Of the load, after which a run that has not settled ends.
+    tolerance : float, default 1e-6
+        Relative to the size of the motion, to which states repeat.
+    start : Trajectory or Equilibrium, default None
+        What the first one starts from instead, as in ``simulate``.
+
+    Returns
+    -------
+    FrequencyResponse
+        A frequency at which the run fails is a state with that status; the next one starts where the failed one did. A
+        MultiPhiWarning is issued for each kind of warning that states have.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind, and a BaseMotion that is not Harmonic.
+    MultiPhiValueError
+        For frequencies that are not > 0, a model with a Tolerance that has not decided, and periods or a tolerance out
+        of range.
+
+    Examples
+    --------
+    The linear response, as this load is too small to close the stop:
+
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> load = mp.HarmonicLoad("tip", 2.0, 10.0)
+    >>> response = mp.frequency_response(model, load, [10.0, 12.0])
+    >>> print((1e3 * response.amplitude("tip")).round(3))  # mm
+    [0.287 0.499]
     """
     states = list[SteadyState]()
     begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None] = displacement, velocity, start

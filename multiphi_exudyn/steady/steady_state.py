@@ -53,18 +53,47 @@ PeriodicLoad: TypeAlias = "HarmonicLoad | BaseMotion"
 
 @dataclass(frozen=True, repr=False)
 class SteadyState(Shown):
-    """Result of ``steady_state``.
+    """Result of ``steady_state``: where a run under a harmonic load has settled.
 
-    status: "periodic" | "not settled" | "failed", message: the cause of the latter two. load: of the run.
-    order: periods of the load in one of the response, 0 where it is not periodic.
-    residual: by how much states ``order`` periods apart differ, relative to the size of the motion, both in
-    sqrt(energy); where it is not periodic the smallest over all orders.
-    multiplier: the largest modulus by which a small disturbance grows in a period of the load; NaN where the run
-    settled by itself. Links that never slip have no part in it (shooting.py). periods: of the load run one after
-    the other.
-    trajectory: one period of the response, or the last CHUNK periods of the load where it is not periodic; a failed
-    run ends early. displacement, velocity: (n,), at the end of the run: another one can go on from there.
-    warnings: what to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
+    Attributes
+    ----------
+    status : str
+        "periodic", "not settled" or "failed".
+    message : str
+        The cause of the latter two.
+    load : HarmonicLoad or BaseMotion
+        Of the run.
+    order : int
+        Periods of the load in one of the response, 2 and more for a sub-harmonic one, 0 where it is not periodic.
+    residual : float
+        By how much states ``order`` periods apart differ, relative to the size of the motion, both in sqrt(energy);
+        where it is not periodic the smallest over all orders.
+    multiplier : float
+        The largest modulus by which a small disturbance grows in a period of the load; NaN where the run settled by
+        itself. Friction that never slips has no part in it.
+    periods : int
+        Of the load, run one after the other.
+    trajectory : Trajectory
+        One period of the response, or the last 16 periods of the load where it is not periodic; a failed run ends
+        early.
+    displacement, velocity : array (n,)
+        x [m, rad] and x' [m/s, rad/s] at the end of the run: another one can go on from there.
+    warnings : tuple of str
+        What to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> state = mp.steady_state(model, mp.HarmonicLoad("tip", 20.0, 12.0))
+    >>> state.status, state.order
+    ('periodic', 1)
+    >>> round(state.duty("stop"), 3)  # part of the time in which the stop is closed
+    0.039
     """
 
     status: str
@@ -94,7 +123,7 @@ class SteadyState(Shown):
         return _half_range(self.trajectory, point, 0.0, self.trajectory.t_end)
 
     def amplitudes(self, point: At) -> np.ndarray:
-        """The same for every period of the load in the trajectory, (k,)."""
+        """Half the range [m] of a point in every period of the load in the trajectory, (k,); NaN where failed."""
         if self.status == "failed":
             return np.array([math.nan])
         ends = np.linspace(0.0, self.trajectory.t_end, 1 + max(1, round(self.trajectory.t_end * frequency(self.load))))
@@ -119,14 +148,56 @@ def steady_state(
     tolerance: float = 1e-6,
     start: Trajectory | Equilibrium | None = None,
 ) -> SteadyState:
-    """The response that a run from x, x' (n,) at t = 0 settles to, or from ``start``, as ``simulate`` has it.
+    """The response that a run under a harmonic load settles to.
 
-    load: HarmonicLoad, or BaseMotion with a Harmonic course. other_loads: constant ones. periods: of the load, after
-    which a run that has not settled ends. tolerance: relative to the size of the motion, to which states repeat.
-    A response that attracts slowly is found by Newton's method from where the run is; which response, where several
-    attract, follows from the start: places that friction holds are part of it, and only ``start`` hands them on.
-    Issues a MultiPhiWarning for each kind of its warnings. A model with a Tolerance
-    has to be decided, by a run of ``simulate``.
+        q_k+1 = P(q_k),   P^p(q) = q
+
+    q is the state at whole periods of the load, P one period of the run, p the order of the response. The run goes on
+    until states repeat; what decays slowly is not waited for, but found by Newton's method from where the run is. Which
+    response, where several attract, follows from the start: places that friction holds are part of it, and only
+    ``start`` hands them on.
+
+    Parameters
+    ----------
+    model : MultiPhiModel
+        Structure and contacts; one with a ``Tolerance`` has to be decided, by a run of ``simulate``.
+    load : HarmonicLoad or BaseMotion
+        A base motion with a Harmonic course.
+    displacement, velocity : array (n,), default None
+        x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero.
+    other_loads : sequence of ConstantLoad and Gravity, default ()
+        That act as well.
+    periods : int, default 400
+        Of the load, after which a run that has not settled ends.
+    tolerance : float, default 1e-6
+        Relative to the size of the motion, to which states repeat; 1e-12 at least.
+    start : Trajectory or Equilibrium, default None
+        What it starts from instead, as in ``simulate``; time begins anew.
+
+    Returns
+    -------
+    SteadyState
+        "periodic", "not settled" or "failed", with its cause. A MultiPhiWarning is issued for each kind of its
+        warnings.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind, and a BaseMotion that is not Harmonic.
+    MultiPhiValueError
+        For a frequency of zero, a model with a Tolerance that has not decided, and periods or a tolerance out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> state = mp.steady_state(model, mp.HarmonicLoad("tip", 20.0, 12.0))
+    >>> state.status, round(1e3 * state.amplitude("tip"), 2)  # mm
+    ('periodic', 1.76)
     """
     with kept_back():
         state = settled(model, load, (displacement, velocity, start), other_loads, periods, tolerance)

@@ -30,11 +30,42 @@ class Statistics:
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
-    """Energies [J]: initial + work_of_loads = final + all that was lost, which are the other rows.
+    """Energy balance of a run, all in J: initial + work_of_loads = final + everything that was lost.
 
-    work_of_loads: that of moving stops and counter-surfaces too. friction: limits times ways slipped on the
-    counter-surfaces, and what springs drop by where a static limit lets go. residual: what is left over of the
-    equation.
+    Made by ``Trajectory.ledger``. Two independent sides: what was lost is added up event by event and in closed form,
+    the final energy is read off the last state; ``residual`` is what is left over, round-off if nothing was forgotten.
+
+    Attributes
+    ----------
+    initial : float
+        Kinetic + strain energy [J] at the start.
+    work_of_loads : float
+        Of loads, moving stops and counter-surfaces [J].
+    impact : float
+        Lost [J] in impacts of rigid contacts.
+    truncation_kinetic, truncation_strain : float
+        What the modes of the next level could not hold [J].
+    damping : float
+        Of the structure and of contacts [J].
+    friction : float
+        Limits times ways slipped on the counter-surfaces, and what springs drop by where a static limit lets go [J].
+    final : float
+        Kinetic + strain energy [J] at the end.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> print(f"{tr.ledger.initial:.3f} J, of which damping took {tr.ledger.damping:.3f} J")
+    0.375 J, of which damping took 0.310 J
+    >>> abs(tr.ledger.residual) < 1e-12 * tr.ledger.initial
+    True
     """
 
     initial: float

@@ -31,7 +31,11 @@ INSTANTS = 1001  # of a history where no times are given
 
 
 class Histories(Shown, ABC):
-    """See the module's docstring. Times [s] are scalars or (k,); at an event ``side`` is "right" or "left"."""
+    """What can be asked of a motion, of a run or of one that was saved.
+
+    Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or the "left".
+    MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for a name that there is not.
+    """
 
     segments: Sequence[Segment]
     events: Sequence[Event]
@@ -79,29 +83,74 @@ class Histories(Shown, ABC):
         """x_inf,l (n,) [m, rad]."""
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x [m, rad]: (n,) for a scalar t, (n, k) for (k,) times."""
+        """x [m, rad] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> print(1e3 * tr.displacement(0.0).round(6))  # mm
+        [2.5 5.  7.5]
+        """
         return self._configurations(t, side, 0)
 
     def velocity(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x' [m/s, rad/s]: (n,) or (n, k)."""
+        """x' [m/s, rad/s] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
         return self._configurations(t, side, 1)
 
     def acceleration(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x'' [m/s2, rad/s2]: (n,) or (n, k)."""
+        """x'' [m/s2, rad/s2] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
         return np.asarray(
             self._evaluate(t, side, lambda segment, times: self._motion(segment.level, segment.modal(times, 2)))
         )
 
     def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,)."""
+        """Displacement [m] of a point (name, {point: coefficient} or row): a float for a scalar t, (k,) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
+        7.5
+        """
         return self._values("at", point, t, side)
 
     def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Gap [m] of a contact: a float, or (k,)."""
+        """Gap [m] of a contact: a float for a scalar t, (k,) for (k,) times."""
         return self._values("gap", contact, t, side)
 
     def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Contact force lambda >= 0 [N]: a float, or (k,); impacts of rigid contacts are impulses, not forces."""
+        """Contact force lambda >= 0 [N]: a float for a scalar t, (k,) for (k,) times.
+
+        Impacts of rigid contacts are impulses, not forces: ``contact_impulse``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> force = tr.contact_force("stop", np.linspace(0.0, 0.5, 2001))
+        >>> print(f"{force.max():.0f} N")
+        484 N
+        """
         return self._values("contact_force", contact, t, side)
 
     def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
@@ -121,11 +170,25 @@ class Histories(Shown, ABC):
         return float(pushed + struck)
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
-        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
+        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> [round(t, 4) for t in tr.contact_intervals("stop")[0]]
+        [0.0197, 0.0229]
+        """
         return self._intervals(self._holds("contact_intervals", contact))
 
     def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """T [N] of a friction, whose force on the structure is -h T: a float, or (k,)."""
+        """T [N] of a friction, whose force on the structure is -h T: a float for a scalar t, (k,) for (k,) times."""
         return self._values("friction_force", name, t, side)
 
     def slip(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
@@ -143,17 +206,39 @@ class Histories(Shown, ABC):
         return np.array(self._intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """Kinetic + strain energy [J], that of closed compliant contacts and of force laws included."""
+        """Kinetic + strain energy [J], closed compliant contacts and force laws included: a float, or (k,)."""
         return self._evaluate(t, side, lambda segment, times: segment.energy(times))
 
     def to_dataframe(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> DataFrame:
         """Histories as a pandas table: a row for each time [s], which is the index.
 
         Columns: displacement [m] of every point by its name, of every contact "gap NAME" [m] and "force NAME" [N], of
-        what has friction "friction NAME" [N] and "slip NAME" [m]. points: names, None for all of the structure's.
-        times: (k,) [s], None for 1001 that are evenly spaced.
+        what has friction "friction NAME" [N] and "slip NAME" [m].
 
-        Raises MultiPhiValueError for a name or a time that there is not.
+        Parameters
+        ----------
+        points : sequence of str, default None
+            Names of points, None for all of the structure's.
+        times : array (k,), default None
+            Times [s], None for 1001 that are evenly spaced.
+
+        Raises
+        ------
+        MultiPhiValueError
+            For a name or a time that there is not.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> list(tr.to_dataframe().columns)
+        ['tip', 'gap stop', 'force stop']
         """
         from pandas import DataFrame, Index
 
@@ -168,8 +253,12 @@ class Histories(Shown, ABC):
     def plot(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> Figure:
         """A matplotlib figure: displacements of points, and below them the forces of contacts and frictions.
 
-        points, times: as in ``to_dataframe``. Grey: while a contact is closed; where there are none, while friction
-        sticks.
+        Grey: while a contact is closed; where there are none, while friction sticks.
+
+        Parameters
+        ----------
+        points, times
+            As in ``to_dataframe``.
         """
         at = self._shown_times(times)
         forces: dict[str, Any] = {name: self.contact_force(name, at) for name in self.contacts}

@@ -42,11 +42,38 @@ _Start: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"
 
 @dataclass(frozen=True)
 class ManyRuns:
-    """What is kept of k runs.
+    """What is kept of k runs; made by ``simulate_many``.
 
-    points: (p,) as they were given. times: (t,) [s]. samples: (k, p, t) displacements of the points [m] at the times,
-    NaN from where a run has failed. events: (k,) their numbers. ends: (k,) how far each came [s].
-    status: (k,) "ok" or "failed". messages: (k,) the causes. warnings: (k,) what to distrust in each.
+    Attributes
+    ----------
+    points : tuple (p,)
+        As they were given.
+    times : array (t,)
+        [s].
+    samples : array (k, p, t)
+        Displacements of the points [m] at the times, NaN from where a run has failed.
+    events : array (k,)
+        Their numbers.
+    ends : array (k,)
+        How far each came [s].
+    status : tuple of str
+        "ok" or "failed" of each.
+    messages : tuple of str
+        The causes.
+    warnings : tuple of tuple of str
+        What to distrust in each.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> runs = mp.simulate_many(model, 0.5, velocities=np.diag([0.5, 0.5, 0.5]), points=["tip"])
+    >>> runs.samples.shape, set(runs.status)
+    ((3, 1, 1), {'ok'})
     """
 
     points: tuple[At, ...]
@@ -69,14 +96,51 @@ def simulate_many(
     times: np.ndarray | None = None,
     threads: int | None = None,
 ) -> ManyRuns:
-    """Runs of ``model`` from 0 to t_end [s] from k starts, each as ``simulate`` would do it, to the bit.
+    """Runs of one model that differ in their starts alone, on all cores, each what ``simulate`` gives, to the bit.
 
-    displacements, velocities: (k, n) x and x' at t = 0, None for zero; one of them is needed. loads: of all runs.
-    points: names, {point: coefficient} or rows (n,), at which displacements are sampled. times: (t,) [s] at which, None
-    for the end alone. threads: None for as many as there are cores; the answer does not hang on it.
+    Parameters
+    ----------
+    model : MultiPhiModel
+        Structure, contacts and modes.
+    t_end : float
+        End of every run [s].
+    displacements, velocities : array (k, n), default None
+        x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero; one of them is needed.
+    loads : sequence of loads, default ()
+        Of all runs, as of ``simulate``.
+    points : sequence of str, mapping or array (n,), default ()
+        Names, {point: coefficient} or rows, at which displacements are sampled.
+    times : array (t,), default None
+        At which they are [s], None for the end alone.
+    threads : int, default None
+        How many, None for as many as there are cores; the answer does not hang on it.
 
-    A run that fails, or whose start is refused, is a status of its row. Warnings are issued by their kinds, with the
-    numbers of the runs. Raises MultiPhiValueError or MultiPhiTypeError for bad input that is common to all.
+    Returns
+    -------
+    ManyRuns
+        Samples, events and warnings of each. A run that fails, or whose start is refused, is a status of its row.
+        Warnings are issued by their kinds, with the numbers of the runs.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For what is wrong for all runs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> speeds = np.zeros((100, 3))
+    >>> speeds[:, 2] = np.linspace(0.01, 0.5, 100)
+    >>> runs = mp.simulate_many(model, 0.5, velocities=speeds, points=["tip"])
+    >>> runs.samples.shape, set(runs.status)
+    ((100, 1, 1), {'ok'})
     """
     from tqdm import tqdm
 

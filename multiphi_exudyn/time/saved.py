@@ -77,7 +77,45 @@ class SavedLevel:
 
 @dataclass(frozen=True, repr=False)
 class SavedTrajectory(Histories):
-    """A trajectory from a file: what ``Trajectory`` has, but no model, and no way to continue it."""
+    """A trajectory from a file: all histories, events and energies of a run, but no model, and no way to continue it.
+
+    Made by ``load_trajectory``; its questions are those of a Trajectory. Times [s] are scalars or (k,); at an event
+    ``side`` chooses the limit from the "right" (default) or the "left".
+
+    Attributes
+    ----------
+    segments : sequence of Segment
+        The pieces of the motion.
+    events : sequence of Event
+        In order of time.
+    t_end : float
+        How far it goes [s].
+    status, message : str
+        "ok", or "failed" and the cause.
+    warnings : tuple of str
+        What to distrust in it.
+    ledger : Ledger
+        Energies [J]; None for a run that failed at its start.
+    stats : Statistics
+        Work of the run.
+    header : mapping
+        What the file says of itself: names of points, contacts and frictions, states of the levels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> tr.save("run.npz")
+    >>> saved = mp.load_trajectory("run.npz")
+    >>> saved.points, saved.contacts, len(saved.events) == len(tr.events)
+    (('tip',), ('stop',), True)
+    """
 
     segments: Sequence[Segment]
     events: Sequence[Event]
@@ -178,9 +216,37 @@ def save(run: Histories, path: Path, **told: Any) -> None:
 def load_trajectory(path: str | Path) -> SavedTrajectory:
     """A trajectory that ``Trajectory.save`` has written, to be evaluated.
 
-    path: of the .npz file. Needs nothing of the model that was run, and holds no code.
+    Needs nothing of the model that was run; the file holds no code.
 
-    Raises MultiPhiValueError naming a file that is not there, not whole or of another kind.
+    Parameters
+    ----------
+    path : str or path
+        Of the .npz file.
+
+    Returns
+    -------
+    SavedTrajectory
+        With the histories, events, ledger and warnings of the run.
+
+    Raises
+    ------
+    MultiPhiValueError
+        Naming a file that is not there, not whole or of another kind.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> tr.save("run.npz")
+    >>> saved = mp.load_trajectory("run.npz")
+    >>> round(1e3 * saved.at("tip", 0.0), 3)  # mm
+    7.5
     """
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as stored:

@@ -50,24 +50,66 @@ def simulate(
     compiled: bool | None = None,
     start: Trajectory | Equilibrium | None = None,
 ) -> Trajectory:
-    """Motion of ``model`` from 0 to t_end [s], or from the end of the trajectory ``start``.
+    """Motion of a model from 0 to ``t_end``, or from the end of another trajectory; exact between contact events.
 
-    displacement, velocity: x, x' (n,) at t = 0, None for zero; not modified. loads: see loads.py.
-    start: a trajectory of the same model; its final state is handed on whole, what links hold and what contacts wait
-    for included, so that also a truncated model moves as it would have without the break. Time goes on: the answer
-    lasts from ``start.t_end`` to t_end, and that is the time of the loads. They are not part of the trajectory: give
-    them again, or others, which then begin to act with a jump. Or an ``equilibrium`` of the model, whose displacement
-    is the start, at rest, with the springs of friction as they are stretched there; given as a displacement alone, they
-    are not stretched. The forces are not part of it either.
-    compiled: False for the loop as plain Python; True, or None, for the compiled one, plain Python where numba is not
-    installed and None is given; the answer is the same to round-off.
-    The first run of a model with a Tolerance is repeated until its modes suffice; they are those of the trajectory's
-    model, and of every later run of the same model.
-    Of a structure whose base does not hold all modes the trajectory's model has a base that holds the loads as well.
-    The trajectory's status is "ok", or "failed" with the cause in its message; it then ends early. The message of a run
-    that is ok says where the tolerance of a smooth load could not be reached. What else to distrust is in its warnings,
-    each of which is issued as a MultiPhiWarning too.
-    Raises MultiPhiValueError or MultiPhiTypeError for bad input, and for a start inside a rigid stop.
+        M x'' + C x' + K x = f(t) + sum_i h_i lambda_i
+
+    Within a level the modes move in closed form; an event ends it where a gap closes, a contact force vanishes, or
+    friction changes between stick and slip. There is no time step.
+
+    Parameters
+    ----------
+    model : MultiPhiModel
+        Structure, contacts and modes. The first run of a model with a ``Tolerance`` is repeated until its modes
+        suffice; they are those of the trajectory's model, and of every later run of the same model.
+    t_end : float
+        End of the run [s].
+    displacement, velocity : array (n,), default None
+        x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero; not modified.
+    loads : sequence of loads, default ()
+        ConstantLoad, Gravity, HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad, StopMotion, BaseMotion.
+    compiled : bool, default None
+        False runs the loop as plain Python; True the compiled one; None the compiled one, and plain Python where numba
+        is not installed. The answer is the same to round-off.
+    start : Trajectory or Equilibrium, default None
+        A trajectory of the same model: its final state is handed on whole, what friction holds and what contacts wait
+        for included, so that a truncated model too moves as it would have without the break. Time and the time of the
+        loads go on from its t_end; the loads are not part of it: give them again, or others, which then begin with a
+        jump. Or an ``MultiPhiModel.equilibrium``: at rest there, with the springs of friction stretched; its forces are
+        not part of it.
+
+    Returns
+    -------
+    Trajectory
+        With status "ok", or "failed" with the cause in ``message``; it then ends early. Of a large structure its model
+        has a base that holds the loads as well. What to distrust is in its ``warnings``, each of which is issued as a
+        MultiPhiWarning too. Of a run that is ok the message says where the tolerance of a smooth load could not be
+        reached.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For vectors that are not (n,) finite numbers, a time that is not > 0, a start inside a rigid stop, a ``start``
+        that failed, is of another model or stands beside a displacement, and points and contacts that there are not.
+    MultiPhiError
+        For compiled=True without numba.
+
+    Examples
+    --------
+    Pulled with 100 N, let go, and striking a stop 1 mm below its rest:
+
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> tr.status, len(tr.contact_intervals("stop"))
+    ('ok', 13)
     """
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")

@@ -76,14 +76,64 @@ class Start(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Histories):
-    """Result of ``simulate``.
+    """Result of ``simulate``: a motion in analytic pieces that answers at any time, and what is known about it.
 
-    final: the state it ends in, after whatever happened at that instant; final_work: see Motion.
+        x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
 
-    status: "ok" | "failed"; message: the cause. warnings: what to distrust in this answer, and what to do about it, a
-    sentence each that begins with its kind and a colon (reliability.py). t_end [s]: how far it goes. events: in order
-    of time. again: the same run from other y, y' (m,), without warnings.
-    Times are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or "left".
+    Ask it for ``displacement``, ``velocity``, ``acceleration``, ``at`` a point, ``gap``, ``contact_force``,
+    ``contact_impulse``, ``contact_intervals``, ``friction_force``, ``slip``, ``stick_intervals`` and ``energy``; for a
+    table by ``to_dataframe``, a figure by ``plot``. Times [s] are scalars or (k,); at an event ``side`` chooses the
+    limit from the "right" (default) or the "left".
+
+    Attributes
+    ----------
+    model : MultiPhiModel
+        What was run; with the modes that were decided where it had a ``Tolerance``.
+    segments : sequence of Segment
+        The pieces, each within one level.
+    events : sequence of Event
+        In order of time.
+    t_end : float
+        How far it goes [s].
+    status : str
+        "ok" or "failed".
+    message : str
+        The cause of a failure.
+    start : Start
+        Displacement, velocity and states that it begins with, in base coordinates.
+    start_loss : Loss
+        Energies [J] that the start itself took.
+    final : State
+        The state it ends in, after whatever happened at that instant; None for a run that never began.
+    final_work : float
+        Work [J] that varying loads and stops have done on the final state.
+    load : array (m,)
+        The static load in base coordinates.
+    stats : Statistics
+        Levels built, transitions, events, segments, function evaluations, bytes.
+    warnings : tuple of str
+        What to distrust in this answer and what to do about it, one sentence each that begins with its kind and a
+        colon: truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
+        modes, linear range, cluster, base, load pieces.
+    again : callable
+        The same run from other y, y' (m,), without warnings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
+    7.5
+    >>> tr.displacement(np.linspace(0.0, 0.5, 11)).shape
+    (3, 11)
+    >>> tr.warnings
+    ()
     """
 
     model: MultiPhiModel
@@ -131,8 +181,13 @@ class Trajectory(Histories):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.
 
-        What is loaded answers all questions about histories, events and energies; it cannot be continued.
-        The file has n numbers for each mode of each level that was visited, and appears whole or not at all (saved.py).
+        What is loaded answers all questions about histories, events and energies; it cannot be continued. The file has
+        n numbers for each mode of each level that was visited, and appears whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            Of the file.
         """
         told = {"status": self.status, "message": self.message, "warnings": self.warnings}
         ledger = dataclasses.asdict(self.ledger) if self.segments else None
@@ -140,7 +195,13 @@ class Trajectory(Histories):
 
     @functools.cached_property
     def ledger(self) -> Ledger:
-        """Where the energy went; computed when it is asked for. A run that failed at its start has none."""
+        """Where the energy went [J]; computed when it is asked for.
+
+        Raises
+        ------
+        NumericalFailure
+            For a run that failed at its start, and so has none.
+        """
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = self.start_loss + total_loss(self.events)
@@ -171,8 +232,13 @@ class Trajectory(Histories):
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
 
-        Looked for where the event rule let the gap be negative, ``samples`` in the shortest period of the level and
-        at least as many in a segment.
+        Looked for where the event rule let the gap be negative, ``samples`` in the shortest period of the level and at
+        least as many in a segment.
+
+        Raises
+        ------
+        MultiPhiValueError
+            For a name that is no contact.
         """
         i = self._contact("deepest_gap", contact)
         depth = 0.0
@@ -186,10 +252,35 @@ class Trajectory(Histories):
     def horizon(self, tolerance: float = 0.01) -> float:
         """Sensitivity horizon [s]: until when runs nudged at their start stay within ``tolerance`` of this one.
 
-        The nudges are +-NUDGE of the speeds y' that the run has where it is fastest, added to those it starts with. The
-        distance is that of y, in the norm of the mass matrix, relative to the largest |y| of the run. t_end where it
-        never exceeds the tolerance. A nudged run that fails tells nothing beyond its end. No answer beyond the horizon
-        is to be compared point by point: round-off would change it as much. Costs two more runs.
+        No answer beyond it is to be compared point by point: round-off would change it as much. The nudges are +-1e-12
+        of the speeds y' that the run has where it is fastest, added to those it starts with; the distance is that of y,
+        in the norm of the mass matrix, relative to the largest |y| of the run. t_end where it never exceeds the
+        tolerance. A nudged run that fails tells nothing beyond its end. Costs two more runs.
+
+        Parameters
+        ----------
+        tolerance : float, default 0.01
+            Between 0 and 1; 0.01 is 1 %.
+
+        Raises
+        ------
+        MultiPhiValueError
+            For a tolerance out of range.
+        NumericalFailure
+            For a run that failed at its start.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> tr.horizon(0.01)  # to the end: this run is determined
+        0.5
         """
         if not (is_real(tolerance) and 0 < tolerance < 1):
             raise MultiPhiValueError(f"tolerance: got {tolerance!r}, need a number between 0 and 1")

@@ -53,9 +53,62 @@ ROUND_OFF = 1e-12  # of the energy at the start: an impact that takes less is no
 
 
 class MultiPhiBody:
-    """One body: its items, its present state, and what happened to it.
+    """One Multi-Phi body of an Exudyn system: its items, its present state, and what happened to it.
 
-    name, model; items: typed indices; matched_step: h [s] or None; coordinates: its part of the system.
+    Made by ``CreateMultiPhiBody``, and found as ``mbs.variables["multiPhi"][name]``.
+
+    Parameters
+    ----------
+    name : str
+        Of the body.
+    motion : Motion
+        Of the model, at its start.
+    loads : sequence of loads
+        Its own, as of ``simulate``.
+    end : float
+        Of the run [s] that they are prepared for.
+    matched_step : float or None
+        Step [s] that its modes are matched to.
+
+    Attributes
+    ----------
+    model : MultiPhiModel
+        What it moves by.
+    items : dict
+        Typed indices of its items in the system.
+    coordinates : Coordinates
+        Its part of the system's coordinates.
+
+    Raises
+    ------
+    MultiPhiValueError
+        For loads at points or contacts that there are not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.solution.file.write = False
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
+    >>> body = mbs.variables["multiPhi"]["chain"]
+    >>> body.events[0].contact, body.warnings
+    ('stop', ())
     """
 
     def __init__(

@@ -48,25 +48,90 @@ def CreateMultiPhiBody(
     start: Trajectory | Equilibrium | None = None,
     color: Sequence[float] = (-1.0, -1.0, -1.0, -1.0),
 ) -> dict[str, Any]:
-    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``.
+    """Add the reduced model to an Exudyn system, before ``mbs.Assemble()``; also ``mbs.CreateMultiPhiBody(...)``.
 
-    mbs: the system. model: structure, contacts and modes. name: of the body, and of its items with a prefix.
-    displacement, velocity: x, x' (n,) at the start, None for zero. loads: as in ``simulate``. start: as there; where it
-    is a trajectory its final state is handed on whole, and time begins anew.
-    matchedStepSize: None, or the fixed step size h [s] of the solver; the body alone is then exact at that step
-    with TrapezoidalIndex2 or GeneralizedAlpha of spectralRadius 1. Velocities of the node are then those of
-    stepped_level.py. interface: what connectors, loads and sensors act on: names of points or {name: point or row},
-    one coordinate each, or {name: PositionInterface or RigidInterface}, positions and frames to which markers of
-    positions and of rigid bodies attach (interface_nodes.py); needs TrapezoidalIndex2 and constant loads. Where an
-    ObjectContactCoordinate acts on them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``:
-    shorter steps than the others are no gain, and with matchedStepSize an error. show, color: as in other
-    Create functions (RGBA, negative for the usual). drawing: None, or how the renderer shows the body.
+        M q'' + D q' + K q = drive + (loads and connectors of the system)
 
-    Returns typed indices: nInterface and sInterface (only if asked for: {name: NodeIndex}, and {name: SensorIndex},
-    the forces on its coordinates), nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates,
-    sCoordinates_t, sCoordinates_tt and sLevel. ``body_histories(mbs, items)`` turns the sensors into displacements
-    and forces; ``mbs.variables['multiPhi'][name]`` has the ``events`` with times inside steps, and the
-    ``warnings``: what to distrust in the run so far; at its end a MultiPhiWarning is issued for each of them.
+    q are the modal coordinates eta of the present level.
+
+    A body on which nothing acts but its own loads follows the motion of ``simulate``; beside others its steps are of
+    second order, and its events are found inside them.
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        The system.
+    model : MultiPhiModel
+        Structure, contacts and numbers of modes.
+    name : str, default ""
+        Of the body, and of its items with a prefix; empty for "multiPhi0" and so on.
+    displacement, velocity : array (n,), default None
+        x [m, rad] and x' [m/s, rad/s] at the start, None for zero.
+    loads : sequence of loads, default ()
+        As of ``simulate``.
+    matchedStepSize : float, default None
+        The fixed step size [s] of the solver, to which modes are matched: the body alone is then exact at that step
+        with TrapezoidalIndex2, or GeneralizedAlpha of spectralRadius 1; velocities of the node are those of the matched
+        modes.
+    interface : iterable of str, or mapping of str to point, default ()
+        What connectors, loads and sensors of the system act on: names of points or {name: point or row}, one coordinate
+        each; or {name: PositionInterface or RigidInterface}, positions and frames to which markers of positions and of
+        rigid bodies attach. Needs TrapezoidalIndex2 and constant ``loads``. Where an ObjectContactCoordinate acts on
+        them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps are no gain, and with
+        matchedStepSize an error.
+    show : bool, default True
+        As in other Create functions.
+    drawing : Drawing, default None
+        How the renderer shows the body; None for nothing.
+    start : Trajectory or Equilibrium, default None
+        As of ``simulate``, instead of a displacement; the final state of a trajectory is handed on whole, and time
+        begins anew.
+    color : sequence of float, default (-1, -1, -1, -1)
+        Red, green, blue and opacity, as in other Create functions; negative for the usual.
+
+    Returns
+    -------
+    dict
+        Typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates, sCoordinates_t,
+        sCoordinates_tt and sLevel; with an interface nInterface {name: NodeIndex} and sInterface {name: SensorIndex},
+        the forces on its coordinates. ``body_histories(mbs, items)`` turns the sensors into displacements and forces;
+        ``mbs.variables["multiPhi"][name]`` has the ``events``, with times inside steps, and the ``warnings``, for each
+        of which a MultiPhiWarning is issued at the end of a run.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For arguments of another kind.
+    MultiPhiValueError
+        For a name that is taken, a model with a Tolerance, a step that is not > 0; beside an interface loads that vary,
+        moving counter-surfaces, and rigid contacts with friction; and what ``simulate`` refuses.
+    NumericalFailure
+        For a start that cannot be carried through.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.solution.file.write = False
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
+    >>> mbs.variables["multiPhi"]["chain"].events[0].kind
+    'close'
     """
     if not isinstance(mbs, exu.MainSystem):
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an Exudyn MainSystem")

@@ -38,9 +38,41 @@ BODY, OPEN, CLOSED = (0.0, 0.447, 0.698, 1.0), (0.6, 0.6, 0.6, 1.0), (0.835, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """How a body looks. positions (k, 3) [m] of its points, in the order of the line through them;
-    rows (k, n) of their deflections; direction (3,) of a positive deflection, a unit vector;
-    scale: of deflections and gaps in the picture; radius [m] of the bars.
+    """How a body looks in Exudyn's renderer: a line of thick bars, and a block for every stop.
+
+        point j                       p_j = P_j + scale (w_j.x) d
+        stop of contact i at point j  P_j - scale (gap_i / c) d,  where h_i = c w_j
+
+    Contacts whose direction is not that of one point have no block; a stop that moves is drawn where it is at rest.
+
+    Parameters
+    ----------
+    positions : array (k, 3)
+        P [m], in the order of the line through them; two or more.
+    rows : array (k, n)
+        w, rows of their deflections [m].
+    direction : array (3,)
+        d of a positive deflection, a unit vector.
+    scale : float, default 1.0
+        Of deflections and gaps in the picture, > 0.
+    radius : float, default 1e-3
+        Of the bars [m], > 0.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For other shapes, a direction that is no unit vector, and a scale or a radius that is not finite and > 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from multiphi_exudyn.exudyn_plugin import Drawing
+    >>> places = [[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]
+    >>> drawing = Drawing(places, rows=np.eye(3), direction=[0.0, 1.0, 0.0], scale=10.0)
+    >>> print(drawing.line(np.array([0.0, 0.0, 1e-3]))[2])  # where the tip is drawn [m]
+    [0.3  0.01 0.  ]
     """
 
     positions: np.ndarray
@@ -70,8 +102,19 @@ class Drawing:
 
     @classmethod
     def of_beam(cls, beam: Beam, elements: int = 57, scale: float = 1.0, radius: float = 1e-3) -> Drawing:
-        """The drawing of ``planar_beam(beam, elements)``: along x, deflections along y,
-        as Exudyn's own planar beams."""
+        """The drawing of ``planar_beam(beam, elements)``: along x, deflections along y, as Exudyn's own planar beams.
+
+        Parameters
+        ----------
+        beam : Beam
+            Of the structure.
+        elements : int, default 57
+            As of ``planar_beam``.
+        scale : float, default 1.0
+            Of deflections and gaps in the picture.
+        radius : float, default 1e-3
+            Of the bars [m].
+        """
         x, rows = beam_deflections(beam, elements)
         zero = np.zeros_like(x)
         return cls(np.column_stack((x, zero, zero)), rows, np.array([0.0, 1.0, 0.0]), scale, radius)

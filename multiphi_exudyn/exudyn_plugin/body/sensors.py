@@ -39,10 +39,63 @@ RECORDED = {
 class BodyHistories:
     """What a body's sensors recorded: k samples at ``sensors.writePeriod``; for an event list exact times.
 
-    time (k,) [s]; points: name -> displacement (k,) [m]; velocities: name -> (k,) [m/s]; gaps: contact -> (k,) [m];
-    contact_force: contact -> lambda (k,) [N]; contact_intervals: contact -> [(closed at, opened at), ...] [s];
-    closed: contact -> (k,) bool; friction_force: T (k,) [N], slip: (k,) [m], stick_intervals: (m, 2) [s], by the names
-    of frictions and of contacts that have friction; events and warnings as in a Trajectory.
+    Made by ``body_histories``.
+
+    Attributes
+    ----------
+    time : array (k,)
+        [s].
+    points : mapping of str to array (k,)
+        Point to displacement [m].
+    velocities : mapping of str to array (k,)
+        Point to velocity [m/s].
+    gaps : mapping of str to array (k,)
+        Contact to gap [m].
+    contact_force : mapping of str to array (k,)
+        Contact to lambda [N].
+    contact_intervals : mapping of str to list of (float, float)
+        Contact to (closed at, opened at) [s].
+    closed : mapping of str to array (k,)
+        Contact to whether it is closed.
+    friction_force : mapping of str to array (k,)
+        Friction, or contact that has friction, to T [N].
+    slip : mapping of str to array (k,)
+        The same to the way [m] of its patch.
+    stick_intervals : mapping of str to array (m, 2)
+        The same to (sticks from, slips from) [s].
+    events : tuple of Event
+        In order of time, with times inside steps.
+    warnings : tuple of str
+        What to distrust in the run.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.solution.file.write = False
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
+    >>> histories = body_histories(mbs, items)
+    >>> histories.time.shape == histories.points["tip"].shape
+    True
+    >>> first = histories.events[0]
+    >>> first.contact, first.kind, round(first.time, 4)
+    ('stop', 'close', 0.0197)
     """
 
     time: np.ndarray
@@ -80,9 +133,54 @@ def _sensor(mbs: Any, body: MultiPhiBody, key: str, node: str, kind: Any) -> Any
 
 
 def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | None = None) -> BodyHistories:
-    """Histories of a body from the sensors of the last run; ``items`` as returned when it was created.
+    """Histories of a body from its sensors of the last run.
 
-    points: names to rebuild, None for all of the structure.
+        x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        After SolveDynamic.
+    items : mapping
+        As ``CreateMultiPhiBody`` returned it.
+    points : iterable of str, default None
+        Names to rebuild, None for all of the structure's.
+
+    Returns
+    -------
+    BodyHistories
+        Displacements, velocities, gaps, forces, events and warnings.
+
+    Raises
+    ------
+    MultiPhiValueError
+        For items of no body of this system, a system that has not run, and points that there are not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import exudyn as exu
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
+    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
+    >>> mbs.Assemble()
+    >>> settings = exu.SimulationSettings()
+    >>> settings.solution.file.write = False
+    >>> settings.timeIntegration.endTime = 0.1
+    >>> settings.timeIntegration.numberOfSteps = 100
+    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
+    >>> done = mbs.SolveDynamic(settings, solverType=solver)
+    >>> histories = body_histories(mbs, items)
+    >>> print(1e3 * histories.points["tip"][:1].round(6))  # mm
+    [7.5]
     """
     body = _body_of(mbs, items)
     on_points = [mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in items.get("sInterface", {}).values()]

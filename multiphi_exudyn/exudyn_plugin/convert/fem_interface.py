@@ -35,14 +35,53 @@ def linear_structure_from_fem(
     points: Mapping[str, tuple[Nodes, int | str]] | None = None,
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
 ) -> LinearStructure:
-    """The structure of an ``exudyn.FEM.FEMinterface``, which is left as it was.
+    """A finite element model in Exudyn's FEMinterface (from Abaqus, Ansys, NGsolve) as a linear structure.
 
-    fixed: node numbers, or the name of a node set. points: name -> (node number, component), 0 to 2 or "ux", "uy" and
-    "uz"; with the name of a node set the mean of its nodes by their weights, as a contact or load over a face needs it.
-    damping: as ``LinearStructure`` takes it, in the free degrees of freedom; ``dofs`` says which these are.
+        M_free x'' + C x' + K_free x = f,   x the displacements [m] of the nodes that are not fixed
 
-    Raises MultiPhiValueError or MultiPhiTypeError for matrices that are missing or do not fit the nodes, for nodes,
-    sets and components that do not exist, and for a point that is fixed.
+    Degree of freedom 3 i + c is component c (0, 1, 2 for x, y, z) of node i, nodes counted from 0. The matrices stay
+    sparse; the FEMinterface is left as it was.
+
+    Parameters
+    ----------
+    fem : exudyn.FEM.FEMinterface
+        With nodes, massMatrix and stiffnessMatrix.
+    fixed : iterable of int, or str, default ()
+        Node numbers, or the name of a node set.
+    points : mapping of str to (int or str, int or str), default None
+        Name to (node number, component), 0 to 2 or "ux", "uy" and "uz"; with the name of a node set the mean of its
+        nodes by their weights, as a contact or a load over a face needs it.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        In the free degrees of freedom.
+
+    Returns
+    -------
+    LinearStructure
+        Sparse, without the fixed nodes; its ``dofs`` say which degrees of freedom are left.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no FEMinterface, matrices that are missing, and nodes or points of another kind.
+    MultiPhiValueError
+        For matrices that do not fit the nodes, nodes, sets and components that there are not, and a point that is
+        fixed.
+
+    Examples
+    --------
+    Two nodes with a spring along x between them, the first one fixed:
+
+    >>> import numpy as np
+    >>> import scipy.sparse
+    >>> from exudyn.FEM import FEMinterface
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from_fem
+    >>> fem = FEMinterface()
+    >>> fem.nodes = {"Position": np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])}
+    >>> fem.massMatrix = scipy.sparse.eye_array(6, format="csr")
+    >>> K = 4e4 * np.kron([[1, -1], [-1, 1]], np.diag([1, 0, 0]))
+    >>> fem.stiffnessMatrix = scipy.sparse.csr_array(K)
+    >>> linear_structure_from_fem(fem, fixed=[0], points={"tip": (1, 0)})
+    <LinearStructure: degrees of freedom 3; matrices sparse; damping none; points tip>
     """
     mass, stiffness = _matrices(fem)
     held = _fixed_nodes(fem, fixed, mass.shape[0] // COMPONENTS)

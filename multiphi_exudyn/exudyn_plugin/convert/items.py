@@ -54,7 +54,49 @@ _COORDINATE_CONSTRAINTS = {"ConnectorCoordinate", "ConnectorCoordinateVector"}
 
 @dataclass(frozen=True)
 class Item:
-    """One item of the system: its name, index among objects or loads (0 for the system), type, and what it became."""
+    """One item of an Exudyn system, and what a reduction made of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the item.
+    index : int
+        Among objects or loads; 0 for the system.
+    type : str
+        Exudyn's type of it.
+    became : str
+        What it is in the model; empty where it was left out.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> taken = reduce(mbs).taken
+    >>> taken[1].name, taken[1].became
+    ('spring', 'its matrices')
+    """
 
     name: str
     index: int

@@ -35,9 +35,52 @@ LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of t
 
 @dataclass(frozen=True)
 class RangeCheck:
-    """What a check found: times (k,) [s] and the relative error (k,) there, or the reason why there is none.
+    """How far a reduced motion left the range in which the linearisation of its Exudyn system holds.
 
-    lag: by how much [rad] errors that repeat in every oscillation shift it until the end of the run, about.
+    Made by ``Reduction.check``: at a few instants the system is asked for its accelerations in the model's motion.
+
+    Attributes
+    ----------
+    times : array (k,)
+        When it was asked [s].
+    errors : array (k,)
+        What the forces that the model lacks move it away, relative to the motion's largest displacement.
+    reason : str
+        Why nothing could be checked; empty where it could.
+    lag : float
+        By how much [rad], about, errors that repeat in every oscillation shift it until the end of the run.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> reduction = reduce(mbs)
+    >>> given = {"velocity": reduction.velocity, "loads": reduction.loads}
+    >>> tr = mp.simulate(reduction.model, 0.1, **given)
+    >>> reduction.check(tr).holds
+    True
     """
 
     times: np.ndarray

@@ -49,8 +49,55 @@ PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than 
 class LinearizedStructure(LinearStructure):
     """A linear structure that knows the Exudyn coordinates it came from.
 
-    coordinates: S, (n_full, n), with q - q_0 = S z; a copy, read-only. S^T S is the identity, so a
-    matrix A in z acts in Exudyn's coordinates as S A S^T.
+        q = q_0 + S z
+
+    It is a LinearStructure in z, made by ``linear_structure_from`` and ``reduce``. S^T S is the identity, so a matrix A
+    in z acts in Exudyn's coordinates as S A S^T.
+
+    Attributes
+    ----------
+    mass, stiffness : array (n, n)
+        M [kg, kg m2] and K [N/m, N m] in z.
+    damping : array (n, n), ModalDamping, RayleighDamping or None
+        C [N s/m, N m s] in z, or how it is made.
+    points : mapping of str to array (n,)
+        Displacements of markers and coordinates from q_0, as rows in z.
+    dofs : None
+        Rows in z have no nodes.
+    free : array (n,)
+        0 to n - 1: nothing is fixed beside the system's constraints.
+    coordinates : array (n_full, n)
+        S; a copy, read-only.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> structure = reduce(mbs).structure
+    >>> structure.n, structure.coordinates.shape
+    (1, (1, 1))
     """
 
     coordinates: np.ndarray
@@ -71,16 +118,70 @@ def linear_structure_from(
 ) -> tuple[LinearizedStructure, tuple[UnilateralContact, ...]]:
     """Linearise an assembled Exudyn system about its current state; the system is left as it was.
 
-    points: name -> marker index, or (node index, coordinate number). A marker of one coordinate gives the
-    point ``name``; a marker with a position gives ``name.x``, ``name.y``, ``name.z``, a marker of several
-    coordinates ``name.0``, ``name.1``, ... Without ``points`` every marker is named so by its own name and
-    every node coordinate as ``<node name>.<coordinate number>``; those that cannot move are left out.
-    damping: in the coordinates z or by ratios; None takes what the system's own dampers give.
+        q = q_0 + S z,   M = S^T M_q S,  C = S^T C_q S,  K = S^T K_q S
 
-    Every active ObjectContactCoordinate comes back as a UnilateralContact of the object's name: its row,
-    the gap [m] at the linearisation point and its stiffness [N/m]; none of them is part of the stiffness.
+    q are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions that constraints leave free.
+    The state must be an equilibrium of everything but the contacts and the constraint forces: a linear structure has no
+    constant force (``reduce`` takes any state). User functions and other nonlinear forces enter by their tangent at
+    q_0.
 
-    Raises MultiPhiValueError for a contact, a state or a matrix that a linear structure cannot hold.
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        Assembled.
+    points : mapping, default None
+        Name to marker index, or to (node index, coordinate number). A marker of one coordinate gives the point
+        ``name``; a marker with a position gives ``name.x``, ``name.y``, ``name.z``, a marker of several coordinates
+        ``name.0``, ``name.1``, ... None: every marker by its own name, and every node coordinate as ``<node
+        name>.<coordinate number>``; those that cannot move are left out.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        In the coordinates z, or by ratios; None takes what the system's own dampers give.
+
+    Returns
+    -------
+    structure : LinearizedStructure
+        M, C, K, the points and S.
+    contacts : tuple of UnilateralContact
+        One for every active ObjectContactCoordinate, with its name, row, gap [m] in the current state and stiffness
+        [N/m]; none of them is part of K.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For points of another kind.
+    MultiPhiValueError
+        For a system that is not assembled or not of second order, a state that is no equilibrium, and a contact or a
+        matrix that a linear structure cannot hold.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> structure, contacts = linear_structure_from(mbs, points={"mass": (node, 0)})
+    >>> contacts[0].name, contacts[0].gap
+    ('stop', 0.001)
     """
     check_system(mbs)
     objects = _contact_objects(mbs)

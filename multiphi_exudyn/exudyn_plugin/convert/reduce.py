@@ -58,13 +58,58 @@ HELD = 1e-9  # of a row's largest entry before projection: a contact that moves 
 
 @dataclass(frozen=True, repr=False)
 class Reduction(Shown):
-    """What ``reduce`` made of a system.
+    """What ``reduce`` made of an Exudyn system.
 
-    model: structure, contacts, modes. velocity: z'(0), (n,); the displacement z(0) is zero. loads: p, none if zero,
-    and those by functions of time.
-    taken: every item of the model. left_out: what is no part of it, with the reason. symmetrised: matrices that were
-    not symmetric, by how much and between which coordinates; their symmetric part is taken, and what the other part
-    does is found by ``check``.
+    Attributes
+    ----------
+    model : MultiPhiModel
+        Structure, contacts, modes.
+    velocity : array (n,)
+        z'(0) [m/s, rad/s] of the current state; the displacement z(0) is zero.
+    loads : tuple of loads
+        The constant load of a state out of balance, none if it is zero, and those by functions of time.
+    taken : tuple of Item
+        Every item of the system that is part of the model.
+    left_out : tuple of (Item, str)
+        What is no part of it, with the reason.
+    symmetrised : tuple of str
+        Matrices that were not symmetric, by how much and between which coordinates; their symmetric part is taken, and
+        what the other part does is found by ``check``.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> print(reduce(mbs).report)
+    1 degrees of freedom, contacts: 1, frictions: 0, modes: all
+    taken
+      ObjectMass1D 'mass': its matrices
+      ObjectConnectorCoordinateSpringDamper 'spring': its matrices
+      ObjectContactCoordinate 'stop': contact, 1e+06 N/m
+    left out
+      nothing
     """
 
     model: MultiPhiModel
@@ -100,7 +145,7 @@ class Reduction(Shown):
         return "\n".join([size, "taken", *taken, *made, "left out", *(left or ["  nothing"])])
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
-        """How far a trajectory of this model left the linear range (linear_range.py); its warnings say so too."""
+        """How far a trajectory of this model left the linear range; its warnings say so too."""
         validity = self.model.validity
         assert isinstance(validity, (LinearRange, LinearLimits))
         return validity.check(trajectory)
@@ -108,7 +153,12 @@ class Reduction(Shown):
     def report_of(self, trajectory: Trajectory, tolerance: float = 0.01) -> str:
         """How far a trajectory of this model can be trusted, a line each: linear range, horizon, warnings.
 
-        tolerance: of the horizon, see ``Trajectory.horizon``.
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of ``simulate`` with this model.
+        tolerance : float, default 0.01
+            Of the horizon, see ``Trajectory.horizon``.
         """
         found = self.check(trajectory)
         missed = f"forces that the model lacks: {found.error:.2g} of its largest displacement"
@@ -129,15 +179,72 @@ def reduce(
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
-    modes: of every level, as in MultiPhiModel; a number the system does not have means all of them. None: all
-    of a small system, else chosen from static shares.
-    points, damping: as in ``linear_structure_from``. Contacts are ObjectContactCoordinate and the limit stops of
-    ObjectConnectorCoordinateSpringDamperExt, with names ``<object>.upper`` and ``<object>.lower``; friction is that of
-    the latter where it is the law of ``mp.Friction``, with the object's name.
+        q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction)
+        p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
-    strict: whether to refuse a system of which something is left out, instead of a warning of every run.
+    q_0, v_0 are the current coordinates and velocities, f the forces there, S the directions that constraints leave
+    free. A state out of balance has a constant load p and starts to move as the system does. Contacts are
+    ObjectContactCoordinate and the limit stops of ObjectConnectorCoordinateSpringDamperExt, called ``<object>.upper``
+    and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``, with the object's
+    name.
 
-    Raises MultiPhiValueError for a system without a symmetric linearisation of second order.
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+        Assembled.
+    modes : int, "all", UpTo, Tolerance or None, default None
+        Of every level, as in MultiPhiModel; a number that the system does not have means all of them. None: all up to
+        100, else chosen from static responses.
+    points : mapping, default None
+        As of ``linear_structure_from``: name to marker index, or to (node index, coordinate number); None for all.
+    damping : array (n, n), ModalDamping, RayleighDamping or None, default None
+        In the coordinates z, or by ratios; None takes what the system's own dampers give.
+    strict : bool, default False
+        Whether to refuse a system of which something is left out, instead of a warning of every run.
+
+    Returns
+    -------
+    Reduction
+        The model, its start and loads, and what was taken and left out.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For points of another kind.
+    MultiPhiValueError
+        For a system without a symmetric linearisation of second order; with strict=True for what would be left out.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> reduction = reduce(mbs)
+    >>> given = {"velocity": reduction.velocity, "loads": reduction.loads}
+    >>> tr = mp.simulate(reduction.model, 0.1, **given)
+    >>> tr.events[0].contact, tr.events[0].kind
+    ('stop', 'close')
     """
     check_system(mbs)
     objects, loads = items_of(mbs)

@@ -34,11 +34,29 @@ ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, abo
 
 @dataclass(frozen=True)
 class PositionInterface:
-    """A point of a body as a position of the system.
+    """A point of a body as a position of the Exudyn system, to which markers of positions attach.
 
-    position: where it is without displacement [m], two numbers for a plane system and three for one in space.
-    displacements: what moves it in each of these directions, as ``LinearStructure.row`` takes it, or None in one in
-    which the structure does not move.
+    Parameters
+    ----------
+    position : sequence of float
+        Where it is without displacement [m]: two numbers in a plane system, three in space.
+    displacements : sequence of str, mapping, array (n,) or None
+        What moves it in each of these directions: a point name, {point: coefficient} or a row; None where the structure
+        does not move.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        Where it is used, for arguments of another kind.
+    MultiPhiValueError
+        Where it is used, for another number of directions, and points that there are not.
+
+    Examples
+    --------
+    >>> from multiphi_exudyn.exudyn_plugin import PositionInterface
+    >>> tip = PositionInterface(position=[0.3, 0.0, 0.0], displacements=[None, "tip", None])
+    >>> tip.displacements
+    [None, 'tip', None]
     """
 
     position: Sequence[float]
@@ -47,11 +65,33 @@ class PositionInterface:
 
 @dataclass(frozen=True)
 class RigidInterface:
-    """A place of a body as a rigid frame of the system, which moves and turns.
+    """A place of a body as a rigid frame of the Exudyn system, to which every joint attaches.
 
-    position, displacements: as of a PositionInterface. rotations: what turns it [rad]: about z in a plane system, about
-    x, y and z in space, as rows or None. A body is linear: a run in which a rigid interface turns by more than 5
-    degrees issues a warning.
+    A body is linear: a run in which a rigid interface turns by more than 5 degrees issues a warning.
+
+    Parameters
+    ----------
+    position : sequence of float
+        Where it is without displacement [m]: two numbers in a plane system, three in space.
+    displacements : sequence of str, mapping, array (n,) or None
+        What moves it in each of these directions: a point name, {point: coefficient} or a row; None where the structure
+        does not move.
+    rotations : sequence of str, mapping, array (n,) or None
+        What turns it [rad]: about z in a plane system, about x, y and z in space.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        Where it is used, for arguments of another kind.
+    MultiPhiValueError
+        Where it is used, for another number of directions, and points that there are not.
+
+    Examples
+    --------
+    >>> from multiphi_exudyn.exudyn_plugin import RigidInterface
+    >>> end = RigidInterface([0.3, 0.0], displacements=[None, "tip"], rotations=["slope"])
+    >>> end.rotations
+    ['slope']
     """
 
     position: Sequence[float]
