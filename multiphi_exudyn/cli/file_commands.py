@@ -12,6 +12,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.cases import Study, load_study
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
+from multiphi_exudyn.study.scene.file_reference import file_reference
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -42,8 +43,11 @@ def run_validate(path: Path) -> bool:
     return True
 
 
-def run_schema(kind: str) -> bool:
-    """Print the JSON schema of a file's form, with which editors complete and check it."""
+def run_schema(kind: str, markdown: bool) -> bool:
+    """Print the JSON schema of a file's form, with which editors complete and check it, or its fields as a page."""
+    if markdown:
+        print(file_reference(KINDS[kind][1], f"The fields of a {kind} file"))
+        return True
     schema = json.dumps(KINDS[kind][1].model_json_schema())
     print(json.dumps(json.loads(schema, parse_constant=lambda infinite: "rigid"), indent=1))
     return True

@@ -173,6 +173,7 @@ def parser() -> argparse.ArgumentParser:
         "schema scene",
     )
     schema.add_argument("kind", choices=KINDS)
+    schema.add_argument("--markdown", action="store_true", help="all fields as a page to read instead (default: JSON)")
     add(
         "compile",
         _compile,
@@ -306,7 +307,7 @@ def _validate(given: argparse.Namespace) -> bool:
 def _schema(given: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_schema
 
-    return run_schema(given.kind)
+    return run_schema(given.kind, given.markdown)
 
 
 def _compile(given: argparse.Namespace) -> bool:

@@ -1,11 +1,12 @@
 """What a newcomer has: a file to start from, a check without a run, and a study of what the subject is about."""
 
 import json
+from pathlib import Path
 
 import pytest
 from small_study import result_of, row
 
-from multiphi_exudyn import MultiPhiValueError, cli
+from multiphi_exudyn import MultiPhiValueError, cli, study
 from multiphi_exudyn.study import load
 from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.scene.places import with_value
@@ -150,3 +151,12 @@ def test_places_by_name_by_number_all_at_once_and_whole_tables():
     assert DATA["contacts"][0]["gap"] == 1.0
     with pytest.raises(MultiPhiValueError, match="need a field of a table or a list"):
         with_value(DATA, "contacts.b.gap.more", 1.0)
+
+
+@pytest.mark.parametrize("kind", ["scene", "study"])
+def test_the_pages_of_fields_are_those_of_the_classes(kind, capsys):
+    """Made anew by: multiphi-exudyn schema KIND --markdown > multiphi_exudyn/study/KIND-files.md"""
+    code, out, _ = told(capsys, "schema", kind, "--markdown")
+    page = Path(study.__file__).parent / f"{kind}-files.md"
+    assert (code, out) == (0, page.read_text(encoding="utf-8"))
+    assert "| `stiffness` | number > 0 or `rigid` | needed | N/m" in out or kind == "study"

@@ -43,8 +43,8 @@ class ContactSpec(Table):
 
     name: Name
     direction: Place
-    gap: Finite
-    stiffness: Stiffness
+    gap: Finite  # m, at x = 0
+    stiffness: Stiffness  # N/m, or "rigid"
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
     restitution: NotNegative = 0.0  # of a rigid contact, up to 1
     friction: NotNegative = 0.0  # mu, along ``tangential``, where it slides

@@ -1,0 +1,100 @@
+"""The fields of a kind of file, table by table, as a page in Markdown, from the classes that check it.
+
+What a table is stands in its class's docstring, what a field is in the remark behind it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+__all__ = ["file_reference"]
+
+REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
+LIMITS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
+
+
+def file_reference(whole: type[BaseModel], title: str) -> str:
+    """The page: one section for each table that the file may hold, in the order in which they are first met."""
+    return "\n".join([f"# {title}", "", *(_section(path, table) for path, table in _tables(whole))])
+
+
+def _tables(whole: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Every class of table, with the place where it is first met."""
+    waiting, met = [("", whole)], {whole}
+    while waiting:
+        path, table = waiting.pop(0)
+        yield path, table
+        for name, field in table.model_fields.items():
+            for inside in _models(field.annotation):
+                if inside not in met:
+                    met.add(inside)
+                    waiting.append((f"{path}.{name}".lstrip("."), inside))
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Classes of tables in an annotation."""
+    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inside in typing.get_args(annotation):
+        yield from _models(inside)
+
+
+def _section(path: str, table: type[BaseModel]) -> str:
+    """Heading, what the table is, and its fields."""
+    kinds = typing.get_args(table.model_fields["kind"].annotation) if "kind" in table.model_fields else ()
+    kind = f", kind = {json.dumps(kinds[0])}" if kinds else ""
+    heading = f"## `{path}`{kind}" if path else "## The file"
+    fields = table.model_json_schema()["properties"]
+    rows = [
+        f"| `{name}` | {_type(field)} | {_default(table, name)} | {remark} |"
+        for (name, field), remark in zip(fields.items(), _remarks(table, fields), strict=True)
+        if name != "kind"
+    ]
+    text = inspect.getdoc(table) or ""
+    return "\n".join([heading, "", text, "", "| field | value | default | |", "|---|---|---|---|", *rows, ""])
+
+
+def _remarks(table: type[BaseModel], names: Mapping[str, Any]) -> list[str]:
+    found: dict[str, str] = {}
+    for owner in reversed(table.__mro__):
+        if owner is not BaseModel and issubclass(owner, BaseModel):
+            found |= dict(REMARK.findall(inspect.getsource(owner)))
+    return [found.get(name, "") for name in names]
+
+
+def _default(table: type[BaseModel], name: str) -> str:
+    field = table.model_fields[name]
+    if field.is_required():
+        return "needed"
+    value = field.get_default(call_default_factory=True)
+    if value is None or isinstance(value, BaseModel) or value in ((), {}):
+        return "none" if not isinstance(value, BaseModel) else "as below"
+    return f"`{'rigid' if value == float('inf') else json.dumps(value)}`"
+
+
+def _type(field: Mapping[str, Any]) -> str:
+    """What a field takes, in words."""
+    if "$ref" in field:
+        return "table"
+    options = field.get("anyOf") or field.get("oneOf")
+    if options:
+        return " or ".join(dict.fromkeys(text for option in options if (text := _type(option)) != "none"))
+    if "enum" in field or "const" in field:
+        return " or ".join(f"`{value}`" for value in field.get("enum", [field.get("const")]))
+    kind = field.get("type")
+    if kind == "array":
+        inside = field.get("items") or {"anyOf": field.get("prefixItems", [{}])}
+        return f"list of: {_type(inside)}"
+    if kind == "object":
+        values = field.get("additionalProperties")
+        return f"{{name: {_type(values)}}}" if isinstance(values, dict) else "table"
+    limits = "".join(f" {sign} {field[limit]:g}" for limit, sign in LIMITS.items() if limit in field)
+    return f"{WORDS.get(str(kind), 'value')}{limits}"
