@@ -4,7 +4,7 @@ A plate in plane stress, L = 0.5 m, h = 20 mm, meshed and assembled by scikit-fe
 lock in bending), M and K sparse. Stop and tip are pieces of its boundary, 20 mm of the lower edge and the end face: a
 point of a plate has no finite flexibility, the mean over a piece has. The tip is pulled up 3 mm and let go.
 
-Run: python examples/meshed_cantilever.py [--full] [FIGURE.png]        --full: up to 10^5 degrees of freedom, a minute
+Run: python examples/meshed_cantilever.py [--full] [FIGURE.png]   --full: up to 10^5 degrees of freedom, half a minute
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def _small(
     """The lowest modes and the Krylov vectors of ``rows`` (k, n)."""
     count = min(structure.n - 2, modes + BEYOND)
     known = None if less is None or less.complete else _own(less)
-    return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known)
+    return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known, least=min(modes, count))
 
 
 def _own(base: ModalBase) -> Modes:

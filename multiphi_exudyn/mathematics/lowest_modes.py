@@ -79,11 +79,12 @@ def lowest_modes(
     rows: np.ndarray,
     samples: Sequence[HeldRows] = (),
     known: Modes | None = None,
+    least: int = 1,
 ) -> LowestModes:
     """The ``count`` lowest modes and the Krylov vectors of ``rows`` (k, n), for sparse matrices.
 
     One block of Krylov vectors, the static shapes, then as many as ``samples`` need. Where ``count`` would part modes
-    of one frequency there are fewer or more. known: the lowest modes, which are not computed again.
+    of one frequency there are fewer, but at least ``least``. known: the lowest modes, which are not computed again.
 
     The stiffness is factorised once (s = 0); for a structure with rigid-body modes three times: it is singular,
     then s is small, then the first elastic omega^2. A mass that is not diagonal is factorised for its definiteness.
@@ -94,7 +95,7 @@ def lowest_modes(
 
     mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
     with tqdm(desc="modes", unit="solve", disable=None, leave=False, delay=BAR_DELAY) as bar:
-        found = _Lowest(mass, stiffness, bar)
+        found = _Lowest(mass, stiffness, least, bar)
         found.look_for(count, known)
         modes, error = found.completed(rows, samples)
     return LowestModes(modes, len(found.values), error)
@@ -115,9 +116,9 @@ def left_out(mass: Any, stiffness: Any, modes: Modes, rows: np.ndarray) -> np.nd
 class _Lowest:
     """The lowest modes under way. values, vectors: omega^2 and shapes of those found. shift: s; factor: of A."""
 
-    def __init__(self, mass: Any, stiffness: Any, bar: Any) -> None:
+    def __init__(self, mass: Any, stiffness: Any, least: int, bar: Any) -> None:
         _check_mass(mass)
-        self.mass, self.stiffness, self._bar = mass, stiffness, bar
+        self.mass, self.stiffness, self._least, self._bar = mass, stiffness, least, bar
         self.values, self.vectors = np.zeros(0), np.zeros((mass.shape[0], 0))
         self.shift, self._factor = 0.0, _definite_factor(stiffness)
 
@@ -162,19 +163,23 @@ class _Lowest:
             )
 
     def _find(self, count: int) -> None:
-        """Further modes up to ``count``, by the compliance without those that are there."""
+        """Further modes up to ``count``; twice as many where a cluster at their end leaves fewer than ``least``."""
         further = count - len(self.values)
-        if further <= 0:
-            return
-        given = self.values + self.shift
+        while further > 0:
+            self._add(further)
+            most = self.mass.shape[0] - 2 - len(self.values)
+            further = min(2 * further, most) if len(self.values) < self._least and further < most else 0
+
+    def _add(self, further: int) -> None:
+        """So many more, by the compliance without those that are there."""
+        known, own = self.vectors, self.values + self.shift
 
         def answer(x: np.ndarray) -> np.ndarray:
-            return self.solve(x) - self.vectors @ ((self.vectors.T @ x) / given)
+            return self.solve(x) - known @ ((known.T @ x) / own)
 
         values, vectors = _lanczos(self.mass, self.stiffness, further, self.shift, answer)
-        vectors = vectors - self.vectors @ (self.vectors.T @ (self.mass @ vectors))
-        self.values = np.concatenate([self.values, values])
-        self.vectors = np.hstack([self.vectors, vectors])
+        vectors = vectors - known @ (known.T @ (self.mass @ vectors))
+        self.values, self.vectors = np.concatenate([self.values, values]), np.hstack([known, vectors])
 
     def completed(self, rows: np.ndarray, samples: Sequence[HeldRows]) -> tuple[Modes, float]:
         """The modes with the Krylov vectors of ``rows``, and the largest error of omega^2 of the samples."""
@@ -314,5 +319,6 @@ def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -
         raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
     order = np.argsort(values)
     apart = np.flatnonzero(np.diff(values[order]) > NEAR * np.abs(values[order][1:]))
-    kept = order[: apart[-1] + 1] if apart.size else order[:count]
+    whole = count >= n - 2  # there is no more to part them from
+    kept = order[:count] if whole and not apart.size else order[: apart[-1] + 1 if apart.size else 0]
     return values[kept], vectors[:, kept]

@@ -106,12 +106,14 @@ class Samples:
     def amplitude_exceeds(self, limit: float, first: float = 0.0) -> bool:
         """Whether the amplitude is larger, which a few samples may tell already: none of |y|^2 is negative.
 
-        first: what |y| is at the first of them, or less.
+        first: what |y| is at the first of them, or less; where even as much at a few would not tell, all are looked at.
         """
         least = SAMPLES * limit**2
         if first > 0 and first**2 > least:
             return True
-        if "_all" not in vars(self) and self._sum(self._states(self._times[::FEWER])) > least:
+        few = self._times[::FEWER]
+        likely = "_all" not in vars(self) and not 0 < len(few) * first**2 <= least
+        if likely and self._sum(self._states(few)) > least:
             return True
         return self.amplitude > limit
 

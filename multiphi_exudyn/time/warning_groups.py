@@ -36,12 +36,11 @@ class WarningGroup:
 
 def grouped(runs: Iterable[tuple[str, Sequence[str]]]) -> tuple[WarningGroup, ...]:
     """(name of a run, its warnings) of many runs, by kind in the order of their first appearance."""
-    groups = dict[str, WarningGroup]()
+    found = dict[str, tuple[str, dict[str, None]]]()  # the first sentence of a kind, and the runs in order
     for run, sentences in runs:
         for kind, _, rest in (sentence.partition(": ") for sentence in sentences):
-            group = groups.setdefault(kind, WarningGroup(kind, (), rest))
-            groups[kind] = WarningGroup(kind, tuple(dict.fromkeys((*group.runs, run))), group.example)
-    return tuple(groups.values())
+            found.setdefault(kind, (rest, {}))[1][run] = None
+    return tuple(WarningGroup(kind, tuple(names), example) for kind, (example, names) in found.items())
 
 
 def issue(sentences: Iterable[str]) -> None:

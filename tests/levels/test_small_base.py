@@ -86,6 +86,18 @@ def test_its_error_is_that_of_its_levels(monkeypatch, k):
         mp.simulate(model, 0.01, displacement=model.level(()).shapes[:, 0])
 
 
+def test_a_cluster_larger_than_what_is_computed_beyond_the_modes_is_kept_whole():
+    """Twelve equal chains side by side: every frequency twelve times."""
+    one = scipy.sparse.diags_array([2 * np.ones(60), -np.ones(59), -np.ones(59)], offsets=[0, 1, -1])
+    stiffness = scipy.sparse.kron(scipy.sparse.eye_array(12), one).tocsr()
+    structure = mp.LinearStructure(scipy.sparse.eye_array(720).tocsr(), stiffness, points={"m": 30})
+    model = mp.MultiPhiModel(structure, [stop("m", stiffness=10.0)], modes=2)
+    expected = 2 * np.sin(np.pi / 122)
+    assert model.base.exact % 12 == 0
+    assert_allclose(model.level(()).omega, 12 * [expected], rtol=1e-9)
+    assert_allclose(model.level(("stop",)).omega[:11], expected, rtol=1e-9)
+
+
 def counted(monkeypatch):
     """How many modes Lanczos iterations have been asked for, call by call."""
     asked, lanczos = [], lowest_modes._lanczos
