@@ -19,8 +19,9 @@ MEMORY = {
     "bed-of-stops": 70e6,
     "rubbing-stop": 12e6,
 }  # bytes at most; 8 MB for all others, of the loop's code and record
-PACKAGES = ("llvmlite", "numpy", "scipy", "threadpoolctl")  # llvmlite loads the loop; no exudyn, no matplotlib
-MOST_MODULES = 126  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
+PACKAGES = {"llvmlite", "numpy", "scipy", "threadpoolctl"}  # llvmlite loads the loop; numpy may bring others
+HEAVY = {"exudyn", "jinja2", "matplotlib", "numba", "pandas", "pydantic"}
+MOST_MODULES = 140  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
 
 
 @pytest.mark.parametrize("name", [name for name in shipped_scenes() if "hole" not in name])
@@ -30,7 +31,8 @@ def test_a_shipped_scene_takes_what_it_visits(name):
     assert needs.levels_built == LEVELS.get(name, 2)
     assert needs.levels_possible == POSSIBLE.get(name, 2)
     assert needs.dofs_carried <= 0.2 * needs.dofs_given
-    assert needs.packages == PACKAGES
+    assert PACKAGES <= set(needs.packages)
+    assert not HEAVY & set(needs.packages)
     assert 10 < needs.modules <= MOST_MODULES
     assert 0 < needs.memory <= MEMORY.get(name, 8e6)
 
