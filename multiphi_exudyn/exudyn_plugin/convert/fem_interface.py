@@ -24,6 +24,7 @@ __all__ = ["linear_structure_from_fem"]
 Nodes: TypeAlias = "int | str"  # a node, or the name of a node set
 
 COMPONENTS = 3  # of the displacement of a node
+IN_LINE = 1e-9  # of the largest moment of inertia: nodes with less about an axis lie on it
 
 
 def linear_structure_from_fem(
@@ -35,8 +36,12 @@ def linear_structure_from_fem(
     """The structure of an ``exudyn.FEM.FEMinterface``, which is left as it was.
 
     fixed: node numbers, or the name of a node set. points: name -> (node number, component); with the name of a node
-    set the mean of its nodes by their weights, as a contact or load over a face needs it. damping: as
-    ``LinearStructure`` takes it, in the free degrees of freedom.
+    set the mean of its nodes by their weights, as a contact or load over a face needs it; components 3, 4, 5 of a node
+    set are its mean rotation about x, y, z (for a RigidInterface), by least squares
+
+        theta = (sum w (r.r 1 - r r^T))^-1 sum w r x u,   r from the mean of the nodes
+
+    damping: as ``LinearStructure`` takes it, in the free degrees of freedom.
 
     Raises MultiPhiValueError or MultiPhiTypeError for matrices that are missing or do not fit the nodes, for nodes,
     sets and components that do not exist, and for a point that is fixed.
@@ -92,16 +97,31 @@ def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
     called = f"points[{name!r}]"
     if not (isinstance(given, tuple) and len(given) == 2):
         raise MultiPhiTypeError(f"{called}: got {given!r}, need (node number or node set, component)")
-    component = _number(f"{called} component", given[1], COMPONENTS)
+    component = _number(f"{called} component", given[1], (2 if isinstance(given[0], str) else 1) * COMPONENTS)
     row = np.zeros(moving.shape)
     if isinstance(given[0], str):
         nodes, weights = _node_set(fem, called, given[0])
-        np.add.at(row[:, component], nodes, weights)
+        if component < COMPONENTS:
+            np.add.at(row[:, component], nodes, weights)
+        else:
+            np.add.at(row, nodes, _rotation(called, fem.nodes["Position"][nodes], weights)[component - COMPONENTS])
     else:
         row[_number(called, given[0], len(moving)), component] = 1.0
     if not np.any(row[moving]):
         raise MultiPhiValueError(f"{called}: got {given!r}, which is fixed, need a point that can move")
     return row[moving]
+
+
+def _rotation(name: str, places: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Mean rotation (3, k, 3) of nodes at places (k, 3) with weights (k,), by the displacements of each."""
+    arms = places - weights @ places
+    inertia = np.sum(weights * np.sum(arms**2, axis=1)) * np.eye(3) - (weights * arms.T) @ arms
+    values = np.linalg.eigvalsh(inertia)
+    if not values[0] > IN_LINE * values[-1]:
+        raise MultiPhiValueError(f"{name}: got nodes on one line, which have no rotation about it, need others")
+    turned = np.cross(arms[:, None, :], np.eye(3))  # r x e_c, (k, c, 3)
+    found: np.ndarray = np.einsum("ij,k,kcj->ikc", np.linalg.inv(inertia), weights, turned)
+    return found
 
 
 def _number(name: str, given: Any, count: int) -> int:
