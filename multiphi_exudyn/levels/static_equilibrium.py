@@ -151,7 +151,9 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
         path = _path(base, standing, ends, lifts)
         if "open" in (left.name, standing.of(base, element).name):
             _check_snap(base, standing, path, s, element)
-    raise NumericalFailure("static equilibrium: contacts, friction and force laws exchange their states without end")
+    raise NumericalFailure(
+        "static equilibrium: contacts, friction and force laws keep changing states at one load; none was found"
+    )
 
 
 def floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief: bool) -> np.ndarray:

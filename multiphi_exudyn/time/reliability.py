@@ -210,7 +210,7 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
 
 
 def _per_cent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
 def _clusters(trajectory: Trajectory) -> list[str]:

@@ -50,6 +50,24 @@ def test_free_frequencies_are_those_that_exudyn_finds(fem):
     assert own[6:] == pytest.approx(fem.GetEigenFrequenciesHz()[6:12], rel=1e-7)
 
 
+def test_a_set_turns_as_a_rigid_body_does(fem, basis):
+    names = ["ux", "uy", "uz", "rx", "ry", "rz"]
+    structure = linear_structure_from_fem(fem, (), {name: ("end", c) for c, name in enumerate(names)})
+    moved, turned = np.array([1e-4, -2e-4, 3e-4]), np.array([2e-3, -1e-3, 5e-4])
+    ends = fem.nodeSets[1]
+    middle = ends["NodeWeights"] @ fem.nodes["Position"][ends["NodeNumbers"]]
+    field = moved + np.cross(turned, basis.mesh.p.T - middle)
+    found = [structure.row(name) @ field.ravel() for name in names]
+    assert found == pytest.approx([*moved, *turned], rel=1e-12)
+
+
+def test_nodes_on_a_line_have_no_rotation_about_it(fem, basis):
+    line = basis.mesh.nodes_satisfying(lambda p: np.isclose(p[0], LENGTH) & np.isclose(p[1], 0))
+    fem.nodeSets.append({"Name": "edge", "NodeNumbers": line, "NodeWeights": np.ones(len(line))})
+    with pytest.raises(MultiPhiValueError, match=r"points\['turn'\]: got nodes on one line"):
+        linear_structure_from_fem(fem, "clamp", {"turn": ("edge", 5)})
+
+
 def test_a_point_is_the_displacement_of_its_node_and_of_its_set_the_mean(fem, basis):
     corner = int(np.argmax(np.sum(basis.mesh.p, axis=0)))
     places = {"corner": (corner, 2), "end": ("end", 2), "axial": ("end", 0)}

@@ -107,6 +107,26 @@ def test_a_matrix_that_is_not_symmetric_is_refused_with_the_item(part):
         reduce(coupled(part, 0.05).mbs)
 
 
+def damped(least):
+    """Two coordinates by matrices with a damping of 0.4 N s/m and another one."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    zero = {"referenceCoordinates": [0.0, 0.0], "initialCoordinates": [1e-3, 0.0], "initialCoordinates_t": [0.0, 0.0]}
+    node = mbs.AddNode(eii.NodeGenericODE2(numberOfODE2Coordinates=2, **zero))
+    given = {"stiffnessMatrix": 100 * np.eye(2), "dampingMatrix": np.diag([0.4, least])}
+    mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.eye(2), **given))
+    mbs.Assemble()
+    return container, mbs
+
+
+def test_negative_damping_that_is_round_off_is_none_and_more_is_refused():
+    _kept, mbs = damped(-1e-9)
+    assert reduce(mbs).structure.damping == pytest.approx(np.diag([0.4, 0.0]), abs=1e-7)
+    _kept, mbs = damped(-1e-3)
+    with pytest.raises(mp.MultiPhiValueError, match="damping"):
+        reduce(mbs)
+
+
 def stepped(mbs, t, load):
     return load if t < 0.1 else -2 * load if t < 0.3 else 0.0
 

@@ -27,6 +27,7 @@ __all__ = ["linear_structure_from_fem"]
 Nodes: TypeAlias = "int | str"  # a node, or the name of a node set
 
 COMPONENTS = 3  # of the displacement of a node
+IN_LINE = 1e-9  # of the largest moment of inertia: nodes with less about an axis lie on it
 
 
 def linear_structure_from_fem(
@@ -39,6 +40,9 @@ def linear_structure_from_fem(
 
         M_free x'' + C x' + K_free x = f,   x the displacements [m] of the nodes that are not fixed
 
+    The mean rotation of a node set, for a RigidInterface, is theta = (sum w (r.r 1 - r r^T))^-1 sum w r x u by least
+    squares, r from the mean of the nodes.
+
     Degree of freedom 3 i + c is component c (0, 1, 2 for x, y, z) of node i, nodes counted from 0. The matrices stay
     sparse; the FEMinterface is left as it was.
 
@@ -50,7 +54,8 @@ def linear_structure_from_fem(
         Node numbers, or the name of a node set.
     points : mapping of str to (int or str, int or str), default None
         Name to (node number, component), 0 to 2 or "ux", "uy" and "uz"; with the name of a node set the mean of its
-        nodes by their weights, as a contact or a load over a face needs it.
+        nodes by their weights, as a contact or a load over a face needs it; 3 to 5, or "rx", "ry" and "rz", of a
+        node set its mean rotation.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         In the free degrees of freedom.
 
@@ -136,16 +141,32 @@ def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
     if not (isinstance(given, tuple) and len(given) == 2):
         raise MultiPhiTypeError(f"{called}: got {given!r}, need (node number or node set, component)")
     named = isinstance(given[1], str) and given[1] in NAMES
-    component = _number(f"{called} component", NAMES.index(given[1]) if named else given[1], COMPONENTS)
+    most = (2 if isinstance(given[0], str) else 1) * COMPONENTS
+    component = _number(f"{called} component", NAMES.index(given[1]) if named else given[1], most)
     row = np.zeros(moving.shape)
     if isinstance(given[0], str):
         nodes, weights = _node_set(fem, called, given[0])
-        np.add.at(row[:, component], nodes, weights)
+        if component < COMPONENTS:
+            np.add.at(row[:, component], nodes, weights)
+        else:
+            np.add.at(row, nodes, _rotation(called, fem.nodes["Position"][nodes], weights)[component - COMPONENTS])
     else:
         row[_number(called, given[0], len(moving)), component] = 1.0
     if not np.any(row[moving]):
         raise MultiPhiValueError(f"{called}: got {given!r}, which is fixed, need a point that can move")
     return row[moving]
+
+
+def _rotation(name: str, places: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Mean rotation (3, k, 3) of nodes at places (k, 3) with weights (k,), by the displacements of each."""
+    arms = places - weights @ places
+    inertia = np.sum(weights * np.sum(arms**2, axis=1)) * np.eye(3) - (weights * arms.T) @ arms
+    values = np.linalg.eigvalsh(inertia)
+    if not values[0] > IN_LINE * values[-1]:
+        raise MultiPhiValueError(f"{name}: got nodes on one line, which have no rotation about it, need others")
+    turned = np.cross(arms[:, None, :], np.eye(3))  # r x e_c, (k, c, 3)
+    found: np.ndarray = np.einsum("ij,k,kcj->ikc", np.linalg.inv(inertia), weights, turned)
+    return found
 
 
 def _number(name: str, given: Any, count: int) -> int:

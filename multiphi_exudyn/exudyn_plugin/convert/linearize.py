@@ -250,16 +250,15 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
 def projected_matrices(mbs: Any, allowed: float = ASYMMETRY) -> tuple[Checked, np.ndarray]:
     """M, K, C in z, (n, n), and the basis S, (n_full, n); allowed: see ``checked_matrices``.
 
-    What is round-off of the stiffness before constraints take directions out, or of a force over the system's size, is
-    none: it would be a frequency, or an instability.
+    What is round-off of the stiffness that forces give, or of a force over the system's size, is none: it would be a
+    frequency, or an instability.
     """
     geared, geometric = _geared_springs(mbs), geometric_stiffness(mbs)
     with _slack(mbs, geared):
         result = mbs.ComputeLinearizedSystem(
             projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
         )
-        sizes = np.abs(np.array(mbs.ComputeLinearizedSystem()[1])) + np.abs(geometric)
-        sizes += np.max(np.abs(forces(mbs))) / (_largest_coordinate(mbs) or math.inf)
+        sizes = np.abs(geometric) + np.max(np.abs(forces(mbs))) / (_largest_coordinate(mbs) or math.inf)
     mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
     basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
     if basis.shape[1] == 0:

@@ -20,6 +20,7 @@ from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 __all__ = ["ASYMMETRY", "Checked", "checked_matrices", "coordinate_name"]
 
 ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
+DIFFERENTIATED = 1e-9  # of the largest damping or the fastest mode's critical one: what differentiating forces leaves
 MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
 
 
@@ -59,7 +60,7 @@ def checked_matrices(
             f"{_of_largest(mbs, basis @ vectors[:, 0])}, need a state that is stable"
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))
-    return Checked(mass, stiffness, damping, tuple(told))
+    return Checked(mass, stiffness, _not_driving(damping, mass, modes), tuple(told))
 
 
 def _kind(lowest: float, largest: float) -> str:
@@ -72,6 +73,18 @@ def _critical(damping: np.ndarray, modes: Modes) -> float:
     faster = 2 * np.maximum.outer(modes.omega, modes.omega)
     ratios = np.divide(forces, faster, out=np.where(forces > 0, math.inf, 0.0), where=faster > 0)
     return float(np.max(ratios, initial=0.0))
+
+
+def _not_driving(damping: np.ndarray, mass: np.ndarray, modes: Modes) -> np.ndarray:
+    """A symmetric damping matrix (n, n) without the negative damping that is round-off of differentiation."""
+    own = modes.shapes.T @ damping @ modes.shapes
+    values, vectors = np.linalg.eigh(own)
+    largest = max(np.max(np.abs(values)), 2 * np.max(modes.omega))
+    if not -DIFFERENTIATED * largest <= values[0] < 0:
+        return damping
+    momenta = mass @ modes.shapes @ vectors
+    found: np.ndarray = (momenta * np.maximum(values, 0.0)) @ momenta.T
+    return (found + found.T) / 2
 
 
 def _symmetric(

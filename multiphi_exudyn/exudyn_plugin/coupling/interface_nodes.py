@@ -8,8 +8,8 @@ is a NodeRigidBody2D or a NodeRigidBodyRxyz; markers of rigid bodies, and with t
 no mass, and their coordinates are linear in q; what is large in the system around them is not.
 
 The angles of a NodeRigidBodyRxyz are turned by one after the other, about the node's x, y and z axis. As long as they
-are small they are the components of one rotation, which is what a linear structure knows; of 5 degrees that differs by
-0.4 %. The power of what acts on the node is that on the modes at any angle, for p = R^T f.
+are small they are the components of one rotation, which is what a linear structure knows; at 5 degrees about two axes
+the two differ by 0.004 rad. The power of what acts on the node is that on the modes at any angle, for p = R^T f.
 """
 
 from __future__ import annotations
