@@ -240,3 +240,13 @@ def free_mass(system):
     node = system.mbs.AddNode(eii.Node1D(referenceCoordinates=[0.0]))
     system.mbs.AddObject(eii.ObjectMass1D(mass=1.0, nodeNumber=node))
     return system.mbs.AddMarker(eii.MarkerNodeCoordinate(name="other", nodeNumber=node, coordinate=0))
+
+
+def test_an_object_of_first_order_is_refused_by_name():
+    system = spring_mass()
+    start = {"referenceCoordinates": [0.0], "initialCoordinates": [0.0]}
+    node = system.mbs.AddNode(eii.NodeGenericODE1(numberOfODE1Coordinates=1, **start))
+    system.mbs.AddObject(eii.ObjectGenericODE1(name="tank", nodeNumbers=[node], systemMatrix=[[-1.0]]))
+    system.mbs.Assemble()
+    with pytest.raises(mp.MultiPhiValueError, match=r"got ODE1 coordinates \(ObjectGenericODE1 'tank'\)"):
+        reduce(system.mbs)

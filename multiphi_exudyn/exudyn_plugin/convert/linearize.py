@@ -204,9 +204,19 @@ def check_system(mbs: Any) -> None:
     if len(mbs.systemData.GetODE2Coordinates()) == 0:
         raise MultiPhiValueError("mbs: got no ODE2 coordinates, need at least one")
     if len(mbs.systemData.GetODE1Coordinates()) > 0:
-        raise MultiPhiValueError("mbs: got ODE1 coordinates, need a system of second order only")
+        items = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects()))
+        first = ", ".join(
+            f"Object{item['objectType']} {item['name']!r}" for item in items if _has_first_order(mbs, item)
+        )
+        raise MultiPhiValueError(f"mbs: got ODE1 coordinates ({first}), need a system of second order only")
     if mbs.NumberOfGeneralContacts() > 0:
         raise MultiPhiValueError("mbs: got a GeneralContact, need ObjectContactCoordinate items only")
+
+
+def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:
+    """Whether a node of an object has coordinates of first order."""
+    nodes = [int(n) for n in (*item.get("nodeNumbers", ()), item.get("nodeNumber", -1))]
+    return any("ODE1" in mbs.GetNode(exu.NodeIndex(n))["nodeType"] for n in nodes if n >= 0)
 
 
 def _contact_objects(mbs: Any) -> list[Any]:
