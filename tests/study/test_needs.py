@@ -48,7 +48,7 @@ def test_the_command_prints_a_line_for_every_scene(tmp_path, capsys):
     heads, line = capsys.readouterr().out.splitlines()
     assert heads.split()[:3] == ["scene", "model", "levels"]
     assert "2 of 2" in line
-    assert line.endswith(", ".join(PACKAGES))
+    assert set(line.rpartition("   ")[2].strip().split(", ")) >= PACKAGES
 
 
 def test_a_scene_without_a_reduced_model_is_refused(tmp_path, capsys):
