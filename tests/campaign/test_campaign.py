@@ -125,6 +125,11 @@ def test_blocks_are_decided_together(kind, number):
     assert [verdict for verdict, _ in judged(kind, number)[0]] == ["ok"]
 
 
+def test_a_speed_is_no_round_off_of_a_place():
+    """In units of 2^40 s a block that slid was at rest: its speed was measured by the size of a place."""
+    assert judged("friction units", 20014)[0] == [("ok", "")]
+
+
 def test_a_scene_comes_from_its_kind_and_number_alone():
     first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
     assert np.array_equal(first.velocity, again.velocity)

@@ -138,12 +138,13 @@ class Sliding:
         Those at rest bear up to these limits, complementary to their accelerations and to the contacts that touch. Of
         those that do not hold, the ones that had slipped fall first to their limits, and all is looked at once more.
         """
-        level, falls = self.levels.level(before), {}
-        known = level.matrix @ y + level.inputs @ w
-        free, held = known[self.levels.n : 2 * self.levels.n].copy(), set(touching)
+        level, falls, held = self.levels.level(before), {}, set(touching)
         rests = [e for e, own in enumerate(options) if len(own) == 3]
-        if len(rests) + len(held) < 2:
+        pressed = any(self.all[e].contact in self.levels.rigid for e in rests)  # its limit is no number yet
+        if not rests or pressed or len(rests) + len(held) < 2:
             return None
+        known = level.matrix @ y + level.inputs @ w
+        free = known[self.levels.n : 2 * self.levels.n].copy()
         for i in self.levels.rigid:
             if before[i] == "closed":
                 free -= self.levels.inverse @ self.levels.rows[i] * known[2 * self.levels.n + i]
