@@ -9,7 +9,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     1       armed, and asking             phases.phase_of, waiting.watch, waiting.who_asks, decision.decide_jump
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
     2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, independence.join
-    3       a rigid contact opens         switching.is_firm, switching.open_and_enter
+    3       a rigid contact opens         switching.is_firm, switching.open_and_enter, sticking.let_go
     4       a compliant contact changes   switching.try_wishes, switching.switch, phases.is_denied
     5       recovering                    phases.phase_of, waiting.watch
     6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again
@@ -20,7 +20,8 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     10      a rigid one that strikes      impact.rub, resting.sliding_level, rebounds.hear_touching
     11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
-    12      friction at rest              sticking.stick_together, sticking.choose
+    12      friction at rest              sticking.stick_together, sticking.decide_at_rest, sticking.choose
+    12      beside rigid contacts         sticking.let_go, independence.follows
     12      redundant friction            sticking.thin_out_idle, independence.thin_out
     12      its impacts                   changes.bears_nothing, striking.slide_on
 

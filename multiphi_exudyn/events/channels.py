@@ -126,6 +126,9 @@ class Channels:
         moved, slack = np.abs(stops), FOLLOWING / ZERO
         gap_columns = np.where(held, drop_round_off(gap_columns, slack * (sizes @ self.terms + moved)), gap_columns)
         speeds = np.where(held, drop_round_off(speeds, slack * (sizes @ np.abs(self.carried) + moved)), speeds)
+        closed = [i for i in level.indices if np.isinf(level.base.stiffnesses[i])]
+        fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops such a channel does not move
+        gap_columns, speeds = np.where(fixed, -stops, gap_columns), np.where(fixed, -stops, speeds)
         q = self.force.shape[1]
         return ExtendedLevel(
             closed=level.closed,

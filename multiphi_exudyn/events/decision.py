@@ -21,7 +21,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
    striking.close_without_impact
 3. A rigid contact that asks to open always opens: it never pulls. Friction that asks changes always, but stays in slip
    where it has come from stick at the same instant and truncation has left it a speed against its slip.
-   -> switching.is_firm, switching.open_and_enter
+   -> switching.is_firm, switching.open_and_enter, sticking.let_go
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
    -> switching.try_wishes, switching.switch, phases.is_denied
@@ -59,10 +59,11 @@ bases of two levels need not agree, so the law says what happens then; each sent
    their limits, static ones until they slip, are complementary to their accelerations. Of those that then fall from
    their static limits the ones that turn fall first: others may bear less after it, and stick on. What that leaves to
    the next derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others
-   push with their limit, as if they slipped, and take over when they are needed: the motion is the same. None bears an
-   impulse, nor does the friction of a contact that gives way.
-   -> sticking.stick_together, sticking.choose, sticking.thin_out_idle, independence.thin_out, striking.slide_on,
-   changes.bears_nothing
+   push with their limit, as if they slipped, and take over when they are needed: the motion is the same. So do those
+   along a closed rigid contact. One that would be pulled beside what sticks opens, and all is decided once more without
+   it. None bears an impulse, nor does the friction of a contact that gives way.
+   -> sticking.stick_together, sticking.decide_at_rest, sticking.choose, sticking.thin_out_idle, sticking.let_go,
+   independence.thin_out, independence.follows, striking.slide_on, changes.bears_nothing
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
@@ -316,7 +317,8 @@ def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
         sticks = ints[ints[STICKS] + i]
         if bears_nothing(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:  # slips, either way
-            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)
+            begins = ints[states + i] == sticks and asked > sticks
+            ints[ints[COMPLIANT_KEY] + i] = asked if begins else max(ints[states + i], sticks + 1)
     if strikes == 0:
         status = stick_together(ints, numbers, waves, asking)
         left = 0

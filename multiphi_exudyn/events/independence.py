@@ -28,7 +28,7 @@ from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.free_rows import norm
 
-__all__ = ["held_links", "independent", "join", "thin_out"]
+__all__ = ["follows", "held_links", "independent", "join", "thin_out"]
 
 
 @compiled
@@ -69,6 +69,16 @@ def held_links(ints: Ints, numbers: Numbers, element: int, state: int) -> int:
     first = 1 if ints[ints[KINDS] + element] == RIGID and state != OPEN else 0
     rubs = numbers[ints[SPRINGS] + element] == 0.0 and ints[ints[STICKS] + element] >= 0
     return first + 2 if rubs and state == ints[ints[STICKS] + element] else first
+
+
+@compiled
+def follows(ints: Ints, numbers: Numbers, key: int, element: int) -> int:
+    """12. 1 where friction sticks in the level with a key, and cannot move for what else is held there."""
+    if held_links(ints, numbers, element, ints[key + element]) < 2:
+        return 0
+    for i in range(ints[ELEMENTS]):
+        ints[ints[UNION] + i] = held_links(ints, numbers, i, ints[key + i])
+    return 1 - independent(ints, numbers, ints[UNION])
 
 
 @compiled

@@ -112,7 +112,7 @@ def move_part(
         size, terms = abs(total), row
         if ints[way + MAP_TERMS] >= 0:
             terms = ints[way + MAP_TERMS] + i * (n + 1)
-            size = numbers[terms + n]
+            size = size if rates == 1 else numbers[terms + n]  # that one is of places
         for j in range(n):
             total += numbers[row + j] * numbers[given + j]
             size += abs(numbers[terms + j] * numbers[given + j])

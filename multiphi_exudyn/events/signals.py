@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
     ACCELERATION,
+    ACCELERATION_TERMS,
     CHANNELS,
     FIRMNESS,
     GAPS,
@@ -22,7 +23,7 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SWING,
 )
-from multiphi_exudyn.events.state_arrays import accelerate
+from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
@@ -74,19 +75,28 @@ def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
 def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
     """9. Sign of a signal's time derivative, zero where it is round-off of its terms.
 
-    At a turning point all velocities may be round-off of what they were before: omega |eta| counts too.
+    At a turning point all velocities may be round-off of what they were before: omega |eta| counts too. Of a signal
+    with a speed it is a sum of what the accelerations are sums of, which may cancel.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
-    v, swing, accelerations = ints[state + SPEED], ints[state + SWING], ints[ACCELERATION]
-    if ints[signal + RATED] == 1:
+    v, swing, accelerations, terms = (
+        ints[state + SPEED],
+        ints[state + SWING],
+        ints[ACCELERATION],
+        ints[ACCELERATION_TERMS],
+    )
+    rated = ints[signal + RATED] == 1
+    if rated:
         accelerate(ints, numbers, state, accelerations)
+        acceleration_sizes(ints, numbers, state, terms)
     value, size = 0.0, 0.0
     for i in range(n):
         term = numbers[row + i] * numbers[v + i]
-        if ints[signal + RATED] == 1:
-            term += numbers[row + n + i] * numbers[accelerations + i]
-        value += term
         size += abs(term) + abs(numbers[row + i]) * numbers[swing + i]
+        if rated:
+            term += numbers[row + n + i] * numbers[accelerations + i]
+            size += abs(numbers[row + n + i]) * numbers[terms + i]
+        value += term
     return sign_of(value, size)
 
 

@@ -23,14 +23,17 @@ from multiphi_exudyn.events.arrays import (
     FURTHER,
     HIGHEST,
     KEY,
+    KINDS,
     LEADERS,
     LEVEL,
     LIMITS,
     LOWEST,
     MODES,
     OK,
+    OPEN,
     RATIOS,
     RESTING_LIST,
+    RIGID,
     ROWS,
     SIGNAL,
     SLIP_BACKWARD,
@@ -48,12 +51,13 @@ from multiphi_exudyn.events.arrays import (
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, enter, note, transfer
+from multiphi_exudyn.events.changes import NOBODY, is_held, transfer
 from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
 from multiphi_exudyn.events.independence import held_links, independent
-from multiphi_exudyn.events.phases import first_exit
+from multiphi_exudyn.events.phases import first_exit, opening
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, measure
+from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
 from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, product
@@ -65,16 +69,46 @@ __all__ = ["stick_together"]
 def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
     """12. Which rigid friction elements stick, and where the others slip; OK, NEED or FAILED.
 
-    Where any changes they ask no more. Once at an instant, where there are several.
+    Where any changes they ask no more. Once at an instant, where there are several. A closed rigid contact that would
+    pull beside them opens, and they are decided once more without it.
     """
-    count, wishes, key = list_at_rest(ints, numbers, asking), ints[WISHES], ints[KEY]
+    count, wishes = list_at_rest(ints, numbers, asking), ints[WISHES]
     if count < 2 or ints[TOGETHER] == 1:
         return OK
     ints[TOGETHER] = 1
     states = ints[ints[WORKED + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
-        ints[key + i] = ints[states + i]
         ints[wishes + i] = ints[states + i]
+    pulling = 1
+    while pulling > 0:
+        status = decide_at_rest(ints, numbers, count, asking)
+        if status < 0:
+            return status
+        pulling = let_go(ints, numbers)
+    changed = 0
+    for i in range(ints[ELEMENTS]):
+        if ints[wishes + i] == ints[states + i]:
+            ints[wishes + i] = NOBODY
+        else:
+            changed += 1
+    if changed == 0:
+        return OK
+    for i in range(ints[ELEMENTS]):
+        opens = ints[wishes + i] == OPEN and ints[ints[KINDS] + i] == RIGID
+        ints[asking + i] = NOBODY if opens else ints[asking + i]
+    for k in range(count):
+        ints[asking + ints[ints[RESTING_LIST] + k]] = NOBODY
+    if stand_still(ints, numbers, count) < 0:
+        return FAILED
+    return open_and_enter(ints, numbers, waves)
+
+
+@compiled
+def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
+    """12. WISHES and ENTERED_STATE: what those at rest do beside all that WISHES holds; OK, NEED or FAILED."""
+    states, wishes, key = ints[ints[WORKED + LEVEL] + STATES], ints[WISHES], ints[KEY]
+    for i in range(ints[ELEMENTS]):
+        ints[key + i] = ints[wishes + i]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
         ints[key + i] = SLIP_FORWARD if ints[states + i] == STICK else ints[states + i]
@@ -89,25 +123,22 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
             return FAILED
         falling = choose(ints, numbers, count)
     thin_out_idle(ints, numbers, count)
-    changed = 0
-    for i in range(ints[ELEMENTS]):
-        changed += 1 if ints[wishes + i] != ints[states + i] else 0
-    if changed == 0:
-        return OK
     for i in range(ints[ELEMENTS]):
         ints[key + i] = ints[wishes + i]
-    status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
-    if status < 0:
-        return status
+    return transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+
+
+@compiled
+def let_go(ints: Ints, numbers: Numbers) -> int:
+    """3, 12. How many rigid contacts ENTERED_STATE pulls, which are then to open by WISHES."""
+    level, pulled = ints[ENTERED_STATE + LEVEL], 0
     for i in range(ints[ELEMENTS]):
-        if ints[wishes + i] != ints[states + i]:
-            note(ints, numbers, i, ints[wishes + i], 0.0)
-    for k in range(count):
-        ints[asking + ints[ints[RESTING_LIST] + k]] = NOBODY
-    if stand_still(ints, numbers, count) < 0:
-        return FAILED
-    enter(ints, numbers, waves, ENTERED_STATE)
-    return OK
+        if is_held(ints, ENTERED_STATE, i) == 0:
+            continue
+        if row_sign(ints, numbers, ENTERED_STATE, opening(ints, level, i) + SIGNAL, 0.0) < 0:
+            ints[ints[WISHES] + i] = OPEN
+            pulled += 1
+    return pulled
 
 
 @compiled

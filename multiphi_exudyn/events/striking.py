@@ -46,7 +46,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, is_held, note, transfer
 from multiphi_exudyn.events.energies import kinetic, lose
 from multiphi_exudyn.events.impact import RESTING, collide, speed_size
-from multiphi_exudyn.events.independence import join
+from multiphi_exudyn.events.independence import follows, held_links, join
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
 from multiphi_exudyn.events.rebounds import bounce, last_bounce, rebound
@@ -121,7 +121,10 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def slide_on(ints: Ints, numbers: Numbers) -> int:
-    """12. AFTER: rigid friction bears no impulse; who has a speed then slips that way, others stay. OK or NEED."""
+    """12. AFTER: rigid friction bears no impulse; who has a speed then slips that way, others stay. OK or NEED.
+
+    Who would stick and follows from what is held slips on: the closed contact bears what it does not.
+    """
     level, key, turned = ints[AFTER + LEVEL], ints[KEY], 0
     n, before = ints[level + MODES] + ints[CHANNELS], ints[ints[WORKED + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
@@ -133,6 +136,8 @@ def slide_on(ints: Ints, numbers: Numbers) -> int:
             rests = abs(speed) <= RESTING * speed_size(ints, numbers, AFTER, row)
             slips = sticks + (SLIP_FORWARD if speed > 0.0 else SLIP_BACKWARD)
             ints[key + i] = max(ints[before + i], sticks) if rests else slips
+            if rests and follows(ints, numbers, key, i) == 1:
+                ints[key + i] = ints[ints[level + STATES] + i]
             turned += 1 if ints[key + i] != ints[ints[level + STATES] + i] else 0
     if turned == 0:
         return OK
@@ -150,7 +155,7 @@ def close_without_impact(ints: Ints, numbers: Numbers, waves: Waves, asking: int
     """2. Rigid contacts that no impact closes: into the level that gives them a reaction, or they are refused."""
     c, states, closing, key = ints[ELEMENTS], ints[ints[WORKED + LEVEL] + STATES], ints[CLOSED], ints[KEY]
     for i in range(c):
-        ints[ints[HELD] + i] = is_held(ints, WORKED, i)
+        ints[ints[HELD] + i] = held_links(ints, numbers, i, ints[states + i])
         ints[closing + i] = 1 if ints[ints[STRIKING] + i] == 1 and ints[asking + i] != NOBODY else 0
         ints[ints[DENIED] + i] = ints[closing + i]
     join(ints, numbers, closing)

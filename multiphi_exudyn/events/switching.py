@@ -37,7 +37,7 @@ from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
 
-__all__ = ["switch"]
+__all__ = ["open_and_enter", "switch"]
 
 
 @compiled

@@ -110,6 +110,26 @@ def test_rigid_contacts_that_rub_are_struck_together(number):
     assert judged("rigid friction", number)[0] == [("ok", "")]
 
 
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [
+        ("friction impacts", 12108),  # a rigid contact lets go of a block that turns, and which then sticks
+        ("friction impacts", 12038),  # two blocks could fall from their static limits: the one that turns falls first
+        ("friction loads", 12146),  # one block falls, which leaves the other within its static limit
+        ("friction units", 12123),  # a block sticks along a stop: only the sum of their impulses is known
+        ("friction redundant", 3020),  # where all slip accelerations cancel: round-off of them decided who sticks
+        ("friction redundant", 20003),  # the same, without a spring
+    ],
+)
+def test_blocks_are_decided_together(kind, number):
+    assert [verdict for verdict, _ in judged(kind, number)[0]] == ["ok"]
+
+
+def test_a_speed_is_no_round_off_of_a_place():
+    """In units of 2^40 s a block that slid was at rest: its speed was measured by the size of a place."""
+    assert judged("friction units", 20014)[0] == [("ok", "")]
+
+
 def test_a_scene_comes_from_its_kind_and_number_alone():
     first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
     assert np.array_equal(first.velocity, again.velocity)

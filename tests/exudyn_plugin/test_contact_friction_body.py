@@ -73,6 +73,15 @@ class TestAlone:
         found, _ = run(belt, 0.02, END, **given)
         assert_is(found, mp.simulate(belt, END, **given))
 
+    @pytest.mark.parametrize("static", [None, 0.5])
+    def test_with_a_rigid_contact_is_exact_at_matched_steps(self, static):
+        stop = mp.UnilateralContact("floor", "y", 0.0, friction=0.3, static_friction=static, tangential="x")
+        given = {"displacement": [0.4, 0.6, 0.1], "velocity": SPEED, "loads": [WEIGHT, mp.HarmonicLoad("x", 4.0, 0.9)]}
+        found, _ = run(model(stop), 0.02, END, matchedStepSize=0.02, **given)
+        native = mp.simulate(model(stop), END, **given)
+        assert {event.kind for event in native.events} >= {"close", "slip", "stick"}
+        assert_is(found, native)
+
     def test_unmatched_steps_are_exact_where_something_happens(self):
         """Between events Exudyn's own steps are of second order, in levels without a symmetric matrix too."""
         native = mp.simulate(model(floor("rigid")), END, displacement=START, velocity=SPEED, loads=[WEIGHT])

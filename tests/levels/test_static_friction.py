@@ -173,6 +173,29 @@ class TestContacts:
             expected = np.linalg.solve(stuck, [1.0 + spring * place, -6.0 - 80 * 0.05])
         assert_allclose(found.displacement, expected, rtol=1e-13)
 
+    @pytest.mark.parametrize("force", [(3.0, -6.0), (0.5, -1.0), (-8.0, -6.0)])
+    def test_that_are_rigid_slide_along_their_stop(self, force):
+        """10 x - 2 gap = f_x - s mu N,   N = 2 x - 20 gap - f_y."""
+        found = self.rigid(0.4).equilibrium({"x": force[0], "y": force[1]})
+        s, gap = math.copysign(1.0, force[0]), 0.05
+        x = (force[0] + 2 * gap + s * 0.4 * (20 * gap + force[1])) / (10 + 2 * s * 0.4)
+        assert_allclose(found.displacement, [x, -gap], rtol=1e-13)
+
+    def test_that_are_rigid_stick_where_they_have_touched(self):
+        free = np.linalg.solve(self.STIFFNESS, [1.0, -6.0])
+        found = self.rigid(0.4).equilibrium({"x": 1.0, "y": -6.0})
+        assert_allclose(found.displacement, [free[0] * 0.05 / -free[1], -0.05], rtol=1e-13)
+
+    def test_that_are_rigid_and_wedge_are_refused_with_their_number(self):
+        """A force of 1 N along the stop changes the reaction by 2 / 10 N."""
+        with pytest.raises(mp.NumericalFailure, match=r"'floor' wedges: it leaves -0\.4 of the pressure"):
+            self.rigid(7.0).equilibrium({"x": 4.64, "y": -0.56})
+
+    def rigid(self, friction):
+        structure = mp.LinearStructure(np.eye(2), self.STIFFNESS, points={"x": 0, "y": 1})
+        floor = mp.UnilateralContact("floor", "y", 0.05, friction=friction, tangential="x")
+        return mp.MultiPhiModel(structure, [floor], modes="all")
+
     @pytest.mark.parametrize("spring", [math.inf, 40.0])
     @pytest.mark.parametrize("force", [{"x": 1.0, "y": -6.0}, {"x": 3.0, "y": -6.0}])
     def test_stay_there(self, spring, force):
@@ -216,9 +239,8 @@ class TestContacts:
         model = mp.MultiPhiModel(structure, elements, modes="all")
         forces = {places[0]: 1.5, places[1]: -1.0, places[2]: -3.0}
         found = model.equilibrium(forces)
-        loads = [mp.SampledLoad(at, [0.0, 3000.0, 4000.0], [0.0, force, force]) for at, force in forces.items()]
-        run = mp.simulate(model, 3100.0, loads=loads)
+        loads = [mp.SampledLoad(at, [0.0, 12000.0, 16000.0], [0.0, force, force]) for at, force in forces.items()]
+        run = mp.simulate(model, 12100.0, loads=loads)
         assert "reached" in {event.contact for event in run.events}
         size = np.max(np.abs(found.displacement))
-        slow = 5e-4 * size  # a slower run is nearer in proportion
-        assert_allclose(found.displacement, run.displacement(3100.0), rtol=0, atol=slow)
+        assert_allclose(found.displacement, run.displacement(12100.0), rtol=0, atol=3e-4 * size)

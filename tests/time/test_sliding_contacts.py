@@ -37,3 +37,25 @@ def test_a_spring_sticks_at_once_where_an_impact_has_turned_its_slip(side):
     assert run.friction_force("ring", struck + 1e-9) == pytest.approx(side * 0.1, abs=1e-6)
     assert side * run.friction_force("ring", 0.3) < 0.1
     assert abs(run.ledger.residual) < 1e-12
+
+
+@pytest.mark.parametrize("gap", [0.07, 0.1])
+@pytest.mark.parametrize("stiffness", [0.0, 1.0, 3.7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_block_that_rests_at_a_stop_slips_into_it_and_away_from_it(side, stiffness, gap):
+    """Beside the closed stop the block cannot move, and what its friction bears is its limit; then it sticks again."""
+    structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
+    elements = [mp.UnilateralContact("stop", "m", gap), mp.Friction("block", "m", 1.0, 1.3)]
+    load = mp.HarmonicLoad("m", side * 2.0, 1 / (2 * np.pi), -np.pi / 2)  # 2 sin t
+    run = mp.simulate(mp.MultiPhiModel(structure, elements, modes="all"), 4.5, velocity=[-1.0], loads=[load])
+    assert run.status == "ok"
+    first, last = run.stick_intervals("block")[0]
+    assert first < 0.2
+    assert 2 * np.sin(last) == pytest.approx(1.3 + side * -stiffness * gap, abs=1e-9)
+    if side < 0:
+        closed = run.contact_intervals("stop")[-1]
+        assert closed == pytest.approx((last, np.pi - np.arcsin((1.0 + stiffness * gap) / 2)), abs=1e-8)
+        t = np.linspace(*closed, 7)[1:-1]
+        assert_allclose(run.contact_force("stop", t), 2 * np.sin(t) - 1.0 - stiffness * gap, rtol=0, atol=1e-9)
+        again = run.stick_intervals("block")[1]
+        assert again == pytest.approx((closed[1], np.pi + np.arcsin((1.3 - stiffness * gap) / 2)), abs=1e-7)

@@ -49,7 +49,7 @@ class Instants:
         """
         w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
         every = [held for count in range(len(resting) + 1) for held in itertools.combinations(resting, count)]
-        for slides in self.levels.sliding.choices(before, y, w, self.speed):
+        for slides in self.levels.sliding.choices(before, y, w, self.speed, resting):
             for held in sorted(every, key=lambda held: sum((before[i] == "closed") != (i in held) for i in resting)):
                 if worst <= ZERO or not self._independent(held, slides):
                     continue

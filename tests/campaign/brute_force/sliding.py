@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 
+MOST_ALIKE = 1e10  # condition of what is held together
 ZERO = 1e-11  # of the scene's speeds and of a limit: a slider is at rest, a spring is as tight as it may be
 SIGNS = {"+": 1.0, "-": -1.0}
 
@@ -107,8 +108,11 @@ class Sliding:
                     size[k] = np.abs(limit[i - self.first]) + np.abs(tension[i - self.first])
         return sizes
 
-    def choices(self, before, y, w, speed):
-        """All that the sliders may do after an instant, as tuples of their states, those that follow first."""
+    def choices(self, before, y, w, speed, touching):
+        """All that the sliders may do after an instant, as tuples of their states, those that follow first.
+
+        Several may be admissible where static limits are higher. First is what static limits leave, see ``_fallen``.
+        """
         level = self.levels.level(before)
         options, asking = [], []
         for e, slider in enumerate(self.all):
@@ -119,12 +123,78 @@ class Sliding:
             if slider.contact is not None:
                 asking[-1] = asks or before[slider.contact] != "closed"
 
+        fallen = self._fallen(before, options, y, w, touching)
+
         def order(states):
             changed = [states[e] != before[self.first + e] for e in range(len(states))]
             idle = sum(c and not a for c, a in zip(changed, asking, strict=True))
-            return idle, sum(state != "stick" for state in states), sum(changed)
+            return states != fallen, idle, sum(state != "stick" for state in states), sum(changed)
 
         return sorted(itertools.product(*options), key=order)
+
+    def _fallen(self, before, options, y, w, touching):
+        """States of the sliders after they have borne up to their static limits, and fallen from them; or None.
+
+        Those at rest bear up to these limits, complementary to their accelerations and to the contacts that touch. Of
+        those that do not hold, the ones that had slipped fall first to their limits, and all is looked at once more.
+        """
+        level, falls, held = self.levels.level(before), {}, set(touching)
+        rests = [e for e, own in enumerate(options) if len(own) == 3]
+        pressed = any(self.all[e].contact in self.levels.rigid for e in rests)  # its limit is no number yet
+        if not rests or pressed or len(rests) + len(held) < 2:
+            return None
+        known = level.matrix @ y + level.inputs @ w
+        free = known[self.levels.n : 2 * self.levels.n].copy()
+        for i in self.levels.rigid:
+            if before[i] == "closed":
+                free -= self.levels.inverse @ self.levels.rows[i] * known[2 * self.levels.n + i]
+        most = level.limits[0] @ y + level.limits[1] @ w
+        for e in rests:
+            free += self.levels.inverse @ self.all[e].row * (level.tensions[0][e] @ y + level.tensions[1][e] @ w)
+        while True:
+            found = self._complementary(free, rests, sorted(held), most, falls)
+            if found is None:
+                return None
+            slips = {e: s for e, s in found.items() if s != "stick" and e not in falls}
+            slips = {e: s for e, s in slips.items() if self.all[e].static_limit > self.all[e].limit}
+            first = {e: s for e, s in slips.items() if before[self.first + e] in SIGNS} or slips
+            if not first:
+                return tuple(found.get(e, own[0]) for e, own in enumerate(options))
+            falls |= first
+
+    def _complementary(self, free, rests, touching, most, falls):
+        """States of sliders at rest whose accelerations and forces, within ``most``, agree; None where none do.
+
+        falls: states of those that slip with their limits. free: x'' (n,) without these sliders and these contacts.
+        """
+        inverse, size = self.levels.inverse, np.max(np.abs(free), initial=0.0)
+        for states in itertools.product(*([falls[e]] if e in falls else ["stick", *SIGNS] for e in rests)):
+            slides = dict(zip(rests, states, strict=True))
+            moved = free.copy()
+            for e, state in slides.items():
+                share = self.all[e].limit / self.all[e].static_limit if e in falls else 1.0
+                moved -= SIGNS.get(state, 0.0) * share * most[e] * inverse @ self.all[e].row
+            stuck = [e for e in rests if slides[e] == "stick"]
+            for count in range(len(touching) + 1):
+                for closed in itertools.combinations(touching, count):
+                    rows = np.array([self.all[e].row for e in stuck] + [self.levels.rows[i] for i in closed])
+                    rows = rows.reshape(-1, self.levels.n)
+                    if len(rows) and np.linalg.cond(rows @ inverse @ rows.T) > MOST_ALIKE:
+                        continue
+                    forces = -np.linalg.solve(rows @ inverse @ rows.T, rows @ moved)
+                    after = moved + inverse @ rows.T @ forces
+                    bears = [most[e] - abs(f) for e, f in zip(stuck, forces[: len(stuck)], strict=True)]
+                    bears += list(forces[len(stuck) :])
+                    rises = [
+                        SIGNS[s] * (self.all[e].row @ after) for e, s in slides.items() if s in SIGNS and e not in falls
+                    ]
+                    rises += [self.levels.rows[i] @ after for i in touching if i not in closed]
+                    if (
+                        min(bears, default=0.0) >= -ZERO * max([1e-300, *most])
+                        and min(rises, default=0.0) >= -ZERO * size
+                    ):
+                        return slides
+        return None
 
     def _options(self, e, state, level, y, w, speed):
         """States that a slider may enter, and whether it asks for one itself."""
