@@ -146,11 +146,20 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
         if change is None:
             return path.configuration[1], _stretches(base, standing, path)
         s, element, asked = change
-        left = standing.of(base, element)
-        _enter(base, standing, path, s, element, asked)
-        path = _path(base, standing, ends, lifts)
-        if "open" in (left.name, standing.of(base, element).name):
-            _check_snap(base, standing, path, s, element)
+        left, before = standing.of(base, element), standing
+        for state in _alternatives(base, standing, element, asked):
+            standing = _Standing(before.states.copy(), before.held.copy())
+            _enter(base, standing, path, s, element, state)
+            entered = _path(base, standing, ends, lifts)
+            touches = "open" in (left.name, standing.of(base, element).name)
+            if not touches or _lasts(base, standing, entered, s, element, state == asked):
+                break
+        else:
+            raise NumericalFailure(
+                f"static equilibrium: at {s:.3g} of the forces the structure snaps through "
+                f"({base.contacts[element].name}), need forces that reach an equilibrium slowly"
+            )
+        path = entered
     raise NumericalFailure(
         "static equilibrium: contacts, friction and force laws keep changing states at one load; none was found"
     )
@@ -231,16 +240,28 @@ def _sliding_force(base: ModalBase, element: int, state: ElementState, path: _Pa
     return float(state.rubs[1] * path.at(s, np.sum(path.forces[:, normal], axis=1)))
 
 
-def _check_snap(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int) -> None:
-    """Refuse a contact that closes or opens where that turns the path back."""
+def _alternatives(base: ModalBase, standing: _Standing, element: int, asked: int) -> list[int]:
+    """The states that an element may enter, the one it asks for first: a contact that closes may slide at once."""
+    states = base.contacts[element].states
+    if standing.of(base, element).name != "open":
+        return [asked]
+    return [asked, *(k for k, state in enumerate(states) if state.name != "open" and k != asked)]
+
+
+def _lasts(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int, asked: bool) -> bool:
+    """Whether a contact that has closed or opened at s does not turn the path back; one that slides at once slides on.
+
+    asked: whether it has the state that it asked for, in which it may stick at first and slide afterwards.
+    """
     state = standing.of(base, element)
     for exit_ in state.exits:
-        ends, _ = path.signal(base.link_places[element], exit_, standing.held, s)
-        if "open" in (state.name, exit_.asked) and ends[1] < ends[0]:
-            raise NumericalFailure(
-                f"static equilibrium: at {s:.3g} of the forces the structure snaps through "
-                f"({base.contacts[element].name}), need forces that reach an equilibrium slowly"
-            )
+        ends, size = path.signal(base.link_places[element], exit_, standing.held, s)
+        falls = ends[0] - ends[1] > SLACK * size
+        turns_back = "open" in (state.name, exit_.asked)
+        slides_back = not asked and path.at(s, ends) <= SLACK * size
+        if falls and (turns_back or slides_back):
+            return False
+    return True
 
 
 def _stretches(base: ModalBase, standing: _Standing, path: _Path) -> np.ndarray:

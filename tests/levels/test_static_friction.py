@@ -149,6 +149,20 @@ class TestContacts:
         )
         return mp.MultiPhiModel(structure, [floor], modes="all")
 
+    @pytest.mark.parametrize("stiffness", [math.inf, 80.0])
+    @pytest.mark.parametrize(("friction", "force"), [(0.4, (7.457, 0.7)), (4.0, (7.457, 0.9957))])
+    def test_of_no_gap_that_would_be_pulled_at_if_they_stuck_slide_at_once(self, stiffness, friction, force):
+        """Sticking at zero leaves the floor a force that pulls: the block slides, and is pressed on by its spring."""
+        structure = mp.LinearStructure(np.eye(2), self.STIFFNESS, points={"x": 0, "y": 1})
+        floor = mp.UnilateralContact("floor", "y", 0.0, stiffness, friction=friction, tangential="x")
+        found = mp.MultiPhiModel(structure, [floor], modes="all").static_equilibrium(
+            dict(zip("xy", force, strict=True))
+        )
+        yielding = 1 / stiffness  # N = -stiffness y
+        unknown = np.linalg.solve([[10.0, friction - 2.0 * yielding], [2.0, -1.0 - 20.0 * yielding]], force)
+        assert unknown[1] > 0
+        assert_allclose(found, [unknown[0], -yielding * unknown[1]], atol=1e-12)
+
     @pytest.mark.parametrize("spring", [math.inf, 40.0])
     @pytest.mark.parametrize("force", [(3.0, -6.0), (0.5, -1.0), (-8.0, -6.0)])
     def test_slide_where_the_sliding_structure_is_at_rest(self, spring, force):
