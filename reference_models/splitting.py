@@ -10,6 +10,7 @@ Source: G. Strang, On the construction and comparison of difference schemes, SIA
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -102,7 +103,10 @@ class SplittingRun:
         return bool(np.all(np.isfinite(self.record)))
 
     def histories(self, structure: LinearStructure, points: Sequence[str], time: np.ndarray) -> StepwiseHistories:
-        """On times (k,) [s]: within a step the kick at its start and the free motion after it."""
+        """On times (k,) [s]: within a step the kick at its start and the free motion after it.
+
+        Energies are those at the ends of steps, after both kicks, and between them on straight lines.
+        """
         model, r = self.model, len(self.model.squares)
         places = np.minimum((time / self.step * (1 + 1e-12)).astype(int), self.steps)
         z, speed = self.record[places, :r].T, self.record[places, r:].T
@@ -110,12 +114,11 @@ class SplittingRun:
         flow = _free_flow(model.squares[:, None], model.damping[:, None], np.maximum(time - places * self.step, 0.0))
         z, speed = flow[0] * z + flow[1] * speed, flow[2] * z + flow[3] * speed
         gaps, forces = model.rows @ z + model.laws[:, :1], self._forces(z)
-        strain = 0.5 * model.squares @ z**2 + 0.5 * np.sum(forces**2 / model.laws[:, 1:], axis=0)
         return StepwiseHistories(
             points={name: (structure.row(name) @ model.shapes) @ z for name in points},
             gaps=dict(zip(model.contacts, gaps, strict=True)),
             contact_force=dict(zip(model.contacts, forces, strict=True)),
-            energy=0.5 * np.sum(speed**2, axis=0) + strain,
+            energy=np.interp(time, self.step * np.arange(len(self.record)), self._energy),
         )
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
@@ -127,6 +130,13 @@ class SplittingRun:
         instants = (time[turns] + self.step * gaps[turns] / (gaps[turns] - gaps[turns + 1])).tolist()
         ends = [*([0.0] if closed[0] else []), *instants, *([float(time[-1])] if closed[-1] else [])]
         return list(zip(ends[::2], ends[1::2], strict=True))
+
+    @functools.cached_property
+    def _energy(self) -> np.ndarray:
+        """Kinetic and strain energy (steps + 1,) [J] at the ends of steps."""
+        z, speed = np.split(self.record.T, 2)
+        pressed = 0.5 * np.sum(self._forces(z) ** 2 / self.model.laws[:, 1:], axis=0)
+        return np.asarray(0.5 * np.sum(speed**2, axis=0) + 0.5 * self.model.squares @ z**2 + pressed)
 
     def _forces(self, z: np.ndarray) -> np.ndarray:
         """Contact forces (c, k) [N] at coordinates (r, k)."""

@@ -31,10 +31,7 @@ def test_without_damping_it_neither_gains_nor_loses_energy():
     structure = LinearStructure([[1.0]], [[1.0]], points={"m": 0})
     run = bilinear().run(np.array([1.0]), 200.0, 0.002)
     late = run.histories(structure, ["m"], np.linspace(150, 200, 5001))
-    apart = np.abs(late.energy - 0.5)[
-        late.gaps["stop"] > 0
-    ]  # after some forty contacts; within one it goes up and down
-    assert np.max(apart) < 1e-3 * 0.5
+    assert np.max(np.abs(late.energy - 0.5)) < 1e-3 * 0.5  # after some forty contacts
 
 
 def test_a_chain_with_damping_comes_to_the_exact_answer():
@@ -45,7 +42,7 @@ def test_a_chain_with_damping_comes_to_the_exact_answer():
     run = splitting(structure, contacts, ("m4",), 4).run(-start, 15.0, 2e-4)
     found = run.histories(structure, ["m4"], time)
     np.testing.assert_allclose(found.points["m4"], exact.at("m4", time), atol=2e-6)
-    np.testing.assert_allclose(found.energy, exact.energy(time), rtol=5e-4)  # within a contact of first order
+    np.testing.assert_allclose(found.energy, exact.energy(time), rtol=2e-5)
     np.testing.assert_allclose(run.contact_intervals("stop"), exact.contact_intervals("stop"), atol=1e-4)
     assert found.contact_force["stop"].max() > 1.0
 
