@@ -308,10 +308,8 @@ class Trajectory(Histories):
     @property
     def rubbing(self) -> tuple[str, ...]:
         """Names of the model's contacts that have friction."""
-        links = self.model.links
-        given = zip(self.model.contacts, self.model.link_places, strict=True)
-        held = [contact.name for contact, places in given if any(links[k].held for k in places)]
-        return tuple(name for name in held if name in self.contacts)
+        names = [self.model.contacts[i].name for i in self.model.rubbing]
+        return tuple(name for name in names if name in self.contacts)
 
     # ------------------------------------------------------------------ rows of a level
 
