@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -99,7 +99,7 @@ class Excitation:
     @classmethod
     def of(cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0) -> Excitation:
         """The loads of a run of ``model`` until ``end`` [s], smooth courses to their tolerance / finer."""
-        if not isinstance(loads, Iterable):
+        if isinstance(loads, (str, Mapping)) or not isinstance(loads, Iterable):
             raise MultiPhiTypeError(f"loads: got {type(loads).__name__}, need a sequence of loads")
         base, channels = model.base, _Channels(model, end, finer)
         for number, load in enumerate(loads):

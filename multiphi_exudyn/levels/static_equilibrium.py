@@ -175,8 +175,9 @@ def floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief
     left = np.divide(np.abs(load[free]), size[free], out=np.zeros(base.modes.rigid), where=size[free] > 0)
     name = f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes)"
     if not inertia_relief and np.max(left) > BALANCED:
+        percent = f"{100 * np.max(left):{'.2g' if np.max(left) < 0.995 else '.0f'}} %"
         raise MultiPhiValueError(
-            f"{name} and {100 * np.max(left):.2g} % of the forces are not balanced by others, need forces that are, "
+            f"{name} and {percent} of the forces are not balanced by others, need forces that are, "
             "supports, or inertia_relief=True for the deformation of a structure that they accelerate"
         )
     y = np.zeros(base.modes.count)

@@ -135,6 +135,8 @@ class LinearStructure(Shown):
             if not at:
                 raise MultiPhiValueError("direction: got an empty mapping, need {point: coefficient, ...}")
             return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
+        if isinstance(at, tuple) and any(isinstance(part, str) for part in at):
+            raise MultiPhiTypeError(f"point: got {at!r}, need the name of a point: points={{'name': {at!r}}}")
         return _vector("row", at, self.n)
 
     @property
@@ -249,6 +251,9 @@ class _PointRows(Mapping[str, np.ndarray]):
 
     def __contains__(self, name: object) -> bool:
         return name in self._entries
+
+    def __repr__(self) -> str:
+        return f"<rows of {self.n} degrees of freedom, by point: {names(list(self))}>"
 
     def taken(self, moving: np.ndarray) -> _PointRows:
         """The rows of these degrees of freedom alone; refused of a point that cannot move without the others."""

@@ -330,7 +330,9 @@ class Histories(Shown, ABC):
         try:
             times = np.atleast_1d(np.asarray(t, dtype=float))
         except (TypeError, ValueError) as error:
-            raise MultiPhiTypeError(f"t: got {type(t).__name__}, need a time or (k,) times in s") from error
+            hint = f"; a point's displacement: at({t!r}, times)" if isinstance(t, str) and t in self.points else ""
+            needed = f"a time or (k,) times in s{hint}"
+            raise MultiPhiTypeError(f"t: got {type(t).__name__}, need {needed}") from error
         if times.ndim != 1 or len(times) == 0:
             raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
         if not self.segments or not np.all((times >= self.t_start) & (times <= self.t_end)):

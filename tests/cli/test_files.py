@@ -67,6 +67,12 @@ def test_points_that_are_not_there_are_told_all_at_once(folder, capsys):
     )
 
 
+def test_a_scene_given_as_a_study_and_the_reverse_are_told_in_one_sentence(folder, capsys):
+    told(capsys, "new", "study")
+    assert told(capsys, "study", "scene.toml")[2].startswith("scene.toml: got a scene, need a study")
+    assert told(capsys, "compare", "study.toml")[2].startswith("study.toml: got a study, need a scene")
+
+
 @pytest.mark.parametrize(
     ("axis", "said"),
     [

@@ -460,6 +460,7 @@ def test_what_an_interface_cannot_hold_is_refused():
         (("m7",), mp.errors.MultiPhiValueError, "point: got 'm7'"),
         ({"none": np.zeros(3)}, mp.errors.MultiPhiValueError, "a row of zeros"),
         ({3: "m2"}, mp.errors.MultiPhiTypeError, "interface: got 3"),
+        ({"tip": (1.0, 0.0)}, mp.errors.MultiPhiValueError, "interface 'tip': got .*, need a point, a row"),
     ]:
         with pytest.raises(error, match=told):
             CreateMultiPhiBody(mbs, model, interface=interface)

@@ -302,6 +302,23 @@ def test_a_system_not_assembled_is_refused():
         reduce(container.AddSystem())
 
 
+def test_what_is_no_system_and_what_are_no_points_is_refused():
+    with pytest.raises(mp.MultiPhiTypeError, match=r"mbs: got SystemContainer, need an exudyn\.MainSystem"):
+        reduce(exu.SystemContainer())
+    system = Mass()
+    system.mbs.Assemble()
+    with pytest.raises(mp.MultiPhiTypeError, match="points: got list, need "):
+        reduce(system.mbs, points=["a"])
+
+
+def test_a_structure_is_shown_in_one_line():
+    system = Mass()
+    system.mbs.Assemble()
+    structure = reduce(system.mbs).structure
+    assert repr(structure).startswith("<LinearizedStructure: degrees of freedom 3; matrices dense")
+    assert repr(structure.points).startswith("<rows of 3 degrees of freedom, by point: m1")
+
+
 def test_a_start_that_is_displaced_and_moving_against_a_damper_moves_as_in_exudyn():
     system = Mass(displacement=0.3, velocity=10.0)
     stops = {"limitStopsUpper": 0.95, "limitStopsLower": -0.95, "limitStopsStiffness": 1e4, "useLimitStops": True}

@@ -183,6 +183,7 @@ class TestRow:
             (ValueError, [1.0, math.inf], "row: got a value that is NaN or infinite"),
             (TypeError, [1j, 0], "row: got list"),
             (TypeError, object(), "row: got object"),
+            (TypeError, (3, "uz"), "point: got (3, 'uz'), need the name of a point"),
         ],
     )
     def test_refuses(self, refused, kind, at, begins):

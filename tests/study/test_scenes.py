@@ -143,6 +143,9 @@ BROKEN = {
     "negative stiffness": (
         ["contacts", 0, "stiffness"], -1.0, "contacts[0].stiffness: got -1.0, need greater than 0"
     ),
+    "stiffness by another word": (
+        ["contacts", 0, "stiffness"], "inf", "contacts[0].stiffness: got 'inf', need a number or 'rigid'"
+    ),
     "stiffness nan": (["contacts", 0, "stiffness"], math.nan, "contacts[0].stiffness: got nan, need greater than 0"),
     "infinite gap": (["contacts", 0, "gap"], math.inf, "contacts[0].gap: got inf, need a finite number"),
     "negative time": (["outputs", "t_end"], -1.0, "outputs.t_end: got -1.0, need greater than 0"),

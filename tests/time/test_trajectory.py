@@ -85,6 +85,11 @@ class TestEvaluation:
     def test_times_outside_are_refused(self, run, refused, t):
         refused(ValueError, "t: got", run.displacement, t)
 
+    def test_a_point_in_the_place_of_the_time_is_told_where_points_are_asked_for(self, run, refused):
+        point = run.points[0]
+        told = f"t: got str, need a time or (k,) times in s; a point's displacement: at({point!r}"
+        refused(TypeError, told, run.displacement, point)
+
     def test_other_questions_that_make_no_sense_are_refused(self, run, refused):
         refused(ValueError, "t: got shape", run.displacement, np.zeros((2, 2)))
         refused(ValueError, "t: got shape", run.displacement, [])

@@ -11,7 +11,7 @@ during a run.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import SensorNode
 
+from multiphi_exudyn.display import Shown, kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event
@@ -35,8 +36,8 @@ RECORDED = {
 }
 
 
-@dataclass(frozen=True)
-class BodyHistories:
+@dataclass(frozen=True, repr=False)
+class BodyHistories(Shown):
     """What a body's sensors recorded: k samples at ``sensors.writePeriod``; for an event list exact times.
 
     Made by ``body_histories``.
@@ -110,6 +111,14 @@ class BodyHistories:
     stick_intervals: Mapping[str, np.ndarray]
     events: tuple[Event, ...]
     warnings: tuple[str, ...]
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        span = f", {self.time[0]:.4g} to {self.time[-1]:.4g} s" if len(self.time) else ""
+        yield "samples", f"{len(self.time)}{span}"
+        yield "points", names(list(self.points))
+        yield "contacts", names(list(self.gaps))
+        yield "events", str(len(self.events))
+        yield "warnings", kinds(self.warnings)
 
 
 def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:

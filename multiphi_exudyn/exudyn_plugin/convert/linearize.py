@@ -21,7 +21,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current
 from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
     generalised_forces,
@@ -45,7 +45,7 @@ SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its for
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class LinearizedStructure(LinearStructure):
     """A linear structure that knows the Exudyn coordinates it came from.
 
@@ -199,6 +199,8 @@ def linear_structure_from(
 
 
 def check_system(mbs: Any) -> None:
+    if not isinstance(mbs, exu.MainSystem):
+        raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an exudyn.MainSystem")
     if not mbs.systemIsConsistent:
         raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
     if len(mbs.systemData.GetODE2Coordinates()) == 0:

@@ -53,6 +53,9 @@ def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
 
 def given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
     """Rows (n,) of the points asked for; raises MultiPhiValueError or MultiPhiTypeError for one that there is not."""
+    if not isinstance(points, Mapping):
+        needed = "{name: marker index or (node index, coordinate number)}"
+        raise MultiPhiTypeError(f"points: got {type(points).__name__}, need {needed}")
     rows: dict[str, np.ndarray] = {}
     for name, given in points.items():
         _add(rows, _given_rows(mbs, name, given))

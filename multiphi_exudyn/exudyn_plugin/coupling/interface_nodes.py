@@ -146,6 +146,9 @@ def interface_nodes(
 
 def _node(structure: LinearStructure, name: str, point: InterfacePoint) -> InterfaceNode:
     if not isinstance(point, (PositionInterface, RigidInterface)):
+        if isinstance(point, (tuple, list)) and len(point) != structure.n:
+            needed = f"a point, a row ({structure.n},), PositionInterface or RigidInterface"
+            raise MultiPhiValueError(f"interface {name!r}: got {point!r}, need {needed}")
         row = structure.row(point)
         if not np.any(row):
             raise MultiPhiValueError(f"interface: got a row of zeros for {name!r}, need one that moves")

@@ -140,7 +140,10 @@ def load_study(source: str, *, quick: bool = False) -> Study:
     Raises MultiPhiValueError, one line: file, field, what was given, what is needed.
     """
     path = _find(source)
-    file = validated(StudyFile, path, read_toml(path))
+    raw = read_toml(path)
+    if "structure" in raw and "scene" not in raw:
+        raise MultiPhiValueError(f"{path}: got a scene, need a study, whose field scene names it; compare runs a scene")
+    file = validated(StudyFile, path, raw)
     scene_path, data = scene_data(file.scene, path.parent)
     try:
         _change(data, file, quick)

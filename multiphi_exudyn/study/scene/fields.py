@@ -39,6 +39,8 @@ def _not_zero(value: float) -> float:
 
 
 def _rigid_is_infinite(value: Any) -> Any:
+    if isinstance(value, str) and value != "rigid":
+        raise PydanticCustomError("stiffness", "a number or 'rigid'")
     return math.inf if value == "rigid" else value
 
 

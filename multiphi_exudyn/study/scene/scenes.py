@@ -59,7 +59,10 @@ def load_scene(source: str, *, t_end: float | None = None, modes: int | None = N
 def scene_data(source: str, folder: Path | None = None) -> tuple[Path, dict[str, Any]]:
     """Path and raw content, with its base's, of a shipped scene or a TOML file (relative to ``folder``)."""
     path = _find(source, folder or Path())
-    return path, _with_base(path, read_toml(path))
+    data = read_toml(path)
+    if "scene" in data and "structure" not in data:
+        raise MultiPhiValueError(f"{path}: got a study, need a scene; the command study runs a study")
+    return path, _with_base(path, data)
 
 
 def scene_of(path: Path, data: Mapping[str, Any]) -> Scene:
