@@ -76,7 +76,8 @@ def _hdf5_array(item: Any) -> Any:
 def op4_arrays(path: Path) -> dict[str, Matrix]:
     """All matrices of a Nastran OUTPUT4 file by name, in small letters."""
     try:
-        from pyyeti.nastran import op4
+        with np.printoptions():  # which importing pyYeti changes, for everybody
+            from pyyeti.nastran import op4
     except ImportError as error:
         raise ValueError("pyYeti is needed for it (pip install 'multiphi-exudyn[nastran]')") from error
     arrays: dict[str, Matrix] = op4.read(str(path), sparse=None)

@@ -1,6 +1,7 @@
 """Matrices from files are those that were written, whatever the kind of file; a broken one is told in one line."""
 
 import gzip
+import subprocess
 import sys
 
 import numpy as np
@@ -106,7 +107,9 @@ def write_several(file, arrays):
     elif file.suffix == ".mat":
         scipy.io.savemat(file, {**arrays, "title": "a structure"})
     else:
-        pytest.importorskip("pyyeti.nastran.op4").write(str(file), arrays)
+        with np.printoptions():  # which importing it changes
+            op4 = pytest.importorskip("pyyeti.nastran.op4")
+        op4.write(str(file), arrays)
     return file
 
 
@@ -230,3 +233,14 @@ def refusal(mass, file):
     except MultiPhiError as error:
         return str(error)
     return ""
+
+
+def test_reading_output4_leaves_how_numbers_are_printed(tmp_path):
+    """In a process of its own: importing its reader changes NumPy's print options."""
+    file = write_several(tmp_path / "m.op4", {"m": np.eye(2)})
+    code = (
+        "import numpy as np; from pathlib import Path; from multiphi_exudyn.mechanics.array_files import op4_arrays\n"
+        f"op4_arrays(Path({str(file)!r})); print(str(np.float64(1) / 3))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert told.strip() == str(1 / 3)
