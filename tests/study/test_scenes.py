@@ -304,7 +304,7 @@ JUNK = st.recursive(
 )
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(list(places(BEAM))), value=st.none() | JUNK)
 def test_any_value_anywhere_is_taken_or_refused_in_one_line(tmp_path, path, value):
     file = write(tmp_path / "scene.toml", changed(path, value))
