@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
-__all__ = ["Shown", "kinds", "names"]
+__all__ = ["Shown", "kinds", "names", "per_cent"]
 
 MOST_NAMES = 6  # that are written out
 STYLE = ' style="text-align:left"'
@@ -40,3 +40,8 @@ def names(given: Sequence[str]) -> str:
 def kinds(warnings: Sequence[str]) -> str:
     """The kinds of warnings, which are what stands before a colon."""
     return "; ".join(dict.fromkeys(warning.partition(":")[0] for warning in warnings)) or "none"
+
+
+def per_cent(share: float) -> str:
+    """A share in per cent, two digits of it below a hundred."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

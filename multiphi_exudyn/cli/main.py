@@ -111,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
     animate = add(
         "animate",
         _animate,
-        "show a reduced model and the reference moving side by side, as a GIF",
+        "show a reduced model and the reference moving over each other, as a GIF",
         "",
         "animate paper-rig --t-end 0.3 --slow 40",
     )

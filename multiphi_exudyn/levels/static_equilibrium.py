@@ -38,6 +38,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.static_response import static_response
@@ -175,10 +176,9 @@ def floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief
     left = np.divide(np.abs(load[free]), size[free], out=np.zeros(base.modes.rigid), where=size[free] > 0)
     name = f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes)"
     if not inertia_relief and np.max(left) > BALANCED:
-        percent = f"{100 * np.max(left):{'.2g' if np.max(left) < 0.995 else '.0f'}} %"
         raise MultiPhiValueError(
-            f"{name} and {percent} of the forces are not balanced by others, need forces that are, "
-            "supports, or inertia_relief=True for the deformation of a structure that they accelerate"
+            f"{name} and {per_cent(float(np.max(left)))} of the forces are not balanced by others, need forces that "
+            "are, supports, or inertia_relief=True for the deformation of a structure that they accelerate"
         )
     y = np.zeros(base.modes.count)
     y[elastic] = load[elastic] / base.modes.omega[elastic] ** 2

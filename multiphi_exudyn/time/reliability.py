@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
@@ -108,7 +109,7 @@ def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
         others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
         also = f" (and at {others} more)" if others else ""
         yield (
-            f"truncated contact: at {name!r}{also} {modes} modes leave out {_per_cent(share)} of the static "
+            f"truncated contact: at {name!r}{also} {modes} modes leave out {per_cent(share)} of the static "
             f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
         )
 
@@ -186,7 +187,7 @@ def _left_alone(trajectory: Trajectory) -> bool:
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
     """largest: zero where truncation has taken all energy at the start."""
     if lost > ENERGY_SHARE * largest:
-        share = _per_cent(lost / (largest or lost))
+        share = per_cent(lost / (largest or lost))
         yield f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}"
 
 
@@ -206,11 +207,7 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
         )
     elif error > (RIGID_INDICATOR if rigid else INDICATOR):
         typical = ", with rigid contacts a quarter of that is typical" if rigid else ""
-        yield f"truncation: displacements may be off by {_per_cent(error)} of the motion{typical}; {REMEDY}"
-
-
-def _per_cent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+        yield f"truncation: displacements may be off by {per_cent(error)} of the motion{typical}; {REMEDY}"
 
 
 def _clusters(trajectory: Trajectory) -> list[str]:
