@@ -122,7 +122,7 @@ class Channels:
         """The level in the coordinates xi; stops: s (c, q)."""
         directions, sizes = level.base.directions.T, level.base.magnitudes[0].T
         gap_columns, speeds = directions @ self.shapes - stops, directions @ self.carried - stops
-        held = ~np.any(level.gap_rows, axis=1)[:, None]  # what no mode moves, the channels move by round-off only
+        held = level.following[:, None]  # the channels move these by round-off only
         moved, slack = np.abs(stops), FOLLOWING / ZERO
         gap_columns = np.where(held, drop_round_off(gap_columns, slack * (sizes @ self.terms + moved)), gap_columns)
         speeds = np.where(held, drop_round_off(speeds, slack * (sizes @ np.abs(self.carried) + moved)), speeds)
@@ -138,6 +138,7 @@ class Channels:
             vectors=np.hstack([level.vectors, self.shapes]),
             damping=np.pad(level.damping, (0, q)),
             gap_rows=np.hstack([level.gap_rows, gap_columns]),
+            following=level.following,
             force_rows=np.hstack([level.force_rows, self.contact_force]),
             force_rate_rows=np.hstack([level.force_rate_rows, self.contact_force_rate]),
             neutral=level.neutral,

@@ -100,8 +100,7 @@ class LoadedLevel(Shown):
         magnitudes, initial = level.base.magnitudes
         gaps = level.base.directions.T @ rest.configuration + level.base.gaps
         terms = initial + np.abs(rest.configuration) @ magnitudes
-        held = ~np.any(level.gap_rows, axis=1)  # by the closed contacts, of which its gap is the sum
-        gaps = drop_round_off(gaps, np.where(held, FOLLOWING / ZERO, 1.0) * terms)
+        gaps = drop_round_off(gaps, np.where(level.following, FOLLOWING / ZERO, 1.0) * terms)
         return cls(level, rest, gaps, Excitation.constant(load, len(gaps)), Channels.none(level))
 
     def under(self, excitation: Excitation) -> LoadedLevel:

@@ -45,7 +45,8 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     _check(base, squares, vectors, closed_directions, accuracy)
     sizes = np.outer(np.linalg.norm(base.directions, axis=0), np.linalg.norm(vectors, axis=0))
     gap_rows = drop_round_off(base.directions.T @ vectors, sizes)  # of a mode all components have round-off
-    gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
+    following = _following(base, held)
+    gap_rows[following] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
         closed=tuple(base.links[i].name for i in closed),
@@ -55,6 +56,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         vectors=vectors,
         damping=_projected_damping(damping, squares, vectors),
         gap_rows=gap_rows,
+        following=following,
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],

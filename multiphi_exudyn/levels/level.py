@@ -127,6 +127,8 @@ class Level(Shown):
         Phi_l^T C Phi_l [1/s].
     gap_rows : array (c, r)
         gap_i = gap_rows[i].eta + ... for every contact of the model.
+    following : array (c,)
+        Whether the closed rigid contacts alone determine a contact's gap; of other contacts loads move it as well.
     force_rows, force_rate_rows : array (k, r)
         Contact forces of the closed contacts from eta and eta'.
     neutral : array (m, z)
@@ -157,6 +159,7 @@ class Level(Shown):
     vectors: np.ndarray
     damping: np.ndarray
     gap_rows: np.ndarray
+    following: np.ndarray
     force_rows: np.ndarray
     force_rate_rows: np.ndarray
     neutral: np.ndarray

@@ -170,3 +170,22 @@ def test_a_tolerance_keeps_the_rigid_body_modes():
     single = mp.LinearStructure([[1.0]], [[0.0]], points={"m0": 0})
     falling = mp.simulate(mp.MultiPhiModel(single, modes=mp.Tolerance(0.1)), 1.0, velocity=np.array([1.0]))
     assert falling.at("m0", 1.0) == pytest.approx(1.0)
+
+
+def test_a_contact_that_no_kept_mode_moves_follows_the_static_response():
+    """Two free masses keep their rigid-body mode alone: (1, -1) is then F times static flexibility, 2e-4 m at most.
+
+    F = 3 cos(4 pi t) N, gap 1e-4 m: it closes where cos = -1/2. Springs in parallel: 1e4 and 5e4 N/m.
+    """
+    stiffness = 1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    masses = mp.LinearStructure(np.diag([1.0, 2.0]), stiffness, points={"a": 0, "b": 1})
+    bump = mp.UnilateralContact("bump", {"a": 1, "b": -1}, gap=1e-4, stiffness=5e4)
+    model = mp.MultiPhiModel(masses, [bump], modes=1)
+    with pytest.warns(mp.MultiPhiWarning):
+        trajectory = mp.simulate(model, 0.5, loads=[mp.HarmonicLoad("a", 3.0, 2.0)])
+    assert trajectory.contact_intervals("bump") == pytest.approx(np.array([[1 / 6, 1 / 3]]), rel=1e-12)
+    times = np.linspace(0.17, 0.33, 9)
+    pressed = -2.0 * np.cos(4 * np.pi * times) - 1.0  # N, F 2/3 less what closes the gap
+    assert trajectory.gap("bump", times) == pytest.approx(-pressed / 6e4, rel=1e-9)
+    assert trajectory.contact_force("bump", times) == pytest.approx(pressed * 5 / 6, rel=1e-9)
+    assert abs(trajectory.ledger.residual) < 1e-15 < trajectory.ledger.work_of_loads
