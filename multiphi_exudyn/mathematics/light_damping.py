@@ -41,7 +41,7 @@ def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | 
     mixed.flat[each], apart.flat[each] = 0.0, np.inf
     if not (np.abs(mixed).sum(axis=1)[:, None] * omega <= LIGHT * np.abs(apart)).all():
         return None
-    vectors, before = np.eye(len(omega), dtype=complex), np.zeros(len(omega), complex)
+    vectors = np.eye(len(omega), dtype=complex)
     for _ in range(MOST_STEPS):
         moved = mixed @ vectors
         half = (own + moved.flat[each]) / 2
