@@ -95,6 +95,11 @@ class ModalBase(Shown):
         return link_places(self.contacts)
 
     @functools.cached_property
+    def held(self) -> tuple[int, ...]:
+        """Links with a held place, in the order of their channels."""
+        return tuple(k for k, link in enumerate(self.links) if link.held)
+
+    @functools.cached_property
     def oblique(self) -> dict[int, int]:
         """Links whose force acts along another direction than theirs, each with the first link of its element."""
         given = ((k, places[0]) for places in self.link_places for k in places[1:])
@@ -196,6 +201,12 @@ class ModalBase(Shown):
     def squares(self) -> np.ndarray:
         """Omega^2 (m,) [rad2/s2]."""
         return self.modes.omega**2
+
+    @functools.cached_property
+    def periods(self) -> np.ndarray:
+        """1 / Omega (m,) [s/rad], zero of rigid-body modes."""
+        omega = self.modes.omega
+        return np.divide(1.0, omega, out=np.zeros_like(omega), where=omega > 0)
 
     @functools.cached_property
     def compliance(self) -> np.ndarray:
