@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
@@ -43,19 +44,22 @@ def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...
     key = before.states, stopped
     if key not in after.entries:
         base, source, target = after.level.base, before.level.vectors, after.level.vectors
-        jump = before.asymptotic.configuration - after.asymptotic.configuration
-        held = held_rigidly(after)
-        displaced = allowed(base, held, np.column_stack([source, -target, jump]))
-        moving = over_omega(base, allowed(base, held | set(stopped), np.column_stack([source, -target])))
-        modes = source.shape[1], target.shape[1]
+        held, modes = held_rigidly(after), (source.shape[1], target.shape[1])
+        motion = np.empty((len(source), sum(modes) + 1), order="F")
+        motion[:, : modes[0]], motion[:, modes[0] : -1] = source, -target
+        motion[:, -1] = before.asymptotic.configuration - after.asymptotic.configuration
+        displaced = allowed(base, held, motion)
+        moving = over_omega(base, allowed(base, held | set(stopped), motion[:, :-1]))
         after.entries[key] = DefectForm(factor(displaced), factor(moving), modes)
     way: DefectForm = after.entries[key]
     return way
 
 
 def factor(rows: np.ndarray) -> np.ndarray:
-    """R with |R z| = |rows z|."""
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+    """R with |R z| = |rows z|, upper triangular."""
+    if not rows.size:
+        return np.zeros((0, rows.shape[1]))
+    return np.triu(scipy.linalg.lapack.dgeqrf(rows)[0][: rows.shape[1]])
 
 
 def held_rigidly(level: LoadedLevel) -> set[int]:
@@ -73,6 +77,4 @@ def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
 
 def over_omega(base: ModalBase, motion: np.ndarray) -> np.ndarray:
     """Motions (m, ...) over Omega, zero where that is zero."""
-    omega = base.modes.omega
-    weights = np.divide(1.0, omega, out=np.zeros_like(omega), where=omega > 0)
-    return np.asarray((motion.T * weights).T)
+    return np.asarray((motion.T * base.periods).T)

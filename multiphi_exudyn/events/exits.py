@@ -8,6 +8,7 @@ An exit whose element may not leave asks what it would say in the level entered:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
 __all__ = [
+    "ExitShares",
     "after",
     "asked_alone",
     "asked_state",
@@ -27,6 +29,7 @@ __all__ = [
     "signal_row",
     "signal_rows",
     "signal_table",
+    "signals_of",
     "state_of",
     "way_back",
 ]
@@ -70,40 +73,78 @@ def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
 
 
 def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """s of exits of elements in a level: of xi (e, r), of xi' (e, r) and constant (e,).
+    """s of exits of elements in a level: of xi (e, r), of xi' (e, r) and constant (e,)."""
+    return signals_of(level, ExitShares.of(level.level.base.link_places, exits))
+
+
+@dataclass(frozen=True)
+class ExitShares:
+    """What the signals of e exits are sums of. constants: (e,).
+
+    links, shares: (e, 3) the first link of each, and the shares of its q, q' and lambda. further: the same of other
+    links, of the exits with these numbers.
+    """
+
+    constants: np.ndarray
+    links: np.ndarray
+    shares: np.ndarray
+    further: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    @classmethod
+    def of(cls, link_places: Sequence[Sequence[int]], exits: Sequence[tuple[int, Exit]]) -> ExitShares:
+        """Of exits with the positions of their elements."""
+        links = np.array([link_places[element][0] for element, _ in exits], int)
+        shares = np.array([exit_.shares[0][1:] for _, exit_ in exits], float).reshape(-1, 3)
+        given = [
+            (k, link_places[element][share.link], *share[1:])
+            for k, (element, exit_) in enumerate(exits)
+            for share in exit_.further
+        ]
+        table = np.array(given, float).reshape(-1, 5)
+        numbers, others = table[:, :2].astype(int).T
+        constants = np.array([exit_.constant for _, exit_ in exits], float)
+        return cls(constants, links, shares, (numbers, others, table[:, 2:]))
+
+    def taken(self, kept: np.ndarray) -> ExitShares:
+        """Of those exits that are ``kept`` (e,) alone."""
+        numbers, links, shares = self.further
+        rows, counted = kept[numbers], np.cumsum(kept) - 1
+        further = counted[numbers[rows]], links[rows], shares[rows]
+        return ExitShares(self.constants[kept], self.links[kept], self.shares[kept], further)
+
+
+def signals_of(level: LoadedLevel, exits: ExitShares) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """s of exits in a level: of xi (e, r), of xi' (e, r) and constant (e,).
 
     A load that is a limit leaves no round-off of both.
     """
-    own, count = level.level, len(exits)
-    places = own.base.link_places
-    moving = [
-        (k, places[element][share.link], share.gap, share.rate)
-        for k, (element, exit_) in enumerate(exits)
-        for share in exit_.shares
-    ]
-    pushing = [(k, *given) for k, (element, exit_) in enumerate(exits) for given in force_shares(level, element, exit_)]
-    position, rate = np.zeros((2, count, own.modes))
-    constant = np.array([exit_.constant for _, exit_ in exits], float)
-    size = np.abs(constant)
-    k, link, gap, speed = _columns(moving, 4)
-    np.add.at(position, k, gap[:, None] * own.gap_rows[link])
-    np.add.at(rate, k, speed[:, None] * own.gap_rows[link])
-    closing = gap * level.gap_constants[link]
-    constant += np.bincount(k, closing, count)
-    size += np.bincount(k, np.abs(closing), count)
-    k, place, force = _columns(pushing, 3)
-    np.add.at(position, k, force[:, None] * own.force_rows[place])
-    np.add.at(rate, k, force[:, None] * own.force_rate_rows[place])
-    pressing = force * level.asymptotic.forces[place]
-    constant += np.bincount(k, pressing, count)
-    size += np.bincount(k, np.abs(pressing), count)
+    position, rate, terms = _linked(level, exits.links, exits.shares)
+    constant, size = exits.constants + terms.sum(axis=1), np.abs(exits.constants) + np.abs(terms).sum(axis=1)
+    numbers, links, shares = exits.further
+    if len(numbers):
+        *rows, terms = _linked(level, links, shares)
+        np.add.at(position, numbers, rows[0])
+        np.add.at(rate, numbers, rows[1])
+        constant += np.bincount(numbers, terms.sum(axis=1), len(constant))
+        size += np.bincount(numbers, np.abs(terms).sum(axis=1), len(constant))
     return position, rate, drop_round_off(constant, size)
 
 
-def _columns(rows: Sequence[tuple[float, ...]], width: int) -> list[np.ndarray]:
-    """Columns of a table: two of places, the others of numbers."""
-    table = np.array(rows, float).reshape(-1, width).T
-    return [table[0].astype(int), table[1].astype(int), *table[2:]]
+def _linked(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What links (s,) have in signals by their shares (s, 3): of xi and xi' (s, r), and constants (s, 2)."""
+    own, (gap, speed, force) = level.level, shares.T
+    rows, constants = own.gap_rows[links], np.zeros((len(links), 2))
+    position, rate = gap[:, None] * rows, speed[:, None] * rows
+    constants[:, 0] = gap * level.gap_constants[links]
+    pressing = np.flatnonzero(force)
+    if len(pressing):
+        place = np.zeros(len(level.gap_constants), int)
+        place[list(own.indices)] = range(len(own.indices))
+        held, share = place[links[pressing]], force[pressing]
+        position[pressing] += share[:, None] * own.force_rows[held]
+        rate[pressing] += share[:, None] * own.force_rate_rows[held]
+        constants[pressing, 1] = share * level.asymptotic.forces[held]
+    return position, rate, constants
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:

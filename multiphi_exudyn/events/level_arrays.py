@@ -12,6 +12,7 @@ from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.channel_arrays import ChannelArrays
 from multiphi_exudyn.events.defect_forms import defect_form
 from multiphi_exudyn.events.element_arrays import describe_elements
+from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
 from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal
@@ -56,6 +57,7 @@ class LevelArrays:
         self.held: Held | None = None
         self.room = ROOM
         self._count = 0  # of levels packed so far
+        self._exits = ExitTable(levels.model.contacts)
         self._weighed: int = 0  # size of the buffers when others were last looked at
         self.channels = ChannelArrays(levels)
         self.forget()
@@ -229,8 +231,8 @@ class LevelArrays:
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
-        self.scratch.reserve(n, free, len(exits_of(level)))
-        record = put_level(self.buffers, level, number, self.levels.ends(level.states))
+        self.scratch.reserve(n, free, int(np.sum(self._exits.of(level.states))))
+        record = put_level(self.buffers, level, number, self._exits, self.levels.ends(level.states))
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
 

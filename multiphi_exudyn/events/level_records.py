@@ -9,7 +9,8 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.exits import asked_state, exits_of, signal_row, signal_table
+from multiphi_exudyn.events.exit_table import ExitTable
+from multiphi_exudyn.events.exits import asked_state, signal_row, signals_of
 from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
@@ -34,10 +35,10 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     return _record(buffers, given)
 
 
-def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequence[int]) -> int:
+def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, watched: Sequence[int]) -> int:
     """The record of a level with a number; watched: elements that can ask first while all are armed."""
-    own, modal, put, parts, exits = level.level, level.modal, buffers.put, level_parts(level), exits_of(level)
-    firsts = np.searchsorted([i for i, _ in exits], range(len(level.states) + 1))
+    own, modal, put, parts, kept = level.level, level.modal, buffers.put, level_parts(level), exits.of(level.states)
+    firsts = exits.firsts(kept).tolist()
     ends = [k for i in watched for k in range(firsts[i], firsts[i + 1])]
     given = {
         a.NUMBER: number,
@@ -45,8 +46,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequen
         a.STATES: put("ints", level.states),
         a.RESPONSE: _put_response(buffers, modal),
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
-        a.EXITS: _put_exits(buffers, level, exits),
-        a.EXIT_COUNT: len(exits),
+        a.EXITS: _put_exits(buffers, level, exits, kept),
+        a.EXIT_COUNT: firsts[-1],
         a.FIRST_EXITS: put("ints", firsts),
         a.ENDS: put("ints", ends),
         a.END_COUNT: len(ends),
@@ -71,20 +72,21 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
     """The record of a signal."""
-    return _put_signals(buffers, level, (row.position[None, :], row.rate[None, :], np.array([row.constant])))[0]
+    table = row.position[None, :], row.rate[None, :], np.array([row.constant])
+    return [int(part) for part in _put_signals(buffers, level, table)[0]]
 
 
-def _put_signals(
-    buffers: Buffers, level: LoadedLevel, table: tuple[np.ndarray, np.ndarray, np.ndarray]
-) -> list[list[int]]:
-    """The records of signals (exits.signal_table)."""
+def _put_signals(buffers: Buffers, level: LoadedLevel, table: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+    """The records (e, 3) of signals (exits.signals_of)."""
     position, rate, constant = table
-    r, shapes = level.modal.modes, level.modal.response.shapes
-    numbers = np.hstack([position, rate, constant[:, None]])
-    waves = np.hstack([position[:, :r] @ shapes, rate[:, :r] @ shapes])
-    at, wave, rates = buffers.put("numbers", numbers), buffers.put("waves", waves), np.any(rate, axis=1).tolist()
-    count, width = numbers.shape[1], waves.shape[1]
-    return [[at + k * count, wave + k * width, int(moves)] for k, moves in enumerate(rates)]
+    r, shapes, moves = level.modal.modes, level.modal.response.shapes, rate.any(axis=1)
+    numbers = np.concatenate([position, rate, constant[:, None]], axis=1)
+    waves = np.zeros((len(numbers), 2 * shapes.shape[1]), complex)
+    waves[:, : shapes.shape[1]] = position[:, :r] @ shapes
+    if moves.any():
+        waves[:, shapes.shape[1] :] = rate[:, :r] @ shapes
+    at, wave, k = buffers.put("numbers", numbers), buffers.put("waves", waves), np.arange(len(numbers))
+    return np.column_stack([at + k * numbers.shape[1], wave + k * waves.shape[1], moves])
 
 
 def _record(buffers: Buffers, given: dict[int, int]) -> int:
@@ -125,19 +127,19 @@ def _put_basis(buffers: Buffers, basis: Exponentials) -> int:
     return record
 
 
-def _put_exits(buffers: Buffers, level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> int:
-    """Records of the exits of a level."""
-    signals, table = _put_signals(buffers, level, signal_table(level, exits)), list[list[int]]()
-    for signal, (i, exit_) in zip(signals, exits, strict=True):
-        asked = asked_state(level, i, exit_)
-        table.append([i, asked, exit_.firmness, *signal, -1, *_turn(buffers, level, i, exit_)])
-    return buffers.put("ints", np.array(table, dtype=int))
+def _put_exits(buffers: Buffers, level: LoadedLevel, exits: ExitTable, kept: np.ndarray) -> int:
+    """Records of the exits of a level, those of the table that are kept (e,)."""
+    described, signals = exits.described[kept], _put_signals(buffers, level, signals_of(level, exits.shares(kept)))
+    table = np.full((len(signals), a.EXIT_INTS), -1)
+    table[:, :3], table[:, 3:6] = described, signals
+    for k, exit_ in exits.turning(kept):
+        table[k, a.TURN :] = _turn(buffers, level, int(described[k, 0]), exit_)
+    return buffers.put("ints", table)
 
 
 def _turn(buffers: Buffers, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
     """The signal of the speed that may turn an exit, and the states that it asks for then."""
-    if exit_.turn is None:
-        return [-1] * (a.EXIT_INTS - a.TURN)
+    assert exit_.turn is not None, "only exits that turn have one"
     speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
     asked = [asked_state(level, element, Exit(name)) for name in (exit_.turn.forward, exit_.turn.backward)]
     return [*put_signal(buffers, level, speed), *asked]

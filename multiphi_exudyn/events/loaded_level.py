@@ -221,10 +221,10 @@ class LoadedLevel(Shown):
         index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
         springs, rows = base.stiffnesses[index], own.gap_rows[index]
         shapes, columns, pulled = own.vectors[:, r:], rows[:, r:], self.excitation.patterns.T @ own.vectors
-        form = (base.modes.omega[:, None] ** 2 * shapes).T @ own.vectors + (columns.T * springs) @ rows - pulled
+        form = (base.squares[:, None] * shapes).T @ own.vectors + (columns.T * springs) @ rows - pulled
         form[:, r:] -= pulled[:, r:].T
         modal = rest.load - self.modal.vectors.T @ static - self.alone.asymptotic.drive
-        load = base.modes.omega**2 * y - base.preload - static
+        load = base.squares * y - base.preload - static
         along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
         constant = rest.strain + self.stored - float(static @ y)
         return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form, self.follows)
@@ -247,6 +247,8 @@ class LoadedLevel(Shown):
     @functools.cached_property
     def rubbing_elements(self) -> tuple[int, ...]:
         """Those whose friction goes with the force of a link."""
+        if not self.level.base.held:
+            return ()
         given = enumerate(zip(self.level.base.contacts, self.states, strict=True))
         return tuple(i for i, (element, state) in given if element.states[state].rubs is not None)
 

@@ -30,7 +30,6 @@ import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.modal_base import ModalBase
 
 __all__ = ["Transition", "modal_projection"]
 
@@ -95,7 +94,9 @@ class Transition:
         source, excitation = self.source, self.source.excitation
         rows, constants = np.zeros((excitation.channels, len(source.level.squares))), np.zeros(excitation.channels)
         base = source.level.base
-        places = {link: k for k, link in enumerate(_held_links(base), start=excitation.prescribed)}
+        places = {link: k for k, link in enumerate(base.held, start=excitation.prescribed)}
+        if not places:
+            return rows, constants
         for i, (element, links) in enumerate(zip(base.contacts, base.link_places, strict=True)):
             before, after = element.states[source.states[i]], element.states[self.target.states[i]]
             for number, link in enumerate(links):
@@ -120,11 +121,6 @@ class Transition:
     def velocity(self, xi_t: np.ndarray) -> np.ndarray:
         """xi'_m from xi'_l."""
         return self.velocity_matrix @ xi_t
-
-
-def _held_links(base: ModalBase) -> list[int]:
-    """The links with a held place, in the order of their channels."""
-    return [k for k, link in enumerate(base.links) if link.held]
 
 
 def modal_projection(target: Level, source: Level) -> np.ndarray:

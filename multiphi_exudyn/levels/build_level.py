@@ -39,22 +39,21 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     rigid_body = _rigid_body_modes(base, turned)
     squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    damping = base.damping_matrix(closed)
-    squares, vectors = _turned(base, squares, vectors, damping)
+    squares, vectors = _turned(base, squares, vectors, closed)
     zero = squares == 0
     _check(base, squares, vectors, closed_directions, accuracy)
-    sizes = np.outer(np.linalg.norm(base.directions, axis=0), np.linalg.norm(vectors, axis=0))
-    gap_rows = drop_round_off(base.directions.T @ vectors, sizes)  # of a mode all components have round-off
+    gap_rows = drop_round_off(base.directions.T @ vectors, base.lengths[:, None])  # of a mode all components have some
     following = _following(base, held)
     gap_rows[following] = 0.0  # by definition, whatever a soft mode leaves
-    forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
+    damped = base.damped(vectors, closed)
+    forces, rates = _force_rows(base, closed, squares, vectors, damped, gap_rows[closed])
     return Level(
         closed=tuple(base.links[i].name for i in closed),
         indices=indices,
         base=base,
         squares=squares,
         vectors=vectors,
-        damping=_projected_damping(damping, squares, vectors),
+        damping=_projected_damping(base, closed, squares, vectors, damped),
         gap_rows=gap_rows,
         following=following,
         force_rows=forces,
@@ -66,19 +65,19 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
 
 
 def _turned(
-    base: ModalBase, squares: np.ndarray, vectors: np.ndarray, damping: np.ndarray
+    base: ModalBase, squares: np.ndarray, vectors: np.ndarray, closed: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Modes of a level with signs and clusters chosen by contacts, then points, then the base's own modes.
 
     Of zero-frequency modes those that nothing damps come first: they drift for ever, the others come to rest.
     """
-    rows = np.vstack([base.directions.T, base.points])
-    sizes = np.concatenate([np.linalg.norm(rows, axis=1), np.ones(base.modes.count)])
-    free, squares, vectors = np.flatnonzero(squares == 0), squares.copy(), vectors.copy()
+    rows, sizes = base.seen
+    free = np.flatnonzero(squares == 0)
     if not len(free):
         return turned(squares, vectors, rows, sizes)
-    resisted, rotation = np.linalg.eigh(vectors[:, free].T @ damping @ vectors[:, free])
-    drifting = int(np.sum(resisted <= UNDAMPED * np.max(np.abs(damping), initial=0.0)))
+    squares, vectors = squares.copy(), vectors.copy()
+    resisted, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
+    drifting = int(np.sum(resisted <= UNDAMPED * _largest_damping(base, closed)))
     if 0 < drifting < len(free):
         vectors[:, free] = vectors[:, free] @ rotation
     for part in (free[:drifting], free[drifting:], np.flatnonzero(squares)):
@@ -91,46 +90,48 @@ def _force_rows(
     closed: list[int],
     squares: np.ndarray,
     vectors: np.ndarray,
-    damping: np.ndarray,
+    damped: np.ndarray,
     gap_rows: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
-    rigid = np.isinf(base.stiffnesses[closed])
-    forces = np.zeros((len(closed), len(squares)))
-    rates = np.zeros_like(forces)
-    pinned, sprung = base.directions[:, closed][:, rigid], base.directions[:, closed][:, ~rigid]
-    forces[~rigid] = -base.stiffnesses[closed][~rigid][:, None] * gap_rows[~rigid]
-    rates[~rigid] = -base.dampings[closed][~rigid][:, None] * gap_rows[~rigid]
-    if np.any(rigid):
-        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, sprung @ forces[~rigid])
-        rates[rigid] = np.linalg.lstsq(pinned, damping @ vectors, rcond=None)[0]
+    stiffness, damping = base.stiffnesses[closed], base.dampings[closed]
+    rigid = np.isinf(stiffness)
+    forces, rates = -np.where(rigid, 0.0, stiffness)[:, None] * gap_rows, -damping[:, None] * gap_rows
+    if rigid.any():
+        pinned = base.directions[:, closed][:, rigid]
+        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, base.directions[:, closed] @ forces)
+        rates[rigid] = np.linalg.lstsq(pinned, damped, rcond=None)[0]
     return forces, rates
 
 
-def _projected_damping(damping: np.ndarray, squares: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own."""
-    projected: np.ndarray = vectors.T @ damping @ vectors
+def _projected_damping(
+    base: ModalBase, closed: Sequence[int], squares: np.ndarray, vectors: np.ndarray, damped: np.ndarray
+) -> np.ndarray:
+    """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own. damped: C_l Phi_l."""
+    projected: np.ndarray = vectors.T @ damped
     free = squares == 0
-    if not np.any(free):
+    if not free.any():
         return projected
-    negligible = np.abs(projected) <= UNDAMPED * np.max(np.abs(damping), initial=0.0)
+    negligible = np.abs(projected) <= UNDAMPED * _largest_damping(base, closed)
     projected[negligible & (free[:, None] | free[None, :])] = 0.0
     return projected
 
 
+def _largest_damping(base: ModalBase, closed: Sequence[int]) -> float:
+    return float(np.max(np.abs(base.damping_matrix(closed)), initial=0.0))
+
+
 def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
     """Whether none of these rigid contacts follows from the others, so that they can be closed together."""
-    pinned = _units(base.directions[:, list(rigid)])
-    if pinned.shape[1] == 0:
+    if not len(rigid):
         return True
+    pinned = _units(base.directions[:, list(rigid)])
     left = np.abs(np.diagonal(np.linalg.qr(pinned, mode="r")))
     return pinned.shape[1] <= base.modes.count and bool(np.min(left) > INDEPENDENT)
 
 
 def _following(base: ModalBase, held: Sequence[int]) -> np.ndarray:
     """Which contacts (c,) follow from these rigid ones, which are independent: their gaps do not move."""
-    if not held:
-        return np.zeros(len(base.links), bool)
     units, (q, _) = _units(base.directions), np.linalg.qr(base.directions[:, list(held)])
     left = units - q @ (q.T @ units)
     return np.asarray(np.linalg.norm(left, axis=0) <= INDEPENDENT)
@@ -144,6 +145,8 @@ def _units(directions: np.ndarray) -> np.ndarray:
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:
     """Rigid-body motions that no closed contact resists."""
+    if base.modes.rigid == 0:
+        return 0
     rigid = closed_directions.resisting[: base.modes.rigid]
     if rigid.size == 0:
         return base.modes.rigid
@@ -175,11 +178,11 @@ def _check(
     """Mass normalisation and interlacing."""
     error = np.max(np.abs(vectors.T @ vectors - np.eye(len(squares))), initial=0.0)
     stiffening, softening = int(np.sum(closed_directions.stiffness > 0)), int(np.sum(closed_directions.stiffness < 0))
-    given = base.modes.omega**2
-    slack = INTERLACING * (given + accuracy) + np.finfo(float).eps * np.max(given, initial=0.0)
+    largest = float(base.modes.omega[-1]) ** 2 if base.modes.count else 0.0
+    given = base.squares[: len(squares) + stiffening]
+    slack = INTERLACING * (given + accuracy) + np.finfo(float).eps * largest
     below, above = (given - slack)[: len(squares) - softening], (given + slack)[stiffening:]
-    count = min(len(above), len(squares))
-    interlaced = np.all(squares[softening:] >= below) and np.all(squares[:count] <= above[:count])
+    interlaced = (squares[softening:] >= below).all() and (squares[: len(above)] <= above).all()
     if not (error <= ORTHONORMAL and interlaced):
         raise NumericalFailure(
             f"level: its modes fail their invariants (mass normalisation off by {error:g}, "

@@ -51,7 +51,7 @@ def level_modes(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """omega^2 ascending, modes (m, r), the lowest ``modes`` at least or all, and the mu that limits their accuracy."""
     if not closed_directions.members:
-        return base.modes.omega[:modes] ** 2, np.eye(base.modes.count, modes), 0.0
+        return base.squares[:modes].copy(), np.eye(base.modes.count, modes), 0.0
     if modes is not None and base.modes.count >= ROOTED:
         found = _rank_one(base, closed_directions, modes)
         if found is not None:
@@ -69,7 +69,7 @@ def _rank_one(
     if len(sprung) != 1 or closed_directions.stiffness[sprung[0]] < 0:
         return None
     along, stiffness = closed_directions.vectors[:, sprung[0]], closed_directions.stiffness[sprung[0]]
-    found = rank_one_modes(base.modes.omega**2, along, float(stiffness), modes)
+    found = rank_one_modes(base.squares, along, float(stiffness), modes)
     if found is None:
         return None
     squares, vectors = found
@@ -111,7 +111,7 @@ def _lowest(base: ModalBase, closed_directions: ClosedDirections, modes: int) ->
     vectors = None
     if base.modes.count >= LARGE:
         scaled, yielding = directions / lengths, 1 / stiffness / lengths**2
-        vectors = _iterated(base.modes.omega**2, scaled, yielding, taken, modes)
+        vectors = _iterated(base.squares, scaled, yielding, taken, modes)
     if vectors is None:
         vectors = _of_all(compliance, taken, modes)
     pinned = directions[:, np.isinf(stiffness)]

@@ -95,6 +95,11 @@ class ModalBase(Shown):
         return link_places(self.contacts)
 
     @functools.cached_property
+    def held(self) -> tuple[int, ...]:
+        """Links with a held place, in the order of their channels."""
+        return tuple(k for k, link in enumerate(self.links) if link.held)
+
+    @functools.cached_property
     def oblique(self) -> dict[int, int]:
         """Links whose force acts along another direction than theirs, each with the first link of its element."""
         given = ((k, places[0]) for places in self.link_places for k in places[1:])
@@ -109,6 +114,17 @@ class ModalBase(Shown):
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """|H| (m, l) and |gaps| (l,): with them a gap's round-off is judged."""
         return np.abs(self.directions), np.abs(self.gaps)
+
+    @functools.cached_property
+    def lengths(self) -> np.ndarray:
+        """|h| (l,) in these coordinates: with them the round-off of a mode's gap is judged."""
+        return np.linalg.norm(self.directions, axis=0)
+
+    @functools.cached_property
+    def seen(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (k, m) of links and points, and what a mode of unit length can move them by, then the coordinates."""
+        rows = np.vstack([self.directions.T, self.points])
+        return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
 
     @functools.cached_property
     def stiffnesses(self) -> np.ndarray:
@@ -171,7 +187,7 @@ class ModalBase(Shown):
 
         gaps: (c,) of all contacts, None for their own.
         """
-        constant = float(self._omega_squares @ (configuration * configuration)) / 2 + self.energy_offset
+        constant = float(self.squares @ (configuration * configuration)) / 2 + self.energy_offset
         if self.laws:
             constant -= float(self.preload @ configuration)
         if not len(closed):
@@ -182,8 +198,20 @@ class ModalBase(Shown):
         return constant + 0.5 * float(np.sum(springs * closing**2))
 
     @functools.cached_property
-    def _omega_squares(self) -> np.ndarray:
+    def squares(self) -> np.ndarray:
+        """Omega^2 (m,) [rad2/s2]."""
         return self.modes.omega**2
+
+    @functools.cached_property
+    def periods(self) -> np.ndarray:
+        """1 / Omega (m,) [s/rad], zero of rigid-body modes."""
+        omega = self.modes.omega
+        return np.divide(1.0, omega, out=np.zeros_like(omega), where=omega > 0)
+
+    @functools.cached_property
+    def compliance(self) -> np.ndarray:
+        """Omega^-2 (e,) [s2/rad2] of the elastic modes."""
+        return self.modes.omega[self.modes.rigid :] ** -2.0
 
     def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
         """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""
@@ -192,6 +220,22 @@ class ModalBase(Shown):
             return self.damping
         directions = self.directions[:, viscous]
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
+
+    def damped(self, vectors: np.ndarray, closed: Sequence[int]) -> np.ndarray:
+        """C_l v (m, k) of vectors (m, k), without the matrix."""
+        own = self._own_damping
+        found = self.damping @ vectors if own is None else own[:, None] * vectors
+        viscous = [i for i in closed if self.dampings[i]]
+        if viscous:
+            directions = self.directions[:, viscous]
+            found += (directions * self.dampings[viscous]) @ (directions.T @ vectors)
+        return np.asarray(found)
+
+    @functools.cached_property
+    def _own_damping(self) -> np.ndarray | None:
+        """The structure's damping (m,) of every mode where it is modal, None where it couples them."""
+        own = np.diagonal(self.damping)
+        return own.copy() if np.count_nonzero(self.damping) == np.count_nonzero(own) else None
 
     def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
         """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""

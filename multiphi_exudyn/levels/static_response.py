@@ -7,6 +7,9 @@ P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body c
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
@@ -23,50 +26,67 @@ def static_response(
     """Forces (d,) along closed directions and configuration y (m,) at rest, motion nobody resists left out."""
     turned, mixing = closed_directions.orthogonal
     forces, configuration = _response(base, turned, load)
-    forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
+    if turned is not closed_directions:
+        forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
     return forces, configuration
 
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``rest`` where the directions of rigid contacts are orthogonal."""
-    elastic, free = slice(base.modes.rigid, None), slice(base.modes.rigid)
-    compliance = base.modes.omega[elastic] ** -2.0
-    touching = closed_directions.vectors[elastic]
+    """``static_response`` where the directions of rigid contacts are orthogonal."""
+    elastic, free, compliance = slice(base.modes.rigid, None), slice(base.modes.rigid), base.compliance
+    touching, offsets = closed_directions.vectors[elastic], closed_directions.offsets
     sprung = closed_directions.stiffness != 0  # the others push with G, whatever y is
-    own = np.where(sprung, 1 / np.where(sprung, closed_directions.stiffness, 1.0), 1.0)
+    own = 1 / np.where(sprung, closed_directions.stiffness, 1.0)
     bent = touching.T @ (compliance[:, None] * touching)
-    carried = _range(closed_directions.resisting[free], INDEPENDENT * closed_directions.size)
+    carried = np.zeros((0, 0))
+    if base.modes.rigid:
+        carried = _range(closed_directions.resisting[free], INDEPENDENT * closed_directions.size)
     coupling = closed_directions.vectors[free].T @ carried
-    none = np.zeros((carried.shape[1],) * 2)
-    matrix = np.block([[sprung[:, None] * bent + np.diag(own), sprung[:, None] * coupling], [coupling.T, none]])
     sizes = _sizes(np.diagonal(bent) + sprung * np.abs(own), coupling)
-    pressed = -closed_directions.offsets - sprung * (touching.T @ (compliance * load[elastic]))
-    solution = _solved(matrix, np.concatenate([pressed, -carried.T @ load[free]]), sizes)
-    forces = solution[: len(own)]
+    solved = _solver(sprung[:, None] * bent + np.diag(own), sprung[:, None] * coupling, coupling, sizes)
+    pressed = -offsets - sprung * (touching.T @ (compliance * load[elastic]))
+    forces, moved = solved(pressed, -carried.T @ load[free])
     total = drop_round_off(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
-    configuration = np.concatenate([carried @ solution[len(own) :], compliance * total])
-    left = closed_directions.offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
-    further = _solved(matrix, np.concatenate([-left, np.zeros(len(none))]), sizes)  # what soft modes magnified
-    added = np.concatenate([carried @ further[len(own) :], compliance * (touching @ further[: len(own)])])
-    return forces + further[: len(own)], configuration + added
+    configuration = np.concatenate([carried @ moved, compliance * total])
+    left = offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
+    further, moved = solved(-left, np.zeros(len(moved)))  # what soft modes magnified
+    added = np.concatenate([carried @ moved, compliance * (touching @ further)])
+    return forces + further, configuration + added
+
+
+Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def _solver(flexibility: np.ndarray, above: np.ndarray, coupling: np.ndarray, sizes: np.ndarray) -> Solver:
+    """f (d,), z (k,) of [[flexibility, above], [coupling^T, 0]] (f, z) = (a, b) from a (d,) and b (k,).
+
+    Scaled by the sizes (d + k,) of the unknowns, and of the rows: pivots then do not hang on units. The smallest
+    solution where the matrix is singular: springs that cancel, under a load they allow.
+    """
+    d = len(flexibility)
+    matrix = np.zeros((d + above.shape[1],) * 2)
+    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = flexibility, above, coupling.T
+    matrix *= sizes
+    lengths = np.abs(matrix).max(axis=1, initial=0.0)
+    rows = 1 / np.where(lengths > 0, lengths, 1.0)
+    scaled = rows[:, None] * matrix
+
+    def solved(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        given = rows * np.concatenate([a, b])
+        try:
+            found = sizes * np.linalg.solve(scaled, given)
+        except np.linalg.LinAlgError:
+            found = sizes * np.linalg.lstsq(scaled, given, rcond=None)[0]
+        return found[:d], found[d:]
+
+    return solved
 
 
 def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
-    """Of the unknowns (d + k,), to which rows and columns are scaled: pivots then do not hang on units."""
+    """Of the unknowns (d + k,), to which rows and columns are scaled."""
     forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
     largest = float(np.max(np.abs(forces[:, None] * coupling), initial=0.0)) or 1.0
     return np.concatenate([forces, np.full(coupling.shape[1], 1 / largest)])
-
-
-def _solved(matrix: np.ndarray, given: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The solution, the smallest one where the matrix is singular: springs that cancel, under a load they allow."""
-    lengths = np.max(np.abs(matrix * sizes), axis=1, initial=0.0)
-    rows = 1 / np.where(lengths > 0, lengths, 1.0)
-    scaled, right = rows[:, None] * matrix * sizes, rows * given
-    try:
-        return np.asarray(sizes * np.linalg.solve(scaled, right))
-    except np.linalg.LinAlgError:
-        return np.asarray(sizes * np.linalg.lstsq(scaled, right, rcond=None)[0])
 
 
 def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:

@@ -21,6 +21,7 @@ import scipy.linalg
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import Chain, ModalResponse, uncoupled
+from multiphi_exudyn.mathematics.light_damping import lightly_damped
 from multiphi_exudyn.mathematics.motion_parts import Parts, parts_of
 
 __all__ = ["modal_response"]
@@ -37,8 +38,12 @@ def modal_response(squares: np.ndarray, damping: np.ndarray, coupling: np.ndarra
     scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
     off_diagonal = damping - np.diag(diagonal)
     apart = np.all(np.abs(off_diagonal) <= DIAGONAL * np.maximum(scale, np.max(scale, initial=0.0) * DIAGONAL))
-    if apart and (coupling is None or not np.any(coupling)):
-        return uncoupled(squares, diagonal)
+    if coupling is None or not np.any(coupling):
+        if apart:
+            return uncoupled(squares, diagonal)
+        found = lightly_damped(squares, damping)
+        if found is not None:
+            return found
     return _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
 
 

@@ -145,9 +145,12 @@ def _turn(seen: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def _first_moved(moved: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """First row that moves, by ``moved`` (k,) or in every column of (k, m), or else the one nearest to moving."""
+    moves = moved > MOVES * sizes
+    first = moves.argmax(axis=0)
+    if moves.any(axis=0).all():
+        return np.asarray(first)
     share = np.divide(moved, sizes, out=np.zeros_like(moved), where=sizes > 0)
-    moves = share > MOVES
-    return np.where(np.any(moves, axis=0), np.argmax(moves, axis=0), np.argmax(share, axis=0))
+    return np.where(moves.any(axis=0), first, share.argmax(axis=0))
 
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:
