@@ -3,107 +3,29 @@
 A structure (M, C, K, named points) and its contacts make levels, one for each set of closed contacts, each with its
 own modes and asymptotic configuration; transitions carry the motion from level to level.
 
+The public names stand in public.py. They are loaded when the first of them is asked for, so that what needs none of
+them, as the command line's help, starts at once.
+
 Every room imports only from those before it in this order, and so do the files of a room.
 
-Order: errors, version, display, files, mathematics, mechanics, levels, events, time, steady, exudyn_plugin, study,
-cli, __main__.
+Order: errors, version, display, files, mathematics, mechanics, levels, events, time, steady, public, exudyn_plugin,
+study, cli, __main__.
 """
 
-from multiphi_exudyn.errors import (
-    MultiPhiError,
-    MultiPhiTypeError,
-    MultiPhiValueError,
-    MultiPhiWarning,
-    NumericalFailure,
-)
-from multiphi_exudyn.events.state import Event
-from multiphi_exudyn.levels.level import Level, LevelOverride
-from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.assembly import Assembly, assemble
-from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import (
-    BaseMotion,
-    ConstantLoad,
-    FunctionLoad,
-    Gravity,
-    HarmonicLoad,
-    SampledLoad,
-    StopMotion,
-    SweepLoad,
-)
-from multiphi_exudyn.mechanics.matrix_files import read_structure
-from multiphi_exudyn.mechanics.modal_structure import ModalStructure, structure_from_modes
-from multiphi_exudyn.mechanics.section import Section
-from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
-from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
-from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
-from multiphi_exudyn.time.balance import Ledger
-from multiphi_exudyn.time.many import ManyRuns, simulate_many
-from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory
-from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.truncation import truncation_indicator
-from multiphi_exudyn.version import __version__
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Assembly",
-    "BaseMotion",
-    "Beam",
-    "Clamp",
-    "ConstantLoad",
-    "Equilibrium",
-    "Event",
-    "ForceLaw",
-    "FrequencyResponse",
-    "Friction",
-    "FunctionLoad",
-    "Gravity",
-    "Harmonic",
-    "HarmonicLoad",
-    "Ledger",
-    "Level",
-    "LevelOverride",
-    "LinearStructure",
-    "ManyRuns",
-    "ModalDamping",
-    "ModalStructure",
-    "MultiPhiError",
-    "MultiPhiModel",
-    "MultiPhiTypeError",
-    "MultiPhiValueError",
-    "MultiPhiWarning",
-    "NumericalFailure",
-    "PointMass",
-    "RayleighDamping",
-    "Sampled",
-    "SampledLoad",
-    "SavedTrajectory",
-    "Section",
-    "Smooth",
-    "SteadyState",
-    "StopMotion",
-    "Sweep",
-    "SweepLoad",
-    "Tolerance",
-    "Trajectory",
-    "UnilateralContact",
-    "UpTo",
-    "__version__",
-    "assemble",
-    "frequency_response",
-    "load_trajectory",
-    "planar_beam",
-    "read_structure",
-    "simulate",
-    "simulate_many",
-    "steady_state",
-    "structure_from_modes",
-    "truncation_indicator",
-]
+if TYPE_CHECKING:
+    from multiphi_exudyn.public import *  # noqa: F403  its __all__ says which
+else:
+
+    def __getattr__(name: str) -> Any:
+        """A public name, or a room, that is not loaded yet."""
+        import multiphi_exudyn.public as public
+
+        globals().update({each: getattr(public, each) for each in public.__all__}, __all__=public.__all__)
+        if name not in globals():
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return globals()[name]
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__getattr__("__all__")})

@@ -20,8 +20,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
-from threadpoolctl import threadpool_limits
-
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.version import __version__
 
@@ -39,11 +37,12 @@ OK, FAILED, BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 141
 def command() -> NoReturn:
     """Entry of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
 
-    More threads cost the small matrices of a modal model more than they give. A pipe that its reader has closed, as
-    in ``multiphi-exudyn scenes | head -1``, ends the command quietly.
+    More threads cost the small matrices of a modal model more than they give. BLAS reads the number when it is loaded,
+    by the command that runs. A pipe that its reader has closed, as in ``multiphi-exudyn scenes | head -1``, ends the
+    command quietly.
     """
     if not any(name in os.environ for name in THREAD_SETTINGS):
-        threadpool_limits(1)
+        os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
     try:
         code = main()
         sys.stdout.flush()

@@ -1,6 +1,7 @@
 """The command line: exit codes, one line for bad input, files that are whole or not there."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -11,7 +12,7 @@ from small_scene import BEAM, changed, write
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.cli import compare_command
-from multiphi_exudyn.cli.main import parser
+from multiphi_exudyn.cli.main import THREAD_SETTINGS, parser
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.scene.scenes import shipped_scenes
@@ -193,15 +194,31 @@ def installed(*arguments, **options):
     )
 
 
-def test_help_loads_no_study_no_pictures_and_not_exudyn():
+def test_help_and_version_load_nothing_that_a_run_needs():
+    commands = [line.split()[0] for line in parser().format_help().splitlines() if line.startswith("    ")]
+    assert "compare" in commands
     code = (
         "import sys; from multiphi_exudyn.cli import main\n"
-        "try: main(['--help'])\n"
-        "except SystemExit: pass\n"
-        "print(sorted({'matplotlib', 'exudyn', 'pydantic', 'jinja2', 'tqdm', 'pandas'} & set(sys.modules)))"
+        f"for asked in (['--help'], ['--version'], *([name, '--help'] for name in {commands})):\n"
+        "    try: main(asked)\n"
+        "    except SystemExit: pass\n"
+        "print(sorted({'numpy', 'scipy', 'matplotlib', 'exudyn', 'pydantic', 'jinja2', 'tqdm'} & set(sys.modules)))"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.splitlines()[-1] == "[]"
+
+
+def test_the_command_gives_blas_one_thread_unless_the_user_has_set_the_number():
+    code = (
+        "import sys; from multiphi_exudyn.cli import command; sys.argv = ['multiphi-exudyn', 'scenes']\n"
+        "try: command()\n"
+        "except SystemExit: pass\n"
+        "import numpy, threadpoolctl; print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+    )
+    free = {name: value for name, value in os.environ.items() if name not in THREAD_SETTINGS}
+    for given, found in ((free, "{1}"), (free | {"OMP_NUM_THREADS": "2"}, "{2}")):
+        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=given)
+        assert told.stdout.splitlines()[-1] == found
 
 
 def test_version_and_module_entry():

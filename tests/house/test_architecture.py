@@ -39,7 +39,10 @@ WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compilation",
     "multiphi_exudyn.mathematics.machine_code",
 )
-COMMANDS = "multiphi_exudyn.cli.main"  # loads a command's own module when the command is run
+LATE = (  # load what they name when it is asked for: a command's own module, the public names
+    "multiphi_exudyn.cli.main",
+    "multiphi_exudyn",
+)
 
 
 def sources() -> list[Path]:
@@ -165,7 +168,7 @@ def test_a_heavy_package_is_imported_in_its_own_room_only(package):
         assert package not in names or inside, f"{path} imports {package}"
 
 
-@pytest.mark.parametrize("module", [name for name in NAMES if name != COMMANDS])
+@pytest.mark.parametrize("module", [name for name in NAMES if name not in LATE])
 def test_nothing_light_is_imported_inside_a_function(module):
     for function in ast.walk(tree(NAMES[module])):
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
@@ -174,8 +177,35 @@ def test_nothing_light_is_imported_inside_a_function(module):
             assert not light, f"{function.name} imports {light}"
 
 
-def test_importing_the_package_loads_neither_exudyn_nor_matplotlib_nor_numba():
-    heavy = "{'exudyn', 'matplotlib', 'numba', 'pandas', 'pydantic', 'tqdm'}"
-    code = f"import sys, multiphi_exudyn; print(sorted({heavy} & set(sys.modules)))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+HEAVY_FOR_A_USER = {"exudyn", "matplotlib", "numba", "pandas", "pydantic", "tqdm"}
+
+
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import multiphi_exudyn", HEAVY_FOR_A_USER | {"numpy", "scipy"}),
+        ("import multiphi_exudyn as mp; mp.simulate", HEAVY_FOR_A_USER),
+        ("from multiphi_exudyn import *; simulate", HEAVY_FOR_A_USER),
+    ],
+)
+def test_importing_the_package_loads_nothing_heavy(code, heavy):
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys; {code}; print(sorted({heavy} & set(sys.modules)))"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
     assert found.stdout.strip() == "[]"
+
+
+def test_the_package_shows_its_public_names_and_its_rooms_and_no_others():
+    import multiphi_exudyn as mp
+    from multiphi_exudyn import public
+
+    assert set(public.__all__) <= set(dir(mp))
+    assert mp.__all__ == public.__all__
+    assert all(getattr(mp, name) is getattr(public, name) for name in public.__all__)
+    assert mp.mechanics.beam.planar_beam is mp.planar_beam
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = mp.simulat
