@@ -34,8 +34,8 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         if isinstance(element, Friction) and element.rigid:
             limits[:, i] = element.limit, element.most
         if isinstance(element, UnilateralContact):
-            given = rubs if element.rigid else limits if math.isinf(element.tangential_stiffness) else np.zeros((2, c))
-            given[:, i] = element.friction, element.most
+            table = rubs if element.rigid else limits if math.isinf(element.tangential_stiffness) else np.zeros((2, c))
+            table[:, i] = element.friction, element.most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
     given = {
