@@ -98,7 +98,8 @@ JUDGED = 211  # whether levels leave modes out, so that defects are added up
 # states, as records in the run record
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
 GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
-LIMITS, STATIC_LIMITS, TOGETHER = 200, 201, 202  # of rigid friction, zero of others; whether it has been decided
+LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction, mu of contacts that give way and rub without a spring, else zero
+TOGETHER = 202  # whether these have been decided together
 FRICTIONS, STATIC_FRICTIONS = 212, 213  # of rigid contacts, zero of others
 PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; the state in which a contact closes
 RUN_INTS = 216

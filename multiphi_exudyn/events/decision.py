@@ -55,13 +55,14 @@ bases of two levels need not agree, so the law says what happens then; each sent
    struck again at once. A bounce too low to be seen is the last: it takes as long as all that would follow, and where
    it lands e is zero.
    -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
-12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together: their forces within
-   their limits, static ones until they slip, are complementary to their accelerations. Of those that then fall from
-   their static limits the ones that turn fall first: others may bear less after it, and stick on. What that leaves to
-   the next derivative, and to truncation, each decides alone. Of redundant ones an independent set sticks; the others
-   push with their limit, as if they slipped, and take over when they are needed: the motion is the same. So do those
-   along a closed rigid contact. One that would be pulled beside what sticks opens, and all is decided once more without
-   it. None bears an impulse, nor does the friction of a contact that gives way.
+12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together, those at contacts that
+   give way with their mu N of the instant: their forces within their limits, static ones until they slip, are
+   complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:
+   others may bear less after it, and stick on. What that leaves to the next derivative, and to truncation, each decides
+   alone. Of redundant ones an independent set sticks; the others push with their limit, as if they slipped, and take
+   over when they are needed: the motion is the same. So do those along a closed rigid contact. One that would be pulled
+   beside what sticks opens, and all is decided once more without it. None bears an impulse, nor does the friction of a
+   contact that gives way.
    -> sticking.stick_together, sticking.decide_at_rest, sticking.choose, sticking.thin_out_idle, sticking.let_go,
    independence.thin_out, independence.follows, striking.slide_on, changes.bears_nothing
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
@@ -31,8 +33,9 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     for i, element in enumerate(model.contacts):
         if isinstance(element, Friction) and element.rigid:
             limits[:, i] = element.limit, element.most
-        if isinstance(element, UnilateralContact) and element.rigid:
-            rubs[:, i] = element.friction, element.most
+        if isinstance(element, UnilateralContact):
+            table = rubs if element.rigid else limits if math.isinf(element.tangential_stiffness) else np.zeros((2, c))
+            table[:, i] = element.friction, element.most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
     given = {

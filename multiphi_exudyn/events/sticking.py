@@ -3,7 +3,8 @@
     h.x'' = A eta'' = A eta''_0 + A A^T z,   -limit <= f <= limit complementary to h.x'',   f = f_0 + z
 
 f is the force along +h, f_0 that of slip, eta''_0 the acceleration in the level in which all of them slip: those that
-stick or turn are at rest relative to their counter-surface. f = -limit: slip+, f = limit: slip-, between: stick.
+stick or turn are at rest relative to their counter-surface. f = -limit: slip+, f = limit: slip-, between: stick. The
+limit of a contact that gives way is mu N, a number at an instant: N goes with places and speeds alone.
 """
 
 from __future__ import annotations
@@ -16,11 +17,13 @@ from multiphi_exudyn.events.arrays import (
     CAUSE,
     CHANGE,
     CHANNELS,
+    COMPLIANT,
     ELEMENTS,
     ENTERED_STATE,
     EXIT_INTS,
     FAILED,
     FURTHER,
+    HELD_LINKS,
     HIGHEST,
     KEY,
     KINDS,
@@ -31,19 +34,24 @@ from multiphi_exudyn.events.arrays import (
     MODES,
     OK,
     OPEN,
+    PLACE,
     RATIOS,
     RESTING_LIST,
     RIGID,
+    ROW,
     ROWS,
     SIGNAL,
+    SLIDING,
     SLIP_BACKWARD,
     SLIP_FORWARD,
     SMALL_PROBLEM,
     SPEED,
     STATES,
     STATIC_LIMITS,
-    STICK,
+    STICKS,
+    STIFFNESSES,
     TOGETHER,
+    TOUCHING,
     UNION,
     UNSETTLED,
     VALUE_SIZES,
@@ -111,7 +119,7 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
         ints[key + i] = ints[wishes + i]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
-        ints[key + i] = SLIP_FORWARD if ints[states + i] == STICK else ints[states + i]
+        ints[key + i] = max(ints[states + i], ints[ints[STICKS] + i] + SLIP_FORWARD)
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
@@ -147,7 +155,7 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
     level, v, problem = ints[ENTERED_STATE + LEVEL], ints[ENTERED_STATE + SPEED], ints[SMALL_PROBLEM]
     r = ints[level + MODES]
     n = r + ints[CHANNELS]
-    fill_rows(ints, numbers, level, ints[RESTING_LIST], count, 0)
+    fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
     for k in range(count):
         row, terms = ints[ROWS] + k * n, 0.0
         for j in range(n):
@@ -181,16 +189,21 @@ def pose_rows(ints: Ints, count: int, r: int, n: int) -> None:
 
 @compiled
 def list_at_rest(ints: Ints, numbers: Numbers, asking: int) -> int:
-    """How many rigid friction elements stick, or ask, or have no speed, where one asks; which: the resting list."""
+    """How many rigid friction elements stick, or ask, or have no speed, where one asks; which: the resting list.
+
+    Their links are those that touch.
+    """
     states, count, asks = ints[ints[WORKED + LEVEL] + STATES], 0, 0
     for i in range(ints[ELEMENTS]):
-        if numbers[ints[LIMITS] + i] > 0.0:
+        asked = ints[asking + i]
+        if numbers[ints[LIMITS] + i] > 0.0 and pressure(ints, numbers, i) > 0.0:
             signal = first_exit(ints, ints[WORKED + LEVEL], i) + SIGNAL
-            rests = ints[states + i] == STICK or ints[asking + i] != NOBODY
+            rests = ints[states + i] == ints[ints[STICKS] + i] or asked != NOBODY
             if rests or row_sign(ints, numbers, WORKED, signal, 0.0) == 0:
                 ints[ints[RESTING_LIST] + count] = i
+                ints[ints[TOUCHING] + count] = ints[ints[HELD_LINKS] + i]
                 count += 1
-                asks += 1 if ints[asking + i] != NOBODY else 0
+                asks += 1 if asked != NOBODY else 0
     return count if asks > 0 else 0
 
 
@@ -201,15 +214,15 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
     n = ints[level + MODES] + ints[CHANNELS]
     accelerate(ints, numbers, ENTERED_STATE, ints[ACCELERATION])
     acceleration_sizes(ints, numbers, ENTERED_STATE, ints[ACCELERATION_TERMS])
-    fill_rows(ints, numbers, level, ints[RESTING_LIST], count, 0)
+    fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
     for k in range(count):
         i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
-        limit = numbers[ints[LIMITS] + i]
-        most = numbers[ints[STATIC_LIMITS] + i]
-        slipped = limit if ints[ints[KEY] + i] == SLIP_FORWARD else -limit
+        presses, forward = pressure(ints, numbers, i), ints[ints[STICKS] + i] + SLIP_FORWARD
+        limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
+        slipped = limit if ints[ints[KEY] + i] == forward else -limit
         low, high = slipped - most, slipped + most
         if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
-            low = slipped - limit if ints[asking + i] == SLIP_FORWARD else slipped + limit
+            low = slipped - limit if ints[asking + i] == forward else slipped + limit
             high = low
         numbers[ints[LOWEST] + k] = low
         numbers[ints[HIGHEST] + k] = high
@@ -221,12 +234,29 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
 
 
 @compiled
+def pressure(ints: Ints, numbers: Numbers, element: int) -> float:
+    """What the limits of friction are to be multiplied by in WORKED: N of a contact, zero where it is round-off."""
+    level, x, v = ints[WORKED + LEVEL], ints[WORKED + PLACE], ints[WORKED + SPEED]
+    if ints[ints[KINDS] + element] == SLIDING:
+        return 1.0
+    if ints[ints[level + STATES] + element] == OPEN:
+        return 0.0
+    signal, n = opening(ints, level, element) + SIGNAL, ints[level + MODES] + ints[CHANNELS]
+    if row_sign(ints, numbers, WORKED, signal, 0.0) <= 0:
+        return 0.0
+    row = ints[signal + ROW]
+    value = product(numbers, row, x, n) + product(numbers, row + n, v, n) + numbers[row + 2 * n]
+    return value * numbers[ints[STIFFNESSES] + element] if ints[ints[KINDS] + element] == COMPLIANT else value
+
+
+@compiled
 def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
     """1 where an element that sticks asks to slip, with what it bears at its limit, and not beyond it."""
     level = ints[WORKED + LEVEL]
-    if ints[ints[level + STATES] + element] != STICK or asked == NOBODY:
+    sticks = ints[ints[STICKS] + element]
+    if ints[ints[level + STATES] + element] != sticks or asked == NOBODY:
         return 0
-    exit_ = first_exit(ints, level, element) + (asked - SLIP_FORWARD) * EXIT_INTS
+    exit_ = first_exit(ints, level, element) + (asked - sticks - SLIP_FORWARD) * EXIT_INTS
     return 1 if row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0 else 0
 
 
@@ -240,17 +270,18 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
     for stuck in range(2):
         for k in range(count):
             i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
-            limit, most = numbers[ints[LIMITS] + i], numbers[ints[STATIC_LIMITS] + i]
-            slipped = limit if ints[ints[KEY] + i] == SLIP_FORWARD else -limit
-            side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], STICK
+            presses, sticks = pressure(ints, numbers, i), ints[ints[STICKS] + i]
+            limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
+            slipped = limit if ints[ints[KEY] + i] == sticks + SLIP_FORWARD else -limit
+            side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks
             if numbers[low] == numbers[high]:
-                entered = SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
+                entered += SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
             elif side != BETWEEN and side != WAITING:
                 force = numbers[ints[FURTHER] + k] - slipped
-                entered = SLIP_BACKWARD if side == ABOVE or force > 0.0 else SLIP_FORWARD
-                now = (ints[states + i] == STICK) == (stuck == 1)
+                entered += SLIP_BACKWARD if side == ABOVE or force > 0.0 else SLIP_FORWARD
+                now = (ints[states + i] == sticks) == (stuck == 1)
                 if now and most > limit and abs(force) > limit:
-                    numbers[low] = slipped - limit if entered == SLIP_FORWARD else slipped + limit
+                    numbers[low] = slipped - limit if entered == sticks + SLIP_FORWARD else slipped + limit
                     numbers[high] = numbers[low]
                     falling += 1
             ints[ints[WISHES] + i] = entered

@@ -219,6 +219,8 @@ def simultaneous(
 ) -> int:
     """How many signals reach zero, falling, at the first descent of ``found``, itself among them; which, as 1, in ints.
 
+    One whose slope is round-off does not fall: it may be zero for as long as another one holds it there.
+
     scratch_wave: p waves. result: where (count,) ints begin.
     """
     p, powers, rates, scales = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES]
@@ -226,16 +228,18 @@ def simultaneous(
     instant = INSTANT / numbers[scales + 1] if numbers[scales + 1] > 0.0 else 0.0
     total = 0
     for s in range(count):
-        value, slope, terms = numbers[constants + s], 0.0, abs(numbers[constants + s])
+        value, slope, terms, steepest = numbers[constants + s], 0.0, abs(numbers[constants + s]), 0.0
         for j in range(p):
             a, phi = waves[signals + s * p + j], waves[scratch_wave + j]
             value += (a * phi).real
             slope += (a * phi * waves[rates + j]).real
-            terms += magnitude(waves, signals + s * p + j) * magnitude(waves, scratch_wave + j)
+            size = magnitude(waves, signals + s * p + j) * magnitude(waves, scratch_wave + j)
+            terms += size
+            steepest += size * magnitude(waves, rates + j)
             if ints[powers + j] > 0:
                 slope += ints[powers + j] / numbers[scales] * (a * waves[scratch_wave + j - 1]).real
         soon = max(ZERO * terms, -slope * instant)
-        falls = terms > 0.0 and slope <= 0.0 and value <= min(SIMULTANEOUS * terms, soon)
+        falls = terms > 0.0 and slope < -ZERO * steepest and value <= min(SIMULTANEOUS * terms, soon)
         ints[result + s] = 1 if s == found or falls else 0
         total += ints[result + s]
     return total

@@ -390,3 +390,44 @@ class TestArguments:
         plain, zero = (mp.UnilateralContact("c", "y", 0.1, 5.0, **k) for k in ({}, {"tangential": "x"}))
         assert plain.states == zero.states
         assert not zero.further
+
+
+def pads(rows, limits, static=1.0, element="block", normal=(100.0, 3.0)):
+    """A unit mass (n,) on pads of constant pressure, each a block, or a contact beside a degree of freedom of its own.
+
+    Structure, elements and the start that presses.
+    """
+    rows, n, count = np.array(rows, float), len(rows[0]), len(rows)
+    stiffness, damping = normal
+    structure = mp.LinearStructure(np.eye(n + count), np.diag([1.0] * n + [stiffness] * count))
+    start, elements = np.r_[np.zeros(n), np.full(count, 0.1)], []
+    for i, (row, limit) in enumerate(zip(rows, limits, strict=True)):
+        along, across = np.r_[row, np.zeros(count)], np.eye(n + count)[n + i]
+        if element == "block":
+            elements.append(mp.Friction(f"f{i}", along, limit, static * limit))
+            continue
+        mu, given = limit / (0.1 * stiffness), {"damping": damping if element == "viscous" else 0.0}
+        given |= {"friction": mu, "static_friction": static * mu, "tangential": along}
+        elements.append(mp.UnilateralContact(f"f{i}", across, -0.2, stiffness, **given))
+    return structure, elements, start
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_contacts_of_constant_pressure_are_blocks(seed):
+    """Static limits that several reach at once, which of them slip and which turn: as blocks of the limits mu N."""
+    random = np.random.default_rng(seed)
+    rows, limits, static = random.normal(size=(3, 3)), random.uniform(0.2, 1.0, 3), 1.5
+    pulls, speed, t = 2 * random.normal(size=(2, 3)), random.normal(size=3), np.linspace(0, 6, 31)
+    runs = []
+    for element in ("block", "compliant", "viscous"):
+        structure, elements, pressed = pads(rows, limits, static, element)
+        loads = [
+            mp.ConstantLoad(np.r_[pulls[0], np.zeros(3)], 1.0),
+            mp.HarmonicLoad(np.r_[pulls[1], np.zeros(3)], 1.0, 0.4),
+        ]
+        model = mp.MultiPhiModel(structure, elements, modes="all")
+        runs.append(mp.simulate(model, 6.0, pressed, np.r_[speed, np.zeros(3)], loads))
+    assert [run.status for run in runs] == ["ok"] * 3
+    for run in runs[1:]:
+        assert_allclose(run.displacement(t)[:3], runs[0].displacement(t)[:3], atol=1e-9)
+        assert [e.kind for e in run.events] == [e.kind for e in runs[0].events]

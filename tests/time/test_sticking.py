@@ -187,3 +187,28 @@ def test_redundant_ones_let_go_where_none_can_take_over(given):
     assert [run.status for run in runs] == ["ok"] * 2
     assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-13)
     assert runs[1].ledger.residual == pytest.approx(0.0, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "force", "hertz", "limits", "spring", "speed"),
+    [
+        (49.49, 3.71, 0.34, (0.31, 0.08), 61.3, -0.34),
+        (51.9, 3.8, 0.29, (0.47, 0.14), 235.57, -0.06),
+        (73.41, 3.55, 0.36, (0.47, 0.17), 127.07, 0.16),
+        (43.15, 3.51, 0.28, (0.33, 0.12), 51.67, 0.36),
+    ],
+)
+def test_a_spring_held_at_its_limit_does_not_ask_with_the_block_that_holds_it(
+    stiffness, force, hertz, limits, spring, speed
+):
+    """What it bears is zero below its limit for as long as the block sticks; a row turned round changes nothing."""
+    runs = []
+    for sign in (1.0, -1.0):
+        structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
+        block, jenkins = mp.Friction("b", "m", limits[0]), mp.Friction("j", {"m": sign}, limits[1], stiffness=spring)
+        model, load = mp.MultiPhiModel(structure, [block, jenkins], modes="all"), mp.HarmonicLoad("m", force, hertz)
+        runs.append(mp.simulate(model, 8.0, velocity=[speed], loads=[load]))
+    t = np.linspace(0, 8, 81)
+    assert [run.status for run in runs] == ["ok", "ok"]
+    assert [(e.contact, e.kind) for e in runs[0].events] == [(e.contact, e.kind) for e in runs[1].events]
+    assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-12)
