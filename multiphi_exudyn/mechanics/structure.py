@@ -295,7 +295,7 @@ def _vector(name: str, given: Any, n: int) -> np.ndarray:
     vector = real_array(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
-    if not np.all(np.isfinite(vector)):
+    if not np.isfinite(vector).all():
         raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
     return vector
 

@@ -16,7 +16,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
-from multiphi_exudyn.events.state import Loss, State
+from multiphi_exudyn.events.state import Loss, Phase, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.time.balance import Statistics
@@ -176,7 +176,7 @@ class Motion:
 
     def _check_record(self) -> None:
         """End the run before its record takes the machine."""
-        taken, segments = self.record.bytes, self.record.parts["rows"].count
+        taken, segments = self.record.bytes, self.record.count
         if taken > RECORD_BYTES:
             self._leave()
             raise NumericalFailure(
@@ -212,11 +212,15 @@ class Motion:
 
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
+        self._keep(self.arrays.numbers[: a.RUN_NUMBERS].tolist())
+
+    def _keep(self, given: list[float]) -> None:
+        """What the first numbers of the arrays say."""
         ints, numbers = self.arrays.ints, self.arrays.numbers
         decisions, start = int(ints[a.DECISIONS]), int(ints[a.RING])
-        ring = numbers[start : start + 2 * min(decisions, self._window + 1)].tolist()
-        last, age, *sums = (float(numbers[place]) for place in (a.LAST_DECISION, a.AGE, *SUMS))
-        self._kept = _Kept(last, decisions, ring, int(ints[a.PIECE]), age, *sums)
+        ring = numbers[start : start + 2 * min(decisions, self._window + 1)].tolist() if decisions else []
+        sums = (given[place] for place in SUMS)
+        self._kept = _Kept(given[a.LAST_DECISION], decisions, ring, int(ints[a.PIECE]), given[a.AGE], *sums)
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
@@ -229,7 +233,8 @@ class Motion:
         for slot in (a.TRANSITIONS, a.GIVEN_UP):
             arrays.ints[slot] = 0
         numbers = arrays.numbers
-        numbers[ring : ring + len(kept.ring)] = kept.ring
+        if kept.ring:
+            numbers[ring : ring + len(kept.ring)] = kept.ring
         numbers[a.TIME], numbers[a.LAST_DECISION], numbers[a.WORK] = self.time, kept.last_decision, kept.work
         numbers[a.DEFECTS], numbers[a.TRUNCATED] = kept.defects, kept.truncated
         numbers[a.ALLOWED], numbers[int(arrays.ints[a.FOUND]) + 1] = self._allowed, 0.0
@@ -245,11 +250,13 @@ class Motion:
         """The state that the loop has come to, and what it has recorded."""
         ints, numbers = self.arrays.ints, self.arrays.numbers
         self.record.take()
-        self.give_up_arrays()
-        self.time = float(numbers[a.TIME])
+        given = numbers[: a.RUN_NUMBERS].tolist()
+        self._keep(given)
+        self.time = given[a.TIME]
         if not ints[a.STARTING]:
             if self._starting:
-                self.start_loss = Loss(*numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
+                lost = given[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES]
+                self.start_loss = Loss(*lost) if any(lost) else Loss()
             self._state, self._starting = self._state_reached(), False
         samples = int(ints[a.FOUND]) + 1
         self._evaluations += int(numbers[samples])
@@ -258,11 +265,15 @@ class Motion:
 
     def _state_reached(self) -> State:
         ints, numbers = self.arrays.ints, self.arrays.numbers
-        record = int(ints[a.CURRENT + a.LEVEL])
+        record, x, v = ints[a.CURRENT + a.LEVEL : a.CURRENT + a.SPEED + 1].tolist()
         level = self.arrays.loaded[int(ints[record + a.NUMBER])]
-        n, phases = level.level.modes, ints[ints[a.CURRENT + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-        x, v = (numbers[ints[a.CURRENT + part] :][:n].copy() for part in (a.PLACE, a.SPEED))
-        return State(level, x, v, tuple(PHASES[k] for k in phases.tolist()))
+        if ints[a.CURRENT + a.SETTLED]:
+            phases = (Phase.ARMED,) * int(ints[record + a.EXIT_COUNT])
+        else:
+            standing = ints[ints[a.CURRENT + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
+            phases = tuple(PHASES[k] for k in standing.tolist())
+        n = level.level.modes
+        return State(level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases)
 
     def failure(self) -> Exception:
         """What has stopped the loop."""

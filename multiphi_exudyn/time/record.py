@@ -39,6 +39,16 @@ EMPTY = {
     "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
 }
 
+TAKEN = (  # where in the loop's arrays they begin, and how many rows there are
+    ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT),
+    ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT),
+    ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT),
+    ("phases", a.PHASE_INTS, a.PHASE_COUNT),
+    ("kinds", a.EVENT_INTS, a.EVENT_COUNT),
+    ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT),
+)
+COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
+
 STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 T = TypeVar("T")
@@ -76,15 +86,32 @@ class Made(Sequence[T], Generic[T]):
 
 
 class Recorded(Made[Segment], Segments):
-    """The segments of a record."""
+    """The segments of a record, which is looked into when somebody asks."""
 
     def __init__(self, record: Record, defects: float, truncated: float) -> None:
-        spans = record.spans
-        super().__init__(record.segment, len(spans), {})
-        self._record = record
-        self.starts, self.ends = spans[:, 0], spans[:, 1]
-        self.numbers, self.levels, self.arrays = record.rows[:, 0], record.levels, record.arrays
+        super().__init__(record.segment, record.count, {})
+        self._record, self.arrays = record, record.arrays
         self.defects, self.truncated = defects, truncated
+
+    @functools.cached_property
+    def starts(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.spans[: self._count, 0]
+
+    @functools.cached_property
+    def ends(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.spans[: self._count, 1]
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.rows[: self._count, 0]
+
+    @functools.cached_property
+    def levels(self) -> Sequence[LoadedLevel]:
+        """See ``Segments``."""
+        return self._record.levels
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
@@ -125,10 +152,19 @@ def _joined(name: str) -> property:
     return property(lambda record: record.parts[name].whole)
 
 
-def _part(ints: np.ndarray, slot: int, buffer: np.ndarray, count: int) -> np.ndarray:
-    """So many numbers that the loop has written, from where the slot says."""
-    start = int(ints[slot])
-    return buffer[start : start + count].copy()
+def _taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int]]) -> dict[str, np.ndarray]:
+    """Copies of those of the ``wanted`` of ``TAKEN`` that have rows; all of them are then empty in the arrays."""
+    ints, numbers, _ = arrays.buffers.all
+    slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
+    for name, slot, counted in wanted:
+        if slots[counted]:
+            empty, start = EMPTY[name], slots[slot]
+            width = empty.shape[-1] or 1
+            part = (numbers if empty.dtype == float else ints)[start : start + slots[counted] * width].copy()
+            parts[name] = part if empty.ndim == 1 else part.reshape(-1, width)
+    for counted in COUNTS:
+        ints[counted] = 0
+    return parts
 
 
 class Record:
@@ -144,53 +180,60 @@ class Record:
 
     def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
         self._contacts, self.arrays = contacts, arrays
+        self.count = 0  # of segments
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
-        self._armed: dict[int, tuple[Phase, ...]] = {}  # phases of a level while all its exits are armed
-        self.parts = {name: Growing(empty) for name, empty in EMPTY.items()}
+        self._parts: dict[str, Growing] = {}
+        self._last: dict[str, np.ndarray] | None = None  # taken, and not among the parts yet
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
     phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
 
     def take(self) -> None:
         """Take over what the loop has written."""
-        ints, numbers = self.arrays.ints, self.arrays.numbers
-        n = int(ints[a.SEGMENT_COUNT])
-        if not n:
-            self.take_events()
-            return
-        rows = _part(ints, a.SEGMENT_INTS, ints, n * a.SEGMENT_WIDTH).reshape(n, a.SEGMENT_WIDTH)
-        packed = rows[:, 0].tolist()
-        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
-        rows[:, 0] = [known[number] for number in packed]
-        rows[:, 2] += self.parts["kinds"].count
-        rows[:, 3] += self.parts["coordinates"].count
-        rows[rows[:, 4] >= 0, 4] += self.parts["phases"].count
-        spans = _part(ints, a.SEGMENT_NUMBERS, numbers, n * a.SEGMENT_WIDTH_NUMBERS)
-        self._add("rows", rows)
-        self._add("spans", spans.reshape(n, a.SEGMENT_WIDTH_NUMBERS))
-        self._add("coordinates", _part(ints, a.COORDINATE_NUMBERS, numbers, int(ints[a.COORDINATE_COUNT])))
-        self._add("phases", _part(ints, a.PHASE_INTS, ints, int(ints[a.PHASE_COUNT])))
-        self.take_events()
+        self._keep(_taken(self.arrays, TAKEN))
 
     def take_events(self) -> None:
         """Take over the events of what the loop has written, and forget the rest."""
-        ints, numbers, m = self.arrays.ints, self.arrays.numbers, int(self.arrays.ints[a.EVENT_COUNT])
-        if m:
-            self._add("kinds", _part(ints, a.EVENT_INTS, ints, m * a.EVENT_WIDTH).reshape(m, a.EVENT_WIDTH))
-            amounts = _part(ints, a.EVENT_NUMBERS, numbers, m * a.EVENT_WIDTH_NUMBERS)
-            self._add("amounts", amounts.reshape(m, a.EVENT_WIDTH_NUMBERS))
-        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
-            ints[slot] = 0
+        self._keep(_taken(self.arrays, TAKEN[-2:]))
+
+    def _keep(self, taken: dict[str, np.ndarray]) -> None:
+        if self._last is not None:
+            self._add(self._last)
+        self._last, rows = taken, taken.get("rows", EMPTY["rows"])
+        packed = rows[:, 0].tolist()
+        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
+        rows[:, 0] = [known[number] for number in packed]
+        self.count += len(rows)
+        vars(self).pop("places", None)
 
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        return sum(part.bytes for part in self.parts.values())
+        last = 0 if self._last is None else sum(part.nbytes for part in self._last.values())
+        return last + sum(part.bytes for part in self._parts.values())
 
-    def _add(self, name: str, part: np.ndarray) -> None:
-        self.parts[name].add(part)
-        vars(self).pop("places", None)
+    @property
+    def parts(self) -> dict[str, Growing]:
+        """The arrays, each in the parts in which they were taken."""
+        if self._last is not None or not self._parts:
+            taken, self._last = self._last or {}, None
+            self._add(taken)
+        return self._parts
+
+    @property
+    def eventless(self) -> bool:
+        """Whether nothing has happened, as far as one sees without looking into it."""
+        return not self._parts and (self._last is None or "kinds" not in self._last)
+
+    def _add(self, taken: dict[str, np.ndarray]) -> None:
+        self._parts = self._parts or {name: Growing(empty) for name, empty in EMPTY.items()}
+        parts, rows = self._parts, taken.get("rows", EMPTY["rows"])
+        rows[:, 2] += parts["kinds"].count
+        rows[:, 3] += parts["coordinates"].count
+        rows[rows[:, 4] >= 0, 4] += parts["phases"].count
+        for name, part in taken.items():
+            parts[name].add(part)
 
     def _number(self, level: LoadedLevel) -> int:
         """The number of a level in this record; the arrays may have packed it twice."""
@@ -202,7 +245,7 @@ class Record:
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return np.flatnonzero(self.kinds[:, 1] != a.SHARED) if self.parts["kinds"].count else EMPTY["phases"]
+        return EMPTY["phases"] if self.eventless else np.flatnonzero(self.kinds[:, 1] != a.SHARED)
 
     @functools.cached_property
     def _told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
@@ -316,10 +359,8 @@ class Record:
 
     def standing(self, i: int) -> tuple[Phase, ...]:
         """The phases at the start of the i-th segment."""
-        number, start = int(self.rows[i, 0]), self.rows[i, 4]
-        if number not in self._armed:
-            self._armed[number] = (Phase.ARMED,) * len(exits_of(self.levels[number]))
-        armed = self._armed[number]
+        level, start = self.level(i), self.rows[i, 4]
+        armed = (Phase.ARMED,) * len(exits_of(level))
         return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:

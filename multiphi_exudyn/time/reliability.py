@@ -134,8 +134,8 @@ def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
     damping = model.structure.damping
     if not isinstance(damping, ModalDamping):
         return
-    listed, kept = damping.listed, model.level_at(()).modes
-    if damping.beyond is None and 0 < len(listed) < kept:
+    listed = damping.listed
+    if damping.beyond is None and 0 < len(listed) < (kept := model.level_at(()).modes):
         yield (
             f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
             f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"

@@ -112,18 +112,32 @@ class Segment(Shown):
 class Segments(Sequence[Segment], ABC):
     """The segments of a run, in order, and in arrays what many of them are asked for together.
 
-    starts, ends: (n,) [s]. numbers: (n,) of their levels in ``levels``, each of which is there once. defects: sum of
-    |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their signs [J]; nan
-    where the loop has not summed them.
+    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their
+    signs [J]; nan where the loop has not summed them.
     """
 
     defects = math.nan
     truncated = math.nan
 
-    starts: np.ndarray
-    ends: np.ndarray
-    numbers: np.ndarray
-    levels: Sequence[LoadedLevel]
+    @property
+    @abstractmethod
+    def starts(self) -> np.ndarray:
+        """When they begin (n,) [s]."""
+
+    @property
+    @abstractmethod
+    def ends(self) -> np.ndarray:
+        """When they end (n,) [s]."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> np.ndarray:
+        """The numbers (n,) of their levels in ``levels``."""
+
+    @property
+    @abstractmethod
+    def levels(self) -> Sequence[LoadedLevel]:
+        """The levels that were visited, each once."""
 
     @abstractmethod
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -154,13 +168,29 @@ class Listed(Segments):
 
     def __init__(self, segments: Sequence[Segment]) -> None:
         self._segments = segments
-        known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
+        self._known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
         for segment in segments:
-            known.setdefault(segment.level.states, (len(known), segment.level))
-        self.levels = [level for _, level in known.values()]
-        self.numbers = np.array([known[segment.level.states][0] for segment in segments], np.int64)
-        self.starts = np.array([segment.start for segment in segments])
-        self.ends = np.array([segment.end for segment in segments])
+            self._known.setdefault(segment.level.states, (len(self._known), segment.level))
+
+    @functools.cached_property
+    def levels(self) -> Sequence[LoadedLevel]:
+        """See ``Segments``."""
+        return [level for _, level in self._known.values()]
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([self._known[segment.level.states][0] for segment in self._segments], np.int64)
+
+    @functools.cached_property
+    def starts(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([segment.start for segment in self._segments])
+
+    @functools.cached_property
+    def ends(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([segment.end for segment in self._segments])
 
     def __len__(self) -> int:
         return len(self._segments)

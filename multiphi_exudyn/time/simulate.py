@@ -139,6 +139,8 @@ def _holding(model: MultiPhiModel, loads: Sequence[Load], start: Trajectory | Eq
     """The model whose base holds what the loads act on; a run that goes on keeps that of its start."""
     if isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
+    if isinstance(loads, tuple) and not loads:
+        return model
     return model.holding(patterns(model.structure, loads))
 
 
@@ -270,7 +272,7 @@ class _Scales:
     def near(self, terms: np.ndarray, y: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Gaps (c,) [m] below which a contact is in touch: by the terms (c,) of h.y, by where y' takes the modes."""
         moving = v * self.times
-        length = math.sqrt(float(y @ y)) + math.sqrt(float(moving @ moving))
+        length = math.sqrt(y @ y) + math.sqrt(moving @ moving)
         return np.asarray(TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching)
 
 
@@ -280,8 +282,10 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
     y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
     scales: _Scales = levels.starts.get_or_build(run.t_end, lambda: _Scales.of(levels, run.t_end))
     stops, directions = base.gaps - scales.moved, base.magnitudes[0]
-    gaps = (y @ base.directions + stops).tolist()
-    near = scales.near(np.abs(y) @ directions, y, v).tolist()
+    judged = y @ base.directions + stops, scales.near(np.abs(y) @ directions, y, v)
+    if not model.general and (judged[0] > judged[1]).all():
+        return Start(y, v, (), (), stops, (OPEN,) * len(model.contacts), np.zeros(0))
+    gaps, near = (judge.tolist() for judge in judged)
     rates, terms = v @ base.directions - scales.speeds, np.abs(v) @ directions + np.abs(scales.speeds)
     rates = drop_round_off(rates, terms)
     states = np.zeros(len(model.contacts), int)
