@@ -168,11 +168,11 @@ def refusal(build, given):
 
 
 @pytest.mark.parametrize("argument", ARRAYS)
-@pytest.mark.parametrize("spoiled", bad_arrays(np.eye(N)))
-def test_an_array_with_a_bad_value_anywhere_is_refused(argument, spoiled):
+def test_an_array_with_a_bad_value_anywhere_is_refused(argument):
     build, good = ARRAYS[argument]
     build(good)
-    refusal(build, bad_arrays(good)[spoiled])
+    for spoiled in bad_arrays(good).values():
+        refusal(build, spoiled)
 
 
 @pytest.mark.parametrize("kind", ["csr_array", "coo_matrix"])
@@ -184,16 +184,16 @@ def test_a_bad_value_in_a_sparse_matrix_is_refused(kind, value):
 
 
 @pytest.mark.parametrize("argument", NUMBERS)
-@pytest.mark.parametrize("given", NO_NUMBERS)
-def test_what_is_no_number_is_refused(argument, given):
-    if (argument, given) not in ALLOWED:
-        refusal(NUMBERS[argument], NO_NUMBERS[given])
+def test_what_is_no_number_is_refused(argument):
+    for name, given in NO_NUMBERS.items():
+        if (argument, name) not in ALLOWED:
+            refusal(NUMBERS[argument], given)
 
 
 @pytest.mark.parametrize("argument", POSITIVE)
-@pytest.mark.parametrize("value", [-1, -1e-300, -math.inf])
-def test_what_is_negative_is_refused(argument, value):
-    refusal(NUMBERS[argument], value)
+def test_what_is_negative_is_refused(argument):
+    for value in (-1, -1e-300, -math.inf):
+        refusal(NUMBERS[argument], value)
 
 
 @pytest.mark.parametrize(

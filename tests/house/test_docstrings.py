@@ -97,52 +97,37 @@ def examples(name: str) -> list[doctest.DocTest]:
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_it_begins_with_one_sentence_and_points_to_no_other_file(name):
-    text = inspect.getdoc(PUBLIC[name]) or ""
-    summary = text.partition("\n\n")[0]
+def test_a_docstring_is_complete(name):
+    """One sentence first, the sections of its kind, every parameter or field, and errors of this package alone."""
+    thing, found, text = PUBLIC[name], sections(PUBLIC[name]), inspect.getdoc(PUBLIC[name]) or ""
+    summary, of_results = text.partition("\n\n")[0], name.rpartition(".")[2] in RESULTS
     assert "\n" not in summary
     assert summary.endswith(".")
     assert not POINTER.search(text)
-
-
-@pytest.mark.parametrize("name", PUBLIC)
-def test_it_has_the_sections_of_its_kind(name):
-    thing, found = PUBLIC[name], sections(PUBLIC[name])
-    if is_error(thing):
-        needed = set()
-    elif name.rpartition(".")[2] in RESULTS:
-        needed = {"Attributes"}
-    else:
-        needed = {"Parameters", "Raises"} | (set() if isinstance(thing, type) else {"Returns"})
-    assert needed | {"Examples"} <= set(found)
-    assert all(text.strip() for text in found.values())
-
-
-@pytest.mark.parametrize("name", [name for name in PUBLIC if not is_error(PUBLIC[name])])
-def test_every_parameter_or_field_is_named(name):
-    thing, found = PUBLIC[name], sections(PUBLIC[name])
-    if name.rpartition(".")[2] in RESULTS:
+    assert needed_sections(thing, of_results) <= set(found)
+    assert all(content.strip() for content in found.values())
+    assert all(is_error(getattr(mp, error, None)) for error in named(found.get("Raises", "")))
+    if of_results:
         fields = {field.name for field in dataclasses.fields(thing) if not field.name.startswith("_")}
         assert fields <= set(named(found["Attributes"]))
-    else:
+    elif not is_error(thing):
         assert named(found["Parameters"]) == parameters(thing)
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_what_it_raises_is_an_error_of_this_package(name):
-    raised = named(sections(PUBLIC[name]).get("Raises", ""))
-    assert all(is_error(getattr(mp, error, None)) for error in raised)
+def needed_sections(thing: object, of_results: bool) -> set[str]:
+    """The headings of a docstring: of an error, of what is handed out, of a class, of a function."""
+    if is_error(thing):
+        return {"Examples"}
+    if of_results:
+        return {"Attributes", "Examples"}
+    return {"Parameters", "Raises", "Examples"} | (set() if isinstance(thing, type) else {"Returns"})
 
 
 @pytest.mark.parametrize("name", [name for name in PUBLIC if isinstance(PUBLIC[name], type)])
-def test_its_public_methods_say_what_they_give(name):
+def test_public_methods_say_what_they_give_and_all_their_parameters(name):
     texts = {member: inspect.getdoc(given) or "" for member, given in members(PUBLIC[name]).items()}
     assert [member for member, text in texts.items() if not text.partition("\n")[0].strip()] == []
     assert [member for member, text in texts.items() if POINTER.search(text)] == []
-
-
-@pytest.mark.parametrize("name", [name for name in PUBLIC if isinstance(PUBLIC[name], type)])
-def test_a_method_that_lists_its_parameters_lists_them_all(name):
     for member in members(PUBLIC[name]):
         method = getattr(PUBLIC[name], member)
         if "Parameters" in sections(method):

@@ -17,7 +17,7 @@ from sweep_functions import Unloadable, logged, many, odd_fails, square, sweep_l
 from multiphi_exudyn.study.sweep import Outcome, Row, Store, grid, open_executor, sweep
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-KILLS = [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
+FEW, MANY = [0, 0, 0, 1, 2], [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
 
 
 @pytest.fixture
@@ -242,11 +242,12 @@ def kill_at_a_random_moment(child, more, chance, log):
     os.kill(child, signal.SIGKILL)
 
 
-def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
+@pytest.mark.parametrize("kills", [pytest.param(FEW, id="5"), pytest.param(MANY, id="20", marks=pytest.mark.slow)])
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path, kills):
     path, log, chance = tmp_path / "runs.db", tmp_path / "log", random.Random(1)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with program("f.nursery(*json.loads(sys.argv[1]))", str(path), str(log), **pipes) as nursery:
-        for more in chance.sample(KILLS, len(KILLS)):
+        for more in chance.sample(kills, len(kills)):
             before, known = len(lines(log)), finished(path)
             print(chance.choice([1, 1, 2]), file=nursery.stdin, flush=True)
             kill_at_a_random_moment(int(nursery.stdout.readline()), more, chance, log)
