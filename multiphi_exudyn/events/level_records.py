@@ -10,7 +10,7 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exits import asked_state, exits_of, signal_row, signal_table
-from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive
+from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive, swings
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.levels.level import Level
@@ -62,11 +62,17 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     """Give the record of a level the power of damping, of what varies and of friction."""
     damping, varying, rubbing, pairs = powers(level)
     dissipated = primitive(level.modal, damping)
-    given = (damping + damping.T) / 2, varying, np.append(rubbing, pairs)
-    places = [buffers.put("numbers", values) for values in given]
-    places += [len(pairs), -1 if dissipated is None else buffers.put("numbers", dissipated)]
-    for slot, place in zip((a.DISSIPATION, a.POWER, a.RUBBING, a.RUBBINGS, a.DISSIPATED), places, strict=True):
-        buffers.ints[record + slot] = place
+    friction = np.append(rubbing, pairs)
+    given = {
+        a.DISSIPATION: buffers.put("numbers", (damping + damping.T) / 2),
+        a.POWER: buffers.put("numbers", varying),
+        a.RUBBING: buffers.put("numbers", friction) if np.any(friction) else -1,
+        a.RUBBINGS: len(pairs),
+        a.DISSIPATED: -1 if dissipated is None or len(pairs) else buffers.put("numbers", dissipated),
+        a.SWINGS: buffers.put("waves", swings(level, varying)),
+    }
+    for slot, value in given.items():
+        buffers.ints[record + slot] = value
 
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
