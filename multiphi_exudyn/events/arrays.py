@@ -130,7 +130,8 @@ RUBBINGS = 23  # how many forces of friction go with others in the last of them
 FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
 DISSIPATED = 26  # form of what damping takes from the free response, -1 where there is none
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
-LEVEL_INTS = 28
+FREE_SIZES = 28  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
+LEVEL_INTS = 29
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

@@ -44,6 +44,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequen
         a.MODES: modal.modes,
         a.STATES: put("ints", level.states),
         a.RESPONSE: _put_response(buffers, modal),
+        a.FREE_SIZES: put("numbers", _free_sizes(modal)) if buffers.ints[a.PRESCRIBED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(buffers, level, exits),
         a.EXIT_COUNT: len(exits),
@@ -120,6 +121,12 @@ def _put_response(buffers: Buffers, level: Level) -> int:
         chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
     places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
     return put("ints", [level.modes, basis, reached, *places])
+
+
+def _free_sizes(level: Level) -> np.ndarray:
+    """|A|, |B|, |P| (3, p, r) of a level's response."""
+    response = level.response
+    return np.abs([response.from_displacement, response.from_velocity, response.from_force])
 
 
 def _put_basis(buffers: Buffers, basis: Exponentials) -> int:

@@ -104,12 +104,11 @@ def integrate_works(
             other, length = max(place, apart), chain(ints, place)
             while other < p:
                 further = chain(ints, other)
-                if multiply(ints, waves, scratch, apart, place, length, other, further, sums) == 1:
-                    for mirrored in range(2):
-                        integrate(
-                            ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
-                            works, 3 * i,
-                        )  # fmt: skip
+                for mirrored in range(multiply(ints, waves, scratch, apart, place, length, other, further, sums)):
+                    integrate(
+                        ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
+                        works, 3 * i,
+                    )  # fmt: skip
                 other += further
             place += length
     return OK
@@ -213,13 +212,15 @@ def weigh_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, apar
 def multiply(
     ints: Ints, waves: Waves, scratch: Waves, apart: int, a: int, length: int, b: int, further: int, sums: int
 ) -> int:
-    """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree; whether there are any.
+    """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree: how many are not zero.
 
-    In the scratch memory from ``sums`` on, (6, 2 p): of damping, what varies and friction, then all with conj(G_k).
+    In the scratch memory from ``sums`` on, (6, 2 p): of damping, what varies and friction, then all with conj(G_k);
+    where that has the same integral it is added to the first ones.
     apart: the first terms, which have no chain, and of which the level knows the speeds.
     """
     level, p, q, some = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS], 0
     n, reached = ints[level + MODES] + q, ints[ints[level + RESPONSE] + REACHED]
+    real = waves[ints[ints[FLOW_BASIS] + RATES] + b].imag == 0.0
     for m in range(6):
         for d in range(length + further - 1):
             scratch[sums + m * 2 * p + d] = 0j
@@ -255,8 +256,10 @@ def multiply(
                 if j != k:
                     rubbed += scratch[other] * scratch[one + 1]
                     opposed += scratch[other].conjugate() * scratch[one + 1]
+            if real:
+                same, varying, rubbed = same + crossed, varying + mirrored, rubbed + opposed
             if same != 0 or crossed != 0 or varying != 0 or mirrored != 0 or rubbed != 0 or opposed != 0:
-                some, at = 1, sums + j - a + k - b
+                some, at = 1 if real else 2, sums + j - a + k - b
                 scratch[at] += same
                 scratch[at + 2 * p] += varying
                 scratch[at + 4 * p] += rubbed
