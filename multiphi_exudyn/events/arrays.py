@@ -13,8 +13,9 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
                                   motion (r, 2n + 1), eta'' = motion . (xi, xi', 1); gaps and gap velocities
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
                                   the power of damping xi'.D xi', of what varies (q, 4 n + 1), and of friction
-                                  f.xi', as in work.py, and a primitive of that of damping in the free response's
-                                  coefficients (2 p, 2 p), or -1;
+                                  f.xi', as in work.py, or -1 without any, and a primitive of that of damping in the
+                                  free response's coefficients (2 p, 2 p), or -1, with its speeds and what of it works
+                                  on w and w', (p, r + 2 q);
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it;
@@ -129,7 +130,9 @@ DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, o
 RUBBINGS = 23  # how many forces of friction go with others in the last of them
 FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
 DISSIPATED = 26  # form of what damping takes from the free response, -1 where there is none
-LEVEL_INTS = 27
+SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
+FREE_SIZES = 28  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
+LEVEL_INTS = 29
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

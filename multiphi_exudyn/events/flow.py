@@ -26,6 +26,7 @@ from multiphi_exudyn.events.arrays import (
     FORCED_WANTED,
     FORCED_WORK,
     FORCES,
+    FREE_SIZES,
     HORIZON,
     LEVEL,
     MODES,
@@ -56,9 +57,6 @@ from multiphi_exudyn.mathematics.basis_arrays import (
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import (
     FREE,
-    FROM_DISPLACEMENT,
-    FROM_FORCE,
-    FROM_VELOCITY,
     REACHED,
     SHAPES,
     coefficients_of,
@@ -189,16 +187,16 @@ def add_forced(
 @compiled
 def size_driven_terms(ints: Ints, numbers: Numbers, waves: Waves, level: int) -> None:
     """Of which terms the coefficients of the free response are the sums; both in the unit of the flow's basis."""
-    response, own, force = ints[level + RESPONSE], ints[FLOW_STATE], ints[level + FORCE]
-    r, basis = ints[level + MODES], ints[response + FREE]
+    response, own, force, p = ints[level + RESPONSE], ints[FLOW_STATE], ints[level + FORCE], ints[FLOW_FREE]
+    r, basis, sizes = ints[level + MODES], ints[response + FREE], ints[level + FREE_SIZES]
     ratio = numbers[ints[ints[FLOW_RECORD] + SCALES]] / numbers[ints[basis + SCALES]]
-    for j in range(ints[FLOW_FREE]):
-        size, unit = 0.0, 1.0
+    for j in range(p):
+        size, unit, row = 0.0, 1.0, sizes + j * r
         for i in range(ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]):
-            size += abs(waves[ints[response + FROM_DISPLACEMENT] + j * r + i]) * numbers[own + 2 * r + i]
-            size += abs(waves[ints[response + FROM_VELOCITY] + j * r + i]) * numbers[own + 3 * r + i]
+            size += numbers[row + i] * numbers[own + 2 * r + i]
+            size += numbers[row + p * r + i] * numbers[own + 3 * r + i]
             if force >= 0:
-                size += abs(waves[ints[response + FROM_FORCE] + j * r + i]) * abs(numbers[force + i])
+                size += numbers[row + 2 * p * r + i] * abs(numbers[force + i])
         for _ in range(ints[ints[basis + POWERS] + j]):
             unit *= ratio
         numbers[ints[FLOW_TERMS] + j] = size * unit

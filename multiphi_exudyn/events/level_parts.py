@@ -13,7 +13,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 
-__all__ = ["base_parts", "from_base", "level_parts", "powers", "primitive"]
+__all__ = ["base_parts", "from_base", "level_parts", "powers", "primitive", "swings"]
 
 LARGEST_PRIMITIVE = 1e3  # of the speeds in it, squared: what energies are made of is of their size; more is round-off
 
@@ -121,3 +121,15 @@ def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
         parts.append(np.divide(power, sums, out=np.zeros_like(power), where=power != 0))
     a, b = parts
     return np.block([[a.real + b.real, b.imag - a.imag], [-a.imag - b.imag, b.real - a.real]])
+
+
+def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
+    """Of each exponential of the free response, without powers of time (p, r + 2 q): eta', and what works on w and w'.
+
+    varying: the power of what varies (``powers``).
+    """
+    response, r, n = level.modal.response, level.modal.modes, level.level.modes
+    speeds = response.shapes * response.basis.rates
+    held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
+    moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)
+    return np.column_stack([speeds.T, (held @ speeds).T, moved.T])

@@ -11,7 +11,7 @@ from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import asked_state, signal_row, signals_of
-from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive
+from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive, swings
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.levels.level import Level
@@ -45,6 +45,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.MODES: modal.modes,
         a.STATES: put("ints", level.states),
         a.RESPONSE: _put_response(buffers, modal),
+        a.FREE_SIZES: put("numbers", _free_sizes(modal)) if buffers.ints[a.PRESCRIBED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(buffers, level, exits, kept),
         a.EXIT_COUNT: firsts[-1],
@@ -63,11 +64,17 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     """Give the record of a level the power of damping, of what varies and of friction."""
     damping, varying, rubbing, pairs = powers(level)
     dissipated = primitive(level.modal, damping)
-    given = (damping + damping.T) / 2, varying, np.append(rubbing, pairs)
-    places = [buffers.put("numbers", values) for values in given]
-    places += [len(pairs), -1 if dissipated is None else buffers.put("numbers", dissipated)]
-    for slot, place in zip((a.DISSIPATION, a.POWER, a.RUBBING, a.RUBBINGS, a.DISSIPATED), places, strict=True):
-        buffers.ints[record + slot] = place
+    friction = np.append(rubbing, pairs)
+    given = {
+        a.DISSIPATION: buffers.put("numbers", (damping + damping.T) / 2),
+        a.POWER: buffers.put("numbers", varying),
+        a.RUBBING: buffers.put("numbers", friction) if np.any(friction) else -1,
+        a.RUBBINGS: len(pairs),
+        a.DISSIPATED: -1 if dissipated is None or len(pairs) else buffers.put("numbers", dissipated),
+        a.SWINGS: buffers.put("waves", swings(level, varying)),
+    }
+    for slot, value in given.items():
+        buffers.ints[record + slot] = value
 
 
 def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
@@ -116,6 +123,12 @@ def _put_response(buffers: Buffers, level: Level) -> int:
         chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
     places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
     return put("ints", [level.modes, basis, reached, *places])
+
+
+def _free_sizes(level: Level) -> np.ndarray:
+    """|A|, |B|, |P| (3, p, r) of a level's response."""
+    response = level.response
+    return np.abs([response.from_displacement, response.from_velocity, response.from_force])
 
 
 def _put_basis(buffers: Buffers, basis: Exponentials) -> int:

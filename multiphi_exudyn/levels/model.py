@@ -32,6 +32,7 @@ __all__ = ["MultiPhiModel"]
 CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
 FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
 WIDER = 2  # models with a base for other loads that a model keeps, each with n numbers for every coordinate
+ENTRIES = 64  # of what others have made of a model: sentences on its levels
 LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
@@ -66,6 +67,8 @@ class MultiPhiModel(Shown):
     ----------
     loaded : BoundedCache
         Levels under loads, kept for later runs.
+    entries : BoundedCache
+        What others have made of it, by their keys.
 
     Raises
     ------
@@ -96,6 +99,9 @@ class MultiPhiModel(Shown):
     _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
     loaded: BoundedCache[Any, Any] = field(
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
+    )
+    entries: BoundedCache[Any, Any] = field(
+        init=False, default_factory=lambda: BoundedCache(ENTRIES), repr=False, compare=False
     )
     _decisions: list[MultiPhiModel] = field(init=False, default_factory=list, repr=False, compare=False)
     _wider: BoundedCache[bytes, MultiPhiModel] = field(

@@ -34,6 +34,7 @@ __all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_
 Sample: TypeAlias = tuple[LoadedLevel, np.ndarray, np.ndarray]
 
 SAMPLES = 100  # of the motion, for its mean square
+FRACTIONS = np.linspace(0.0, 1.0, SAMPLES)
 FEWER = 9  # from one sample to the next of those that may be enough, 12 of them
 
 
@@ -129,7 +130,8 @@ class Samples:
 
     @functools.cached_property
     def _times(self) -> np.ndarray:
-        return np.linspace(self._segments.starts[0], self._end, SAMPLES)
+        first = self._segments.starts[0]
+        return np.asarray(first + (self._end - first) * FRACTIONS)
 
     def _states(self, times: np.ndarray) -> list[Sample]:
         owners = self._segments.owners(times)

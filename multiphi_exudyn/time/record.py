@@ -138,7 +138,7 @@ class Events(Made[Event]):
     @property
     def loss(self) -> Loss:
         """The energies [J] that left at all of them."""
-        return Loss(*np.sum(self._record.amounts[:, 1:-1], axis=0).tolist())
+        return Loss(*self._record.amounts[:, 1:-1].sum(axis=0).tolist())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""

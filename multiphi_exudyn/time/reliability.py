@@ -57,19 +57,32 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    model = trajectory.model
-    found = [*damping_warnings(model), *_missing_modes(model)]
+    model, segments = trajectory.model, listed(trajectory.segments)
+    always, static, clusters = _known(model, segments)
+    found = [*always]
     if not model.whole:
-        segments = listed(trajectory.segments)
         samples = Samples(segments, trajectory.t_end)
-        found.extend(static_warnings([level.level for level in segments.levels]))
+        found.extend(static)
         found.extend(_lost_energy(trajectory, segments, samples))
         found.extend(_truncation(trajectory, samples, tolerance))
-    found.extend(_clusters(trajectory))
+    found.extend(clusters)
     if model.validity is not None:
         found.extend(model.validity(trajectory))
     found.extend(_load_pieces(trajectory))
     return tuple(found)
+
+
+def _known(model: MultiPhiModel, segments: Segments) -> tuple[tuple[str, ...], ...]:
+    """What is known of a model before any run, and of the levels of a run before it comes there; kept by the model."""
+    visited = tuple(level.level.indices for level in segments.levels)
+
+    def made() -> tuple[tuple[str, ...], ...]:
+        levels = [level.modal for level in segments.levels]
+        static = static_warnings([level.level for level in segments.levels])
+        return (*damping_warnings(model), *_missing_modes(model)), tuple(static), tuple(_clusters(levels))
+
+    found: tuple[tuple[str, ...], ...] = model.entries.get_or_build(("warnings", visited), made)
+    return found
 
 
 @dataclass(frozen=True)
@@ -171,6 +184,8 @@ def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
     lost = abs(at_start) + at_events
+    if lost == 0:
+        return
     given = 0.5 * float(start.velocity @ start.velocity)
     given += base.strain(start.displacement, start.penetrating, start.gaps)
     if lost <= ENERGY_SHARE * abs(given):
@@ -210,9 +225,8 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
         yield f"truncation: displacements may be off by {per_cent(error)} of the motion{typical}; {REMEDY}"
 
 
-def _clusters(trajectory: Trajectory) -> list[str]:
-    """One sentence where levels of the run keep modes beyond those asked for."""
-    levels = [level.modal for level in listed(trajectory.segments).levels]
+def _clusters(levels: Sequence[Level]) -> list[str]:
+    """One sentence where some of these levels keep modes beyond those asked for."""
     kept = [level for level in levels if level.kept_beyond]
     if not kept:
         return []

@@ -30,6 +30,8 @@ from multiphi_exudyn.events.arrays import (
     NEEDED,
     OK,
     PIECE,
+    PIECE_NOW,
+    PIECE_TERMS,
     PLACE,
     PRESCRIBED,
     RESPONSE,
@@ -37,13 +39,15 @@ from multiphi_exudyn.events.arrays import (
     SEGMENT_WIDTH_NUMBERS,
     SIGNALS,
     SPEED,
+    TERM_INTS,
     WORK_WAVES,
 )
 from multiphi_exudyn.events.drive import load_piece, set_drive
 from multiphi_exudyn.events.flow import expand, state_at
-from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, differentiate, exponentials
+from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.response_arrays import SHAPES
+from multiphi_exudyn.mathematics.forced_response import NEAREST_FAR, PER_DEGREE
+from multiphi_exudyn.mathematics.response_arrays import FREE, SHAPES
 
 __all__ = ["sample_rows", "sample_states"]
 
@@ -61,8 +65,12 @@ def resume(
     coordinates: Numbers,
     offsets: Ints,
     i: int,
+    widest: float,
 ) -> int:
-    """The flow of the i-th segment; OK, or NEED where there is no room for a response."""
+    """The flow of the i-th segment; OK, or NEED where there is no room for a response.
+
+    widest: by how much its horizon may be longer than it was, for a response of fewer terms.
+    """
     segment, given, level = i * SEGMENT_WIDTH, i * SEGMENT_WIDTH_NUMBERS, offsets[rows[i * SEGMENT_WIDTH]]
     n, start = ints[level + MODES] + ints[CHANNELS], rows[segment + 3]
     for k in range(n):
@@ -74,11 +82,35 @@ def resume(
         load_piece(ints, waves)
         set_drive(ints, numbers, waves, ints[DRIVE_NEXT], spans[given + 5], 0.0, 1.0)
         numbers[HORIZON] = spans[given + 3]
+        numbers[HORIZON] *= widened(ints, numbers, waves, ints[level + RESPONSE], widest)
     expand(ints, numbers, waves, AFTER)
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED] = NEED_ROOM
         return NEED
     return OK
+
+
+@compiled
+def widened(ints: Ints, numbers: Numbers, waves: Waves, response: int, widest: float) -> float:
+    """By which power of two a horizon is to be longer for all poles to be far from the rates of the present piece.
+
+    The response has no more powers of time than the piece then, and loses as many digits of what a piece of the first
+    horizon adds to the motion. One where ``widest`` would not do.
+    """
+    free, piece, nearest, degree, factor = ints[response + FREE], ints[PIECE_NOW], math.inf, 0, 1.0
+    if widest <= 1.0:
+        return factor
+    for term in range(ints[piece + PIECE_TERMS]):
+        rate = waves[ints[piece + TERM_INTS + 2 * term + 1]]
+        degree = max(degree, ints[piece + TERM_INTS + 2 * term] - 1)
+        for j in range(ints[free + SIZE]):
+            pole = waves[ints[free + RATES] + j]
+            nearest = min(nearest, math.hypot(pole.real - rate.real, abs(pole.imag) - abs(rate.imag)))
+    nearest *= numbers[HORIZON] / (NEAREST_FAR + PER_DEGREE * (degree + 1))
+    most = widest ** (1.0 / max(degree, 1))
+    while nearest * factor < 1.0 and factor < most:
+        factor *= 2.0
+    return factor if nearest * factor >= 1.0 else 1.0
 
 
 @compiled
@@ -108,7 +140,7 @@ def sample_states(
             continue
         n, x, v = ints[level + MODES] + ints[CHANNELS], ints[AFTER + PLACE], ints[AFTER + SPEED]
         if t != 0.0 and flowing != i:
-            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i) == NEED:
+            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
             flowing = i
         if t != 0.0:
@@ -148,7 +180,7 @@ def sample_rows(
         while last < count and times[k] < times[last] < until:
             last += 1
         if level > 0:
-            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i) == NEED:
+            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
             began, row = spans[i * SEGMENT_WIDTH_NUMBERS], rows[i * SEGMENT_WIDTH] * (2 * width + 1)
             weigh(ints, numbers, waves, level, functions, row, width)

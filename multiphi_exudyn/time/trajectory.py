@@ -206,12 +206,11 @@ class Trajectory(Histories):
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = self.start_loss + total_loss(self.events)
         damped, varying, rubbed = self._segments.works
-        y0, last = self.start.displacement, self.final
+        last = self.final
         assert last is not None, "a run with segments has a final state"
-        reached = last.level.configuration(last.displacement)
         return Ledger(
             initial=self._initial_energy,
-            work_of_loads=float(self.load @ (reached - y0)) + losses.stop_work + varying + self.final_work,
+            work_of_loads=self._static_work(last) + losses.stop_work + varying + self.final_work,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
@@ -219,6 +218,12 @@ class Trajectory(Histories):
             friction=losses.friction + rubbed,
             final=last.kinetic + float(last.level.strain(last.displacement)),
         )
+
+    def _static_work(self, last: State) -> float:
+        """Work [J] of the static load up to the last state."""
+        if not self.load.any():
+            return 0.0
+        return float(self.load @ (last.level.configuration(last.displacement) - self.start.displacement))
 
     @property
     def _initial_energy(self) -> float:

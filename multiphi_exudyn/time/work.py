@@ -39,6 +39,7 @@ from multiphi_exudyn.events.arrays import (
     RUBBINGS,
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
+    SWINGS,
     WORK_WAVES,
 )
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES, exponentials
@@ -48,6 +49,7 @@ from multiphi_exudyn.time.sampling import resume
 
 __all__ = ["integrate_works", "work_waves"]
 
+WIDEST = 1024.0  # times a segment's horizon: three digits of what the channels do in it for a tenth of the terms
 UPWARDS_ABOVE = 0.5  # |s t| - d from which I_d follows from I_d-1: below, that loses d! / |s t|^d
 SERIES_ROUND_OFF = 1e-18  # of the first term of a power series: terms below it are left out
 
@@ -75,7 +77,7 @@ def integrate_works(
         level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
         if level == 0:
             continue
-        if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i) == NEED:
+        if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, WIDEST) == NEED:
             return NEED
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
@@ -84,30 +86,29 @@ def integrate_works(
         for part in range(3):
             works[3 * i + part] = 0.0
         apart = 0  # terms whose products need no integral
-        if ints[level + DISSIPATED] >= 0 and ints[level + RUBBINGS] == 0:
+        if ints[level + DISSIPATED] >= 0:
             apart = ints[FLOW_FREE]
-        if apart > 0:
             works[3 * i] = dissipated(ints, numbers, waves, scratch)
         if apart == p and q == 0:
             continue
-        list_terms(ints, numbers, waves, scratch)
-        weigh_terms(ints, numbers, scratch, apart)
+        list_terms(ints, numbers, waves, scratch, apart if ints[level + RUBBING] < 0 else 0)
+        weigh_terms(ints, numbers, waves, scratch, apart)
         raised = sums + 12 * p  # powers of t / T at the end
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
         add_constants(ints, numbers, waves, scratch, works, 3 * i + 1)
-        add_friction(ints, numbers, waves, scratch, works, 3 * i + 2)
+        if ints[level + RUBBING] >= 0:
+            add_friction(ints, numbers, waves, scratch, works, 3 * i + 2)
         while place < p:
             other, length = max(place, apart), chain(ints, place)
             while other < p:
                 further = chain(ints, other)
-                if multiply(ints, scratch, n, place, length, other, further, sums) == 1:
-                    for mirrored in range(2):
-                        integrate(
-                            ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
-                            works, 3 * i,
-                        )  # fmt: skip
+                for mirrored in range(multiply(ints, waves, scratch, apart, place, length, other, further, sums)):
+                    integrate(
+                        ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
+                        works, 3 * i,
+                    )  # fmt: skip
                 other += further
             place += length
     return OK
@@ -123,18 +124,20 @@ def chain(ints: Ints, first: int) -> int:
 
 
 @compiled
-def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> None:
-    """Coefficients of xi, xi', xi'' (3, p, n) of the flow."""
+def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, first: int) -> None:
+    """Coefficients of xi, xi', xi'' (3, p, n) of the flow, from its ``first`` term on."""
     level, basis, p, free = ints[AFTER + LEVEL], ints[FLOW_BASIS], ints[FLOW_COUNT], ints[FLOW_FREE]
     r, c, unit = ints[level + MODES], ints[FLOW_WAVES], numbers[ints[ints[FLOW_BASIS] + SCALES]]
     n, moving = r + ints[CHANNELS], r + ints[PRESCRIBED]
-    for j in range(p):
+    for j in range(first, p):
         shape, size = ints[ints[level + RESPONSE] + SHAPES] + j * r, r
         if j >= free:
             shape, size = ints[FLOW_FORCED] + (j - free) * moving, moving
         for i in range(n):
             scratch[j * n + i] = waves[shape + i] * waves[c + j] if i < size else 0j
     for j in range(p, 3 * p if n > r else 2 * p):
+        if j % p < first:
+            continue
         rate, power = waves[ints[basis + RATES] + j % p], 0
         if j % p + 1 < p:
             power = ints[ints[basis + POWERS] + j % p + 1]
@@ -148,31 +151,40 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> No
 def dissipated(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> float:
     """(u + u_0).F (u - u_0) / 2 of the free response at the end u and at the start u_0 of the flow."""
     p, c, phi, total = ints[FLOW_FREE], ints[FLOW_WAVES], ints[WORK_WAVES], 0.0
-    row = ints[ints[AFTER + LEVEL] + DISSIPATED]
+    real = ints[ints[AFTER + LEVEL] + DISSIPATED]
+    imaginary = real + 2 * p * p
     for j in range(p):
         end = waves[c + j] * waves[phi + j]
         scratch[j] = end - waves[c + j]
         scratch[p + j] = end + waves[c + j]
-    for part in range(2):
-        for j in range(p):
-            value = 0.0
-            for k in range(p):
-                value += numbers[row + k] * scratch[k].real + numbers[row + p + k] * scratch[k].imag
-            total += value * (scratch[p + j].real if part == 0 else scratch[p + j].imag)
-            row += 2 * p
+    for j in range(p):  # four sums that do not wait for each other
+        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+        for k in range(p):
+            change = scratch[k]
+            first += numbers[real + k] * change.real
+            second += numbers[real + p + k] * change.imag
+            third += numbers[imaginary + k] * change.real
+            fourth += numbers[imaginary + p + k] * change.imag
+        total += (first + second) * scratch[p + j].real + (third + fourth) * scratch[p + j].imag
+        real += 2 * p
+        imaginary += 2 * p
     return 0.5 * total
 
 
 @compiled
-def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves, apart: int) -> None:
+def weigh_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, apart: int) -> None:
     """Coefficients of D xi' (p, n), of what w_k, w_k' are multiplied by (p, 2 q), but e_k, and of T_e, s_e.xi'.
 
-    apart: the first terms, whose D xi' nobody needs.
+    apart: the first terms, whose D xi' nobody needs, and of which the level knows the others.
     """
-    level, p, q = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS]
-    n = ints[level + MODES] + q
-    for j in range(p):
-        for i in range(n if j >= apart else 0):
+    level, p, q, r = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS], ints[ints[AFTER + LEVEL] + MODES]
+    n = r + q
+    for j in range(apart):
+        for k in range(2 * q):
+            swing = ints[level + SWINGS] + j * (r + 2 * q) + r + k
+            scratch[4 * p * n + 2 * q * j + k] = waves[ints[FLOW_WAVES] + j] * waves[swing]
+    for j in range(apart, p):
+        for i in range(n):
             row, total = ints[level + DISSIPATION] + i * n, 0j
             for k in range(n):
                 total += numbers[row + k] * scratch[(p + j) * n + k]
@@ -197,46 +209,57 @@ def weigh_terms(ints: Ints, numbers: Numbers, scratch: Waves, apart: int) -> Non
 
 
 @compiled
-def multiply(ints: Ints, scratch: Waves, n: int, a: int, length: int, b: int, further: int, sums: int) -> int:
-    """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree; whether there are any.
+def multiply(
+    ints: Ints, waves: Waves, scratch: Waves, apart: int, a: int, length: int, b: int, further: int, sums: int
+) -> int:
+    """Sums of F_j G_k and of F_j conj(G_k) over two chains, either way round, by degree: how many are not zero.
 
-    In the scratch memory from ``sums`` on, (6, 2 p): of damping, what varies and friction, then all with conj(G_k).
+    In the scratch memory from ``sums`` on, (6, 2 p): of damping, what varies and friction, then all with conj(G_k);
+    where that has the same integral it is added to the first ones.
+    apart: the first terms, which have no chain, and of which the level knows the speeds.
     """
-    p, q, some, reached = ints[FLOW_COUNT], ints[CHANNELS], 0, ints[ints[ints[AFTER + LEVEL] + RESPONSE] + REACHED]
+    level, p, q, some = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS], 0
+    n, reached = ints[level + MODES] + q, ints[ints[level + RESPONSE] + REACHED]
+    real = waves[ints[ints[FLOW_BASIS] + RATES] + b].imag == 0.0
     for m in range(6):
         for d in range(length + further - 1):
             scratch[sums + m * 2 * p + d] = 0j
     for j in range(a, a + length):
-        lowest, highest = 0, n
+        lowest, highest, swing = 0, n, ints[level + SWINGS] + j * (n + q)
         if j < ints[FLOW_FREE]:
             lowest, highest = ints[reached + 2 * j], ints[reached + 2 * j + 1]
         for k in range(j if a == b else b, b + further):
             same, crossed, varying, mirrored = 0j, 0j, 0j, 0j
             for i in range(lowest, highest):
-                f, g = scratch[(p + j) * n + i], scratch[(3 * p + k) * n + i]
+                f, g = waves[swing + i] if j < apart else scratch[(p + j) * n + i], scratch[(3 * p + k) * n + i]
                 same += f * g
                 crossed += f * g.conjugate()
+            if j < apart:
+                same, crossed = waves[ints[FLOW_WAVES] + j] * same, waves[ints[FLOW_WAVES] + j] * crossed
             if j != k:  # either way round; D is symmetric
                 same, crossed = 2.0 * same, 2.0 * crossed
             for i in range(2 * q):
                 part = (i // q * p) * n + n - q + i % q
-                f, g = scratch[part + j * n], scratch[4 * p * n + 2 * q * k + i]
-                varying += f * g
-                mirrored += f * g.conjugate()
+                if j >= ints[FLOW_FREE]:
+                    f, g = scratch[part + j * n], scratch[4 * p * n + 2 * q * k + i]
+                    varying += f * g
+                    mirrored += f * g.conjugate()
                 if j != k:
                     f, g = scratch[part + k * n], scratch[4 * p * n + 2 * q * j + i]
                     varying += f * g
                     mirrored += f.conjugate() * g
             rubbed, opposed = 0j, 0j
-            for e in range(ints[ints[AFTER + LEVEL] + RUBBINGS]):
+            for e in range(ints[level + RUBBINGS]):
                 one, other = 4 * p * n + 2 * q * p + 2 * (e * p + j), 4 * p * n + 2 * q * p + 2 * (e * p + k)
                 rubbed += scratch[one] * scratch[other + 1]
                 opposed += scratch[one] * scratch[other + 1].conjugate()
                 if j != k:
                     rubbed += scratch[other] * scratch[one + 1]
                     opposed += scratch[other].conjugate() * scratch[one + 1]
+            if real:
+                same, varying, rubbed = same + crossed, varying + mirrored, rubbed + opposed
             if same != 0 or crossed != 0 or varying != 0 or mirrored != 0 or rubbed != 0 or opposed != 0:
-                some, at = 1, sums + j - a + k - b
+                some, at = 1 if real else 2, sums + j - a + k - b
                 scratch[at] += same
                 scratch[at + 2 * p] += varying
                 scratch[at + 4 * p] += rubbed
