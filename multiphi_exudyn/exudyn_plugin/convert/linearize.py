@@ -291,7 +291,7 @@ def linearised(mbs: Any, time: float) -> Linearisation:
     mass, stiffness, damping = found.mass, found.stiffness, found.damping
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-    static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
+    static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
     largest = _largest_coordinate(mbs)
     return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told)
 
@@ -340,9 +340,10 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
         )
 
 
-def forces(mbs: Any) -> np.ndarray:
-    """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
+def forces(mbs: Any, time: float = 0.0) -> np.ndarray:
+    """Generalised forces at the initial state and a time [s], constraint forces left out, (n_full,)."""
     with static_solver(mbs) as solver:
+        mbs.systemData.SetTime(time)
         return generalised_forces(mbs, solver)
 
 
