@@ -42,6 +42,7 @@ __all__ = ["LinearizedStructure", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
 SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
+LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
 
@@ -203,8 +204,12 @@ def check_system(mbs: Any) -> None:
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an exudyn.MainSystem")
     if not mbs.systemIsConsistent:
         raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
-    if len(mbs.systemData.GetODE2Coordinates()) == 0:
-        raise MultiPhiValueError("mbs: got no ODE2 coordinates, need at least one")
+    count = len(mbs.systemData.GetODE2Coordinates())
+    if not 0 < count <= LARGEST:
+        raise MultiPhiValueError(
+            f"mbs: got {count} ODE2 coordinates, need 1 to {LARGEST} (its matrices are dense; give larger ones of a "
+            "finite element program to mp.LinearStructure)"
+        )
     if len(mbs.systemData.GetODE1Coordinates()) > 0:
         items = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects()))
         first = ", ".join(
@@ -212,7 +217,10 @@ def check_system(mbs: Any) -> None:
         )
         raise MultiPhiValueError(f"mbs: got ODE1 coordinates ({first}), need a system of second order only")
     if mbs.NumberOfGeneralContacts() > 0:
-        raise MultiPhiValueError("mbs: got a GeneralContact, need ObjectContactCoordinate items only")
+        raise MultiPhiValueError(
+            "mbs: got a GeneralContact, whose pairs change, need contacts as items: ObjectContactCoordinate or "
+            "ObjectContactSphereSphere"
+        )
 
 
 def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:
