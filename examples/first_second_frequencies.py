@@ -27,7 +27,12 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Workbench, prepare
 
-STUDIES = ("clamp", "clamp-translation", "support", "amplitude")
+STUDIES = {  # and what their values are
+    "clamp": "rotation [N m/rad]",
+    "clamp-translation": "translation [N/m]",
+    "support": "stiffness [N/m]",
+    "amplitude": "pulled up [m]",
+}
 WINDOWS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # s
 LOW_PASS = 15.0  # Hz: between the rate, at most 6.6 Hz, and the second mode, 37 Hz
 
@@ -71,10 +76,11 @@ def draw(everything: dict[str, dict[Any, tuple[float, float, np.ndarray]]], path
     for axes, (name, found) in zip(figure.subplots(2, 2, sharey=True).flat, everything.items(), strict=False):
         for k, (value, (_, _, rise)) in enumerate(found.items()):
             shade = matplotlib.colormaps["viridis"](0.85 * k / max(1, len(found) - 1))
-            axes.stairs(100 * rise, WINDOWS[: len(rise) + 1], baseline=None, color=shade, lw=2, label=str(value))
+            label = value if isinstance(value, str) else f"{value:g}"
+            axes.stairs(100 * rise, WINDOWS[: len(rise) + 1], baseline=None, color=shade, lw=2, label=label)
         axes.axhline(0.0, color="0.7", lw=1)
         axes.set(title=name, xlabel="time [s]", ylabel="rate above the free frequency [%]")
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False, fontsize=8, title=STUDIES[name], title_fontsize=8)
         axes.label_outer()
     figure.savefig(path, dpi=100)
 

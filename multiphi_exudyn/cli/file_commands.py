@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.accuracy.cases import Study, load_study
+from multiphi_exudyn.study.accuracy.cases import Study, load_study, shipped_studies
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
 from multiphi_exudyn.study.scene.file_reference import file_reference
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -37,9 +37,11 @@ def run_new(kind: str, path: Path | None) -> bool:
     return True
 
 
-def run_validate(path: Path) -> bool:
-    """Check a scene or a study as far as that goes without a run, and say what it has."""
-    print(f"{path}: valid, {_of_study(load_study(str(path))) if 'scene' in read_toml(path) else _of_scene(str(path))}")
+def run_validate(source: str) -> bool:
+    """Check a scene or a study, a file or shipped, as far as that goes without a run, and say what it has."""
+    file = Path(source)
+    is_study = source in shipped_studies() or (file.is_file() and "scene" in read_toml(file))
+    print(f"{source}: valid, {_of_study(load_study(source)) if is_study else _of_scene(source)}")
     return True
 
 

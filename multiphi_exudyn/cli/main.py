@@ -163,7 +163,7 @@ def parser() -> argparse.ArgumentParser:
         "Names all faults at once, each with its place in the file.",
         "validate my-study.toml",
     )
-    validate.add_argument("file", metavar="FILE", type=Path)
+    validate.add_argument("file", metavar="FILE", help="a TOML file, or the name of a shipped scene or study")
     schema = add(
         "schema",
         _schema,
@@ -180,8 +180,8 @@ def parser() -> argparse.ArgumentParser:
         "For a container, or the workers of a cluster (NUMBA_CPU_NAME names their processor).",
         "compile",
     )
-    add("scenes", _scenes, "list the shipped scenes", "", "scenes")
-    add("studies", _studies, "list the shipped studies", "", "studies")
+    add("scenes", _scenes, "list the shipped scenes, which compare, animate, budget and needs take", "", "scenes")
+    add("studies", _studies, "list the shipped studies, which study takes", "", "studies")
     return whole
 
 

@@ -98,7 +98,7 @@ class Tolerance:
     MultiPhiTypeError
         For an error that is no number, or a ``most`` that is no whole number.
     MultiPhiValueError
-        For an error that is not finite and > 0, or most < 1.
+        For an error that is not > 0 and <= 1, or most < 1.
 
     Examples
     --------
@@ -187,5 +187,7 @@ def _check_limits(given: UpTo | Tolerance, name: str, value: float, most: int) -
     kind = type(given).__name__
     if not is_real(value) or not is_count(most):
         raise MultiPhiTypeError(f"{kind}: got {value!r} and {most!r}, need a number and an integer")
-    if not (math.isfinite(value) and value > 0 and most >= 1):
-        raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {name} > 0 and most >= 1")
+    largest = math.inf if isinstance(given, UpTo) else 1.0
+    if not (0 < value < math.inf and value <= largest and most >= 1):
+        limits = f"{name} > 0" if isinstance(given, UpTo) else f"0 < {name} <= 1 (0.01 is 1 %)"
+        raise MultiPhiValueError(f"{kind}: got {name} {value!r} and most {most}, need {limits} and most >= 1")

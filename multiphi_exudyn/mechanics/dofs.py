@@ -99,7 +99,7 @@ def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
             held.update(known(f"fixed {item!r}", dofs).places("fixed", *item))
         elif isinstance(item, (int, np.integer)) and not isinstance(item, bool):
             if not 0 <= item < n:
-                raise MultiPhiValueError(f"fixed: got DoF {item}, need 0 <= DoF < {n}")
+                raise MultiPhiValueError(f'fixed: got DoF {item}, need 0 <= DoF < {n}; a node is (node, "all")')
             held.add(int(item))
         else:
             raise MultiPhiTypeError(f"fixed: got {item!r}, {needed}")

@@ -102,8 +102,8 @@ class Gravity:
     Parameters
     ----------
     direction : str, mapping or array (n,)
-        e, what a unit of rigid-body motion along gravity moves every degree of freedom by: a row, {point: coefficient}
-        or a point name.
+        e (n,): 1 at every translation along gravity, -1 at those against it, 0 at the others; or {point: coefficient}.
+        A point's name alone is e = 1 at that point: its weight, without that of the rest of the structure.
     acceleration : float, default 9.81
         [m/s2].
 
@@ -130,8 +130,8 @@ class Gravity:
     def __post_init__(self) -> None:
         if np.isscalar(self.direction) and not isinstance(self.direction, str):
             raise MultiPhiTypeError(
-                f"gravity direction: got {self.direction!r}, need a point's name, {{point: coefficient}} or a row (n,) "
-                "that moves every degree of freedom along gravity, as in Gravity(e, 9.81)"
+                f"gravity direction: got {self.direction!r}, need a row (n,): 1 at every degree of freedom that is a "
+                "translation along gravity, 0 at the others, as in Gravity(e, 9.81)"
             )
         check_numbers("gravity", acceleration=self.acceleration)
 

@@ -217,8 +217,8 @@ def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | 
         worst = int(np.argmin(mass.diagonal()))
         of = "" if dofs is None else " ({1} of node {0})".format(*dofs.rows[moving[worst]])
         raise MultiPhiValueError(
-            f"mass: diagonal entry {moving[worst]}{of} is {mass.diagonal()[worst]:g}, need a positive definite matrix; "
-            "what has no inertia is condensed by the program that wrote it, or held by fixed="
+            f"mass: diagonal entry {moving[worst]}{of} is {mass.diagonal()[worst]:g}, need values > 0: give it a small "
+            "mass, hold it (fixed=), or condense it statically before"
         )
     if scipy.sparse.issparse(mass):
         return mass  # a factorisation would cost what the modes cost; they are checked when they are computed

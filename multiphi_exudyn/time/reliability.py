@@ -14,6 +14,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               what the base of a large structure does not hold (base_share.py)
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
+    "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 
 The thresholds are calibrated on random truncated models judged by the same with all modes:
 tests/campaign/truncation_study.py.
@@ -48,6 +49,7 @@ PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critic
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
 STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
+HARDLY = 0.01  # of a period of the fastest kept mode: a run so short is hardly one that was meant
 MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
 PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
 PIECE_BYTES = 500  # that it takes there, its segment included
@@ -59,7 +61,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         return ()
     model, segments = trajectory.model, listed(trajectory.segments)
     always, static, clusters = _known(model, segments)
-    found = [*always]
+    found = [*_slow(trajectory), *always]
     if not model.whole:
         samples = Samples(segments, trajectory.t_end)
         found.extend(static)
@@ -139,6 +141,15 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
         yield (
             f"truncated friction: {min(found.values())} modes hold what sticks at {names}, so its force may be off by "
             f"5 % and more until it slips; {REMEDY}"
+        )
+
+
+def _slow(trajectory: Trajectory) -> Iterator[str]:
+    fastest, lasts = trajectory.model.level_at(()).highest_frequency, trajectory.t_end - trajectory.t_start
+    if 0 < fastest * lasts < HARDLY:
+        yield (
+            f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts {lasts:.3g} "
+            "s; are mass and stiffness swapped, or in different units?"
         )
 
 

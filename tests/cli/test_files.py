@@ -38,6 +38,12 @@ def test_templates_are_valid_as_they_are_and_overwrite_nothing(folder, capsys):
     assert sorted(path.name for path in folder.iterdir()) == ["other.toml", "scene.toml", "study.toml"]
 
 
+def test_what_is_shipped_is_valid_by_its_name(folder, capsys):
+    assert told(capsys, "validate", "paper-rig")[1].startswith("paper-rig: valid, a scene of ")
+    assert told(capsys, "validate", "pareto")[1].startswith("pareto: valid, a study of ")
+    assert "got 'no-such'" in told(capsys, "validate", "no-such")[2]
+
+
 def test_all_faults_at_once_unknown_fields_first_with_what_may_be_meant(folder, capsys):
     told(capsys, "new", "scene")
     text = (folder / "scene.toml").read_text()

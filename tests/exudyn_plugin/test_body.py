@@ -446,6 +446,18 @@ def test_settings_under_which_it_would_be_wrong_are_refused(said, radius, given)
         solve(model, start, settings(1e-3, 0.01, radius), **given)
 
 
+@pytest.mark.parametrize(
+    ("interface", "needed"),
+    [((), "need TrapezoidalIndex2 (or spectralRadius = 1): mbs"), (("tip",), "need TrapezoidalIndex2: mbs")],
+)
+def test_the_default_solver_is_refused_with_one_that_fits_the_body(interface, needed):
+    model, start = rig(COMPLIANT)
+    point = next(iter(model.structure.points))
+    with pytest.raises(ValueError, match="GeneralizedAlpha") as refusal:
+        solve(model, start, settings(1e-3, 0.01, 0.9), interface=[point] if interface else ())
+    assert needed in str(refusal.value)
+
+
 def test_bad_arguments_are_refused(refused):
     model, start = rig(COMPLIANT)
     container, mbs = new_system()

@@ -7,6 +7,7 @@ import pytest
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, reduce
+from multiphi_exudyn.exudyn_plugin.convert import linearize
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -162,7 +163,7 @@ def test_a_contact_that_is_no_linear_spring_is_left_out_with_its_reason():
     assert reduction.model.contacts == ()
 
 
-def test_a_contact_of_spheres_is_left_out_and_stays_active():
+def test_a_contact_of_spheres_is_taken_and_stays_active():
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     nodes = [mbs.AddNode(eii.NodePoint(referenceCoordinates=[x, 0.0, 0.0])) for x in (0.0, 1.0)]
@@ -179,9 +180,8 @@ def test_a_contact_of_spheres_is_left_out_and_stays_active():
         )
     )
     mbs.Assemble()
-    ((item, reason),) = reduce(mbs).left_out
-    assert (item.name, item.type) == ("balls", "ObjectContactSphereSphere")
-    assert reason == "its gap is no linear function of coordinates"
+    (contact,) = reduce(mbs).model.contacts
+    assert (contact.name, contact.gap, contact.stiffness) == ("balls", pytest.approx(0.8), 1e3)
     assert mbs.GetObjectParameter(balls, "activeConnector") is True
 
 
@@ -300,6 +300,18 @@ def test_a_system_not_assembled_is_refused():
     container = exu.SystemContainer()
     with pytest.raises(mp.MultiPhiValueError, match="not assembled"):
         reduce(container.AddSystem())
+
+
+def test_what_has_no_linear_or_no_dense_form_is_refused(refused, monkeypatch):
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    mbs.AddNode(eii.NodePoint())
+    mbs.Assemble()
+    monkeypatch.setattr(linearize, "LARGEST", 2)
+    refused(ValueError, "mbs: got 3 ODE2 coordinates, need 1 to 2", reduce, mbs)
+    monkeypatch.undo()
+    mbs.AddGeneralContact()
+    refused(ValueError, "mbs: got a GeneralContact, whose pairs change", reduce, mbs)
 
 
 def test_what_is_no_system_and_what_are_no_points_is_refused():

@@ -89,7 +89,7 @@ class TestCourses:
 class TestLoads:
     @pytest.mark.parametrize("given", [9.81, np.float64(9.81), 3])
     def test_gravity_without_a_direction_is_refused_where_it_is_made(self, refused, given):
-        refused(TypeError, f"gravity direction: got {given!r}, need a point's name", Gravity, given)
+        refused(TypeError, f"gravity direction: got {given!r}, need a row (n,): 1 at every", Gravity, given)
 
     def test_static_rows(self):
         structure = chain(3, mass=2.0)

@@ -190,6 +190,20 @@ class TestTruncation:
         assert "truncated contact" in kinds(run)
 
 
+class TestSlowModel:
+    def test_mass_and_stiffness_in_the_wrong_order_are_said(self):
+        n = 18
+        stiffness = 4e4 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+        right, swapped = mp.LinearStructure(np.eye(n), stiffness), mp.LinearStructure(stiffness, np.eye(n))
+        assert mp.simulate(mp.MultiPhiModel(right), 1.0, velocity=np.ones(n)).warnings == ()
+        (told,) = mp.simulate(mp.MultiPhiModel(swapped), 1.0, velocity=np.ones(n)).warnings
+        assert told.startswith("slow model: its fastest mode takes 208 s for an oscillation, and the run lasts 1 s")
+
+    def test_nothing_is_said_of_a_free_body(self):
+        free = mp.LinearStructure([[1.0]], [[0.0]])
+        assert mp.simulate(mp.MultiPhiModel(free), 1e-3, velocity=np.ones(1)).warnings == ()
+
+
 class TestDamping:
     def test_modes_for_which_a_list_has_no_ratio_are_named(self):
         model = mp.MultiPhiModel(chain(12, damping=mp.ModalDamping([0.01, 0.005])), modes=12)

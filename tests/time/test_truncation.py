@@ -163,7 +163,7 @@ def test_no_motion_has_no_error():
 
 
 def test_a_tolerance_keeps_the_rigid_body_modes():
-    free = mp.MultiPhiModel(chain(4, ends=0), [stop()], modes=mp.Tolerance(1.5, most=3))
+    free = mp.MultiPhiModel(chain(4, ends=0), [stop()], modes=mp.Tolerance(1.0, most=3))
     run = mp.simulate(free, 2.0, displacement=np.ones(4), velocity=-np.ones(4))
     assert run.status == "ok"
     assert run.model.level(()).modes >= 2

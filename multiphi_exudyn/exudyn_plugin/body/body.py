@@ -413,14 +413,16 @@ class MultiPhiBody:
         """Raises for settings of an implicit solver that make the body wrong; TrapezoidalIndex2 has its own."""
         integration = settings.timeIntegration.generalizedAlpha
         if not (trapezoidal or integration.useNewmark) and integration.spectralRadius != 1:
+            other = "" if self.coordinates.interface is not None else " (or spectralRadius = 1)"
             raise MultiPhiValueError(
                 f"solver: got GeneralizedAlpha with spectralRadius {integration.spectralRadius:g} (Exudyn's default is "
-                f"0.9), with which events of the Multi-Phi body {self.name!r} are not exact; need TrapezoidalIndex2 or "
-                "spectralRadius = 1: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
+                f"0.9), with which events of the Multi-Phi body {self.name!r} are not exact; need TrapezoidalIndex2"
+                f"{other}: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
             )
         if self.coordinates.interface is not None and not (trapezoidal or integration.useIndex2Constraints):
             raise MultiPhiValueError(
-                f"solverType: got constraints of index 3, need TrapezoidalIndex2 with the interface of {self.name!r}"
+                f"solver: got GeneralizedAlpha of index 3, with which the interface of {self.name!r} is unstable; need "
+                "TrapezoidalIndex2: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
             )
 
     def _check_start(self, mbs: Any) -> None:

@@ -25,7 +25,7 @@ from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
 )
 from multiphi_exudyn.exudyn_plugin.convert.items import rough_parameters, user_function, value_key
 
-__all__ = ["FullSystem", "initial_is_current", "items_of", "smooth"]
+__all__ = ["FullSystem", "initial_is_current", "items_of", "smooth", "touch_of"]
 
 STEP = 1e-4  # of the reach of a motion, by which C is differentiated along it: an error of 1e-8, and 1e-12 of round-off
 
@@ -52,6 +52,13 @@ def initial_is_current(mbs: Any) -> Iterator[None]:
             data.SetSystemState(state, kind)
             data.SetODE2Coordinates_tt(accelerations, kind)
             data.SetTime(time, kind)
+
+
+def touch_of(mbs: Any, index: int) -> tuple[float, np.ndarray]:
+    """Gap [m] and unit normal (3,) of a contact of spheres at the current state."""
+    item, outputs = exu.ObjectIndex(index), exu.OutputVariableType
+    gap, normal = (mbs.GetObjectOutput(item, each) for each in (outputs.DisplacementLocal, outputs.Director1))
+    return float(gap), np.array(normal)
 
 
 @contextmanager
@@ -112,6 +119,10 @@ class FullSystem:
         load = exu.LoadIndex(index)
         key = value_key(self._mbs.GetLoad(load))
         self._mbs.SetLoadParameter(load, key, float(value[0]) if key == "load" else value)
+
+    def touch(self, index: int) -> tuple[float, np.ndarray]:
+        """Gap [m] and unit normal (3,) of a contact of spheres where the system was moved to."""
+        return touch_of(self._mbs, index)
 
     def moved(self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray, reach: float) -> Moved:
         """The system at q, v, (n_full,), under a force besides its own; reach: the largest |q - q_0| of the motion."""

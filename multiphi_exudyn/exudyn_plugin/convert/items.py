@@ -1,8 +1,8 @@
 """Items of an Exudyn system, as GetObject and GetLoad tell them, and what a reduction makes of each.
 
-Contacts of a model are ObjectContactCoordinate with a linear law and the limit stops of
-ObjectConnectorCoordinateSpringDamperExt, its friction that of the latter (frictions.py); everything else is a matrix,
-a constraint, a load, or left out with a reason.
+Contacts of a model are ObjectContactCoordinate and ObjectContactSphereSphere, -SphereTriangle and -SphereTorus with a
+linear law without friction, and the limit stops of ObjectConnectorCoordinateSpringDamperExt, its friction that of the
+latter (frictions.py); everything else is a matrix, a constraint, a load, or left out with a reason.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ __all__ = [
     "has_stops",
     "is_constraint",
     "is_curved",
+    "is_of_spheres",
     "left_out_functions",
     "left_out_objects",
     "linearised_functions",
@@ -42,6 +43,13 @@ NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"
 _FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor")
+_SPHERES = "ContactSphereSphere"  # what Exudyn calls spheres on spheres, on triangles and on a torus alike
+_CONTACT_LAW = {  # of a linear spring on one side
+    "impactModel": ("impact model", 0),
+    "contactStiffnessExponent": ("stiffness exponent", 1),
+    "dynamicFriction": ("friction coefficient", 0),
+    "contactPlasticityRatio": ("plasticity ratio", 0),
+}
 _LINEAR = {"Mass1D", "RotationalMass1D", "MassPoint", "MassPoint2D", "ConnectorCoordinateSpringDamper", _EXT}
 _LINEAR |= {"GenericODE2"}
 _ONE_SIDED = {
@@ -124,6 +132,11 @@ def is_constraint(item: Mapping[str, Any]) -> bool:
     """True for a joint or another connector that holds coordinates, whatever forces that takes."""
     kind = str(item["objectType"])
     return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
+
+
+def is_of_spheres(item: Mapping[str, Any]) -> bool:
+    """True for a contact of a sphere, whose direction is that of its gradient at the current state."""
+    return bool(item["objectType"] == _SPHERES)
 
 
 def is_curved(item: Mapping[str, Any]) -> bool:
@@ -221,12 +234,11 @@ def _is_contact(item: Mapping[str, Any]) -> bool:
 
 def _refusal(item: Mapping[str, Any]) -> str:
     """Why an active contact object is no unilateral spring; empty if it is one."""
-    if item["objectType"] != "ContactCoordinate":
-        return "its gap is no linear function of coordinates"
-    if item["impactModel"] != 0:
-        return f"impact model {item['impactModel']}, need 0"
-    if item["contactStiffnessExponent"] != 1.0:
-        return f"stiffness exponent {item['contactStiffnessExponent']:g}, need 1"
+    if item["objectType"] not in ("ContactCoordinate", _SPHERES):
+        return "its point of contact moves over a surface, so that its gap is no linear function of coordinates"
+    for key, (called, needed) in _CONTACT_LAW.items():
+        if item.get(key, needed) != needed:
+            return f"{called} {item[key]:g}, need {needed}"
     if not item["contactStiffness"] > 0:
         return f"contact stiffness {item['contactStiffness']:g}, need a value > 0"
     return ""
@@ -259,7 +271,8 @@ def _prescribes_velocity(item: Mapping[str, Any]) -> bool:
 
 def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
     if _is_contact(item):
-        return f"contact, {item['contactStiffness']:g} N/m{_damper(item['contactDamping'])}"
+        present = ", in its present direction" if is_of_spheres(item) else ""
+        return f"contact, {item['contactStiffness']:g} N/m{_damper(item['contactDamping'])}{present}"
     if item["objectType"] == "Ground":
         return "ground"
     if is_constraint(item):

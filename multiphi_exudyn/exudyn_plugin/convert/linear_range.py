@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -180,7 +180,8 @@ class LinearRange:
         linear = self._linear
         sizes, speeds = linear.size(z), linear.size(z_t)
         spread = np.linspace(0.0, trajectory.t_end, (DENSE if self._asked else SPREAD) + 1)[1:]
-        times = np.unique([*spread, samples[np.argmax(sizes)], samples[np.argmax(speeds)]])
+        extremes = samples[np.argmax(sizes)], samples[np.argmax(speeds)]
+        times = np.unique([*spread, *extremes, *_closings(trajectory, linear.spheres)])
         reach = float(np.max(np.abs(linear.basis @ z)))
         if not reach > ROUND_OFF * linear.largest:
             return RangeCheck(times, np.zeros(len(times)))
@@ -201,7 +202,9 @@ class LinearRange:
                 )
                 for t in times
             ]
+            turned = [compared.turned(trajectory.displacement(t), reach) for t in times]
         errors, away = (np.array(parts) for parts in zip(*found, strict=True))
+        errors = np.maximum(errors, turned)
         amplitudes = (linear.modes[1].T @ (linear.mass @ trajectory.displacement(times))).T
         return RangeCheck(times, errors, lag=_lag(away, amplitudes, rate * trajectory.t_end))
 
@@ -245,7 +248,8 @@ class LinearRange:
             return True  # nothing acts on it
         extent = Extent(size * float(np.max(np.abs(self._linear.basis @ shape))), size, rate)
         with self._linear.beside(self._mbs) as compared:
-            return compared.error(size * shape, size * rate * shape, extent, TOLERANCE)[0] <= TOLERANCE
+            off = compared.error(size * shape, size * rate * shape, extent, TOLERANCE)[0]
+            return max(off, compared.turned(size * shape, extent.reach)) <= TOLERANCE
 
 
 class LinearLimits:
@@ -271,6 +275,12 @@ def _pushing(trajectory: Trajectory, contact: Contact, t: float) -> float:
     if isinstance(contact, Friction):
         return -float(trajectory.friction_force(contact.name, t))
     return float(trajectory.contact_force(contact.name, t))
+
+
+def _closings(trajectory: Trajectory, names: Collection[str]) -> np.ndarray:
+    """Instants [s], at most SPREAD spread over the run, at which contacts of these names close."""
+    times = [event.time for event in trajectory.events if event.kind == "close" and event.contact in names]
+    return np.array(times)[np.unique(np.linspace(0, len(times) - 1, SPREAD).astype(int))] if times else np.array(times)
 
 
 def _sampled(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -28,9 +28,10 @@ import scipy.linalg
 from multiphi_exudyn.exudyn_plugin.convert.full_system import FullSystem
 from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad
 
-__all__ = ["Compared", "Extent", "Linearisation"]
+__all__ = ["Compared", "Extent", "Linearisation", "Sphere"]
 
 FAST = 10.0  # times the rate of the motion: a mode that is faster follows it in balance, to a hundredth
+TOUCHING = 1e-9  # of the reach: a gap that is closed
 STAGES = 7  # of relaxation: what couples stiff modes to soft ones spans many decades of stiffness
 
 
@@ -44,13 +45,23 @@ class Extent:
 
 
 @dataclass(frozen=True, eq=False)
+class Sphere:
+    """A contact of a sphere at q_0: index of its object, gap [m], unit normal (3,)."""
+
+    index: int
+    gap: float
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Linearisation:
     """M z'' + C z' + K z = static + (contacts and loads by functions of time), q = displacement + basis z.
 
     mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n).
     displacement, velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad].
     symmetrised: of which matrices the other part is left out, a sentence each. contacts: rows (n_full,) by name.
-    loads: by index of the system.
+    spheres: by name, the contacts whose direction is that of q_0.
+    loads, forces: of the system and of its objects, by index.
     """
 
     mass: np.ndarray
@@ -64,7 +75,9 @@ class Linearisation:
     largest: float
     symmetrised: tuple[str, ...] = ()
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
+    spheres: Mapping[str, Sphere] = field(default_factory=dict)
     loads: Mapping[int, TimedLoad] = field(default_factory=dict)
+    forces: Mapping[int, TimedLoad] = field(default_factory=dict)
 
     @functools.cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -123,15 +136,31 @@ class Compared:
             relaxed = relaxed + np.where(squares >= softest, drift, 0.0)
         return least / extent.size, away
 
+    def turned(self, z: np.ndarray, reach: float) -> float:
+        """Twice the angle [rad] by which contacts of spheres that touch have turned since q_0.
+
+        A sphere that moves sideways by s, at a distance L of the centres, turns by s / L, and so does its impulse. With
+        the speeds along and across it of one size, an impact is off by twice that.
+        """
+        linear = self._linear
+        if not linear.spheres:
+            return 0.0
+        moved, still = linear.basis @ z, np.zeros(len(linear.displacement))
+        self._full.moved(linear.displacement + moved, still, still, reach)
+        angles = [0.0]
+        for name, sphere in linear.spheres.items():
+            gap, normal = self._full.touch(sphere.index)
+            if min(gap, sphere.gap + linear.contacts[name] @ moved) <= TOUCHING * reach:
+                angles.append(float(np.linalg.norm(normal - sphere.normal)))
+        return 2 * max(angles)
+
     def _driven(self, time: float) -> np.ndarray:
-        """Give the system its time and its loads by functions of it; their force (n_full,) in the linearisation."""
+        """Give the system its time and its loads by functions of it; what of it acts in the linearisation (n_full,)."""
         self._full.set_time(self._linear.time + time)
-        total = np.zeros(len(self._linear.displacement))
         for index, load in self._linear.loads.items():
-            value = load.value(time)
-            self._full.load(index, value)
-            total += value @ load.rows
-        return total
+            self._full.load(index, load.value(time))
+        acting = (*self._linear.loads.values(), *self._linear.forces.values())
+        return sum((each.value(time) @ each.rows for each in acting), np.zeros(len(self._linear.displacement)))
 
 
 def _stages(squares: np.ndarray, rate: float) -> np.ndarray:

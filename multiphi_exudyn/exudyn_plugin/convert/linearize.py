@@ -42,6 +42,7 @@ __all__ = ["LinearizedStructure", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
 SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
+LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
 
@@ -203,8 +204,12 @@ def check_system(mbs: Any) -> None:
         raise MultiPhiTypeError(f"mbs: got {type(mbs).__name__}, need an exudyn.MainSystem")
     if not mbs.systemIsConsistent:
         raise MultiPhiValueError("mbs: got a system that is not assembled, need mbs.Assemble() before")
-    if len(mbs.systemData.GetODE2Coordinates()) == 0:
-        raise MultiPhiValueError("mbs: got no ODE2 coordinates, need at least one")
+    count = len(mbs.systemData.GetODE2Coordinates())
+    if not 0 < count <= LARGEST:
+        raise MultiPhiValueError(
+            f"mbs: got {count} ODE2 coordinates, need 1 to {LARGEST} (its matrices are dense; give larger ones of a "
+            "finite element program to mp.LinearStructure)"
+        )
     if len(mbs.systemData.GetODE1Coordinates()) > 0:
         items = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects()))
         first = ", ".join(
@@ -212,7 +217,10 @@ def check_system(mbs: Any) -> None:
         )
         raise MultiPhiValueError(f"mbs: got ODE1 coordinates ({first}), need a system of second order only")
     if mbs.NumberOfGeneralContacts() > 0:
-        raise MultiPhiValueError("mbs: got a GeneralContact, need ObjectContactCoordinate items only")
+        raise MultiPhiValueError(
+            "mbs: got a GeneralContact, whose pairs change, need contacts as items: ObjectContactCoordinate or "
+            "ObjectContactSphereSphere"
+        )
 
 
 def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:
@@ -291,7 +299,7 @@ def linearised(mbs: Any, time: float) -> Linearisation:
     mass, stiffness, damping = found.mass, found.stiffness, found.damping
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-    static = basis.T @ forces(mbs) + damping @ (basis.T @ velocity)
+    static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
     largest = _largest_coordinate(mbs)
     return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told)
 
@@ -340,9 +348,10 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
         )
 
 
-def forces(mbs: Any) -> np.ndarray:
-    """Generalised forces at the initial state, constraint forces left out, (n_full,)."""
+def forces(mbs: Any, time: float = 0.0) -> np.ndarray:
+    """Generalised forces at the initial state and a time [s], constraint forces left out, (n_full,)."""
     with static_solver(mbs) as solver:
+        mbs.systemData.SetTime(time)
         return generalised_forces(mbs, solver)
 
 

@@ -16,7 +16,7 @@ from exudyn.advancedUtilities import NumericalJacobian
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 
-__all__ = ["coordinate_row", "default_points", "given_points"]
+__all__ = ["coordinate_row", "default_points", "gap_row", "given_points"]
 
 HELD = 1e-9  # of a row's largest entry before projection: a point that moves less is held by constraints
 
@@ -27,6 +27,13 @@ _VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # what only a node 
 def coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
     """Row (n_full,) of a marker of one coordinate."""
     return next(iter(_marker_rows(mbs, "marker", marker).values()))
+
+
+def gap_row(mbs: Any, index: Any) -> np.ndarray:
+    """Row (n_full,) by which the gap of a contact of spheres follows the coordinates at the current state."""
+    every = range(len(mbs.systemData.GetODE2Coordinates()))
+    gap = exu.OutputVariableType.DisplacementLocal
+    return np.asarray(NumericalJacobian(mbs, lambda: np.atleast_1d(mbs.GetObjectOutput(index, gap)), every)[0])
 
 
 def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:

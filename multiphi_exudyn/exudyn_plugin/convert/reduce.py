@@ -5,8 +5,9 @@
 q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
 friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
 is a constant load: a state out of balance starts to move as the system does. K holds what constraint forces and weights
-give (geometric_stiffness.py). A LoadCoordinate by a function of time is a FunctionLoad, t = 0 being the
-system's current time. What is no part of the model is in ``left_out``, with the reason.
+give (geometric_stiffness.py). A load by a function of time is a FunctionLoad, t = 0 being the system's current time,
+and so is what changes with time of the force of an ObjectGenericODE2. What is no part of the model is in ``left_out``,
+with the reason.
 
 Exudyn's contact dampers pull at separation; those of the model do not (contact.py).
 """
@@ -17,18 +18,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.convert.contacts import contact_distance, contacts_of, spheres_of
 from multiphi_exudyn.exudyn_plugin.convert.frictions import frictions_of
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, smooth
 from multiphi_exudyn.exudyn_plugin.convert.items import (
     Item,
     grouped,
     has_contact,
-    has_stops,
     left_out_functions,
     left_out_objects,
     linearised_functions,
@@ -39,8 +39,8 @@ from multiphi_exudyn.exudyn_plugin.convert.items import (
 )
 from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, LinearRange, RangeCheck
 from multiphi_exudyn.exudyn_plugin.convert.linearize import LinearizedStructure, check_system, linearised
-from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
-from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_loads
+from multiphi_exudyn.exudyn_plugin.convert.point_rows import default_points, given_points
+from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_forces, timed_loads
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import Matrix
@@ -184,9 +184,10 @@ def reduce(
 
     q_0, v_0 are the current coordinates and velocities, f the forces there, S the directions that constraints leave
     free. A state out of balance has a constant load p and starts to move as the system does. Contacts are
-    ObjectContactCoordinate and the limit stops of ObjectConnectorCoordinateSpringDamperExt, called ``<object>.upper``
-    and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``, with the object's
-    name.
+    ObjectContactCoordinate, contacts of spheres (ObjectContactSphereSphere, -SphereTriangle, -SphereTorus, in the
+    direction that they have now) and the limit stops of ObjectConnectorCoordinateSpringDamperExt, called
+    ``<object>.upper`` and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``,
+    with the object's name.
 
     Parameters
     ----------
@@ -250,14 +251,14 @@ def reduce(
     objects, loads = items_of(mbs)
     now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
     with initial_is_current(mbs):
-        gaps = {i: _distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
+        gaps = {i: contact_distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
         with smooth(mbs, objects, loads):
             linear = linearised(mbs, now)
-            varying = timed_loads(mbs, loads, now)
+            varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
         rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
         frictions = frictions_of(mbs, objects)
         full_contacts: list[UnilateralContact | Friction] = [
-            c for i in gaps for c in _contacts(mbs, i, objects[i], gaps[i])
+            c for i in gaps for c in contacts_of(mbs, i, objects[i], gaps[i])
         ]
         full_contacts += [friction for friction in frictions.values() if isinstance(friction, Friction)]
     full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
@@ -268,7 +269,7 @@ def reduce(
     contacts = [replace(c, direction=_projected(full_rows[c.name], linear.basis)) for c in full_contacts]
     moving = [c for c in contacts if np.any(structure.row(c.direction))]
     names = {c.name for c in moving}
-    taken = (*taken_objects(objects, names), *_taken_loads(loads, timed))
+    taken = (*_acting(taken_objects(objects, names), forces), *_taken_loads(loads, timed))
     left_out = (
         *left_out_objects(objects, names, {i: reason for i, reason in frictions.items() if isinstance(reason, str)}),
         *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
@@ -277,19 +278,26 @@ def reduce(
     missing = missing_parts(left_out)
     if strict and missing:
         raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
-    linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed)
+    linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed, forces=forces)
+    linear = replace(linear, spheres=spheres_of(mbs, objects, names))
     validity = LinearRange(mbs, linear, missing, linearised_functions(left_out))
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
         linear.basis.T @ linear.velocity,
         (
             *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
-            *(each for load in timed.values() for each in function_loads(load, linear.basis)),
+            *(each for load in (*timed.values(), *forces.values()) for each in function_loads(load, linear.basis)),
         ),
         taken,
         left_out,
         linear.symmetrised,
     )
+
+
+def _acting(items: Iterator[Item], forces: Mapping[int, TimedLoad]) -> Iterator[Item]:
+    for item in items:
+        also = "; how its force changes with time" if item.index in forces else ""
+        yield replace(item, became=f"{item.became}{also}")
 
 
 def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) -> Iterator[Item]:
@@ -305,26 +313,6 @@ def _modes(modes: int | str | UpTo | Tolerance | None, most: int) -> int | str |
     if modes is None:
         return "all" if most <= SMALL else None
     return "all" if isinstance(modes, int) and modes > most else modes
-
-
-def _distance(mbs: Any, index: int, item: Mapping[str, Any]) -> float:
-    """Gap [m] of a contact, or what the limits of a limit stop are compared with."""
-    outputs = exu.OutputVariableType
-    variable = outputs.Displacement if has_stops(item) else outputs.Distance
-    return float(mbs.GetObjectOutput(exu.ObjectIndex(index), variable))
-
-
-def _contacts(mbs: Any, index: int, item: Mapping[str, Any], distance: float) -> Iterator[UnilateralContact]:
-    """Contacts of an object, their directions as rows (n_full,)."""
-    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
-    if not has_stops(item):
-        law = float(item["contactStiffness"]), float(item["contactDamping"])
-        yield UnilateralContact(item["name"], second - first, distance, *law)
-        return
-    row = item["factor1"] * second - item["factor0"] * first
-    law = float(item["limitStopsStiffness"]), float(item["limitStopsDamping"])
-    yield UnilateralContact(f"{item['name']}.upper", -row, item["limitStopsUpper"] - distance, *law)
-    yield UnilateralContact(f"{item['name']}.lower", row, distance - item["limitStopsLower"], *law)
 
 
 def _projected(row: np.ndarray, basis: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""Loads of an Exudyn system by user functions of time alone: p(t) = rows^T u(t).
+"""What of an Exudyn system acts by user functions of time: p(t) = rows^T u(t).
 
-u (k,) [N, N m] what the user function returns, one number or a vector, rows (k, n_full) the generalised force of a unit
-of each component at the current state.
+u (k,) [N, N m] what the user function of a load returns, one number or a vector, if it is one of time alone; rows
+(k, n_full) the generalised force of a unit of each component at the current state. Of the force f(t, q, q') of an
+ObjectGenericODE2 u is how it changes with time where the system stands, f(t, q_0, v_0) - f(t_0, q_0, v_0).
 """
 
 from __future__ import annotations
@@ -18,7 +19,12 @@ from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import generalise
 from multiphi_exudyn.exudyn_plugin.convert.items import user_function, value_key
 from multiphi_exudyn.mechanics.loads import FunctionLoad
 
-__all__ = ["TimedLoad", "function_loads", "timed_loads"]
+__all__ = ["TimedLoad", "function_loads", "timed_forces", "timed_loads"]
+
+TRIED = np.concatenate(
+    [[0.0], np.geomspace(1e-6, 1e3, 64)]
+)  # s after the reduction: at which forces are seen to change
+MOST = 30  # components of one force that change with time: each is a load of its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +43,35 @@ def timed_loads(mbs: Any, loads: Sequence[Mapping[str, Any]], start: float) -> d
     known = _NoSystem(dict(mbs.variables))
     found = {i: _value(load, start, known) for i, load in enumerate(loads) if user_function(load)}
     return {i: value if isinstance(value, str) else TimedLoad(_rows(mbs, i), value) for i, value in found.items()}
+
+
+def timed_forces(mbs: Any, objects: Sequence[Mapping[str, Any]], start: float) -> dict[int, TimedLoad]:
+    """What changes with time of the forces of ObjectGenericODE2, by index; t = 0 is the time ``start`` [s]."""
+    known = _NoSystem(dict(mbs.variables))
+    found = {
+        i: _changing(mbs, i, item["forceUserFunction"]["function"], start, known)
+        for i, item in enumerate(objects)
+        if item["objectType"] == "GenericODE2" and item["forceUserFunction"]
+    }
+    return {i: force for i, force in found.items() if force}
+
+
+def _changing(mbs: Any, index: int, function: Any, start: float, known: _NoSystem) -> TimedLoad | None:
+    """The components that change; None for none, for too many, and for a function that reads more of the system."""
+    own = mbs.systemData.GetObjectLTGODE2(exu.ObjectIndex(index))
+    q, q_t = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
+
+    def force(t: float) -> np.ndarray:
+        return np.array(function(known, start + float(t), index, list(q[own]), list(q_t[own])), dtype=float)
+
+    try:
+        tried = np.array([force(t) for t in TRIED])
+    except Exception:  # whatever the user's function raises: the force is taken as it is at present
+        return None
+    moving = np.flatnonzero(np.any(tried != tried[0], axis=0))
+    if not 0 < len(moving) <= MOST:
+        return None
+    return TimedLoad(np.eye(len(q))[np.array(own)[moving]], lambda t: (force(t) - tried[0])[moving])
 
 
 def function_loads(timed: TimedLoad, basis: np.ndarray) -> Iterator[FunctionLoad]:
