@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: on a busy machine threads make small matrices slow
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.study.comparison import plots
 from multiphi_exudyn.study.running import timing
 from reference_models.exudyn_quiet import quiet
 
@@ -28,6 +30,22 @@ def short_timing() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(timing, "STEADY_S", 0.0)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def pictures() -> Iterator[Callable[[], AbstractContextManager[None]]]:
+    """Pages hold no pictures, at which nobody looks, but those made ``with pictures():``."""
+    draw = plots.png
+
+    @contextmanager
+    def drawn() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(plots, "png", draw)
+            yield
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots, "png", lambda figure: b"")
+        yield drawn
 
 
 @pytest.fixture(scope="session")

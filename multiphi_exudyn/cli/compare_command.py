@@ -19,7 +19,7 @@ from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
-from multiphi_exudyn.study.running.environment import environment
+from multiphi_exudyn.study.running.environment import environment, import_times
 from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
@@ -39,7 +39,8 @@ def run_compare(source: str, t_end: float | None, modes: int | None, out: Path |
             bar.set_description(name)
             bar.update(int(name != next(iter(scene.models))))
 
-        comparison = compare(bench, environment(), progress=sys.stderr.isatty(), started=started)
+        where = environment() | {"import_s": import_times()}
+        comparison = compare(bench, where, progress=sys.stderr.isatty(), started=started)
         bar.update()
         bar.set_description("report")
         _write(comparison, folder)

@@ -22,9 +22,9 @@ FILES = {"report.html", "histories.npz", "summary.json"}
 
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
-    """A small scene's file, in an empty working directory, without the seconds that environment() takes."""
+    """A small scene's file, in an empty working directory, without the seconds that import_times() takes."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(compare_command, "environment", lambda: {"python": "3"})
+    monkeypatch.setattr(compare_command, "import_times", dict)
     return write(tmp_path / "small.toml", BEAM)
 
 
@@ -169,11 +169,12 @@ def test_a_wrong_study_is_refused_before_anything_is_written(scene, tmp_path, ca
     assert "--workers" in refused(capsys, "study", good, "--workers", "0")
 
 
-def test_the_budget_of_a_scene(scene, tmp_path, capsys):
+def test_the_budget_of_a_scene(scene, tmp_path, capsys, pictures):
     full = [{"kind": "full", "name": name, "elements": 4, "step": h} for name, h in (("fine", 1e-4), ("coarse", 2e-4))]
     data = changed(["outputs"], {"t_end": 0.03, "windows": [0.02]}) | {"models": full, "modes": 3}
     path = write(tmp_path / "full.toml", data | {"comparison": {"reference": "fine", "coarser": "coarse"}})
-    assert cli.main(["budget", path, "--out", "out"]) == 0
+    with pictures():
+        assert cli.main(["budget", path, "--out", "out"]) == 0
     told = capsys.readouterr().out
     assert "rigid ladder, to 0.02 s" in told
     assert "contact law" in told

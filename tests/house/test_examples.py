@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.study.accuracy import cases
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -115,8 +116,10 @@ def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
     time = np.arange(0.0, 2.0005, 1e-3)
     slower = np.sin(2 * np.pi * 6.0 * time) + 0.1 * np.sin(2 * np.pi * 37.0 * time)
     assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
-    monkeypatch.setattr(example, "STUDIES", ("clamp",))
-    found = example.main(["--quick", str(picture)])["clamp"]
+    shipped = Path(cases.__file__).parent / "shipped" / "clamp.toml"
+    (tmp_path / "clamp.toml").write_text(shipped.read_text().replace("step = 2e-5", "step = 1e-4"))  # of the full beam
+    monkeypatch.setattr(example, "STUDIES", (str(tmp_path / "clamp.toml"),))
+    (found,) = example.main(["--quick", str(picture)]).values()
     for free, limit, rise in found.values():
         assert free < 4.01
         assert 0.2 < rise[0] < limit
@@ -165,7 +168,7 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(example, "CASES", example.CASES[1:4:2])  # others: test_interface.py
     monkeypatch.setattr(example, "T_END", 0.25)
     monkeypatch.setattr(example, "STEPS", example.STEPS[:5:2])
-    monkeypatch.setattr(example, "FINE", 1.25e-5)
+    monkeypatch.setattr(example, "FINE", 2e-5)
     monkeypatch.setattr(example, "REPEATS", 1)
     found = example.main([str(picture)])
     for runs in found.values():

@@ -81,8 +81,9 @@ def drawn(bench, name, share, online_s):
 
 
 @pytest.fixture(scope="module")
-def page(comparison):
-    return render(comparison, level_modes(comparison), loss_tables(comparison.bench))
+def page(comparison, pictures):
+    with pictures():
+        return render(comparison, level_modes(comparison), loss_tables(comparison.bench))
 
 
 def text_of(page):
@@ -227,12 +228,13 @@ def test_without_its_reference_the_report_says_so_and_measures_nothing(compariso
     assert content["errors"] == {} == content["reference_uncertainty"] == content["agreement_horizon_s"]
 
 
-def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison):
+def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison, pictures):
     failed = ModelRun("full-coarser", "full", "full beam", status="failed", message="stopped")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"full-coarser": failed})
     assert "uncertainty is unknown" in " ".join(findings(spoiled).distrust)
     assert summary(spoiled)["reference_uncertainty"] == {}
-    assert plots.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
+    with pictures():
+        assert plots.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
 
 
 def test_pictures_leave_no_global_state(comparison):

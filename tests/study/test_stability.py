@@ -387,7 +387,6 @@ class TestCommand:
     @pytest.fixture(autouse=True)
     def _fast(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(stability_command, "environment", lambda: {"python": "3"})
 
     def test_one_case_writes_page_table_and_figures(self, tmp_path, capsys):
         assert cli.main(["stability", "--quick", "--case", "grazing-1e-12-below-rigid"]) == 0

@@ -41,8 +41,9 @@ def result():
 
 
 @pytest.fixture(scope="module")
-def page(result):
-    return render_study(result)
+def page(result, pictures):
+    with pictures():
+        return render_study(result)
 
 
 def text_of(page):

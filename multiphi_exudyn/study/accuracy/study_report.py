@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 import math
 from collections.abc import Iterable, Mapping
@@ -40,7 +39,7 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     shown_points,
     timing_words,
 )
-from multiphi_exudyn.study.comparison.plots import png
+from multiphi_exudyn.study.comparison.plots import data_uri
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.measures import metrics
 
@@ -206,4 +205,4 @@ def _maps(result: StudyResult) -> Iterable[Picture]:
 
 
 def _picture(figure: Figure, caption: str) -> Picture:
-    return Picture(f"data:image/png;base64,{base64.b64encode(png(figure)).decode('ascii')}", caption)
+    return Picture(data_uri(figure), caption)

@@ -13,11 +13,13 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
@@ -111,12 +113,20 @@ class _FewColours(PillowWriter):
         super().finish()
 
 
+class _DrawnOnce(FigureCanvasAgg):
+    """Draws a frame as it is written, not as it is made too."""
+
+    def draw_idle(self, *_: Any, **__: Any) -> None:
+        """Nobody watches."""
+
+
 def animation(stage: Stage, runs: Mapping[str, ModelRun]) -> FuncAnimation:
     """The animation of two finished runs, by the names of their models."""
     reduced, reference = (runs[name] for name in stage.models)
     names = list(stage.beams)
     figure, axes = panels(1.2 + 2.4 * len(names) + 2.2, len(names) + 1, [1.0] * len(names) + [0.9])
     figure.set_dpi(RESOLUTION)
+    _DrawnOnce(figure)
     moved: list[Callable[[int], None]] = []
     for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
         for beam, panel in zip(names, axes, strict=False):

@@ -7,6 +7,7 @@ contact, as in Figs 38.8 to 38.10; in scenes without contacts its friction stick
 
 from __future__ import annotations
 
+import base64
 import io
 import itertools
 import math
@@ -29,6 +30,7 @@ from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = [
     "CONTACT",
+    "data_uri",
     "energy_figure",
     "error_time_figure",
     "first_contact_span",
@@ -182,6 +184,11 @@ def png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()
+
+
+def data_uri(figure: Figure) -> str:
+    """The figure as a page holds it."""
+    return f"data:image/png;base64,{base64.b64encode(png(figure)).decode('ascii')}"
 
 
 def reduced(comparison: Comparison) -> list[ModelRun]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -130,5 +129,4 @@ def _friction_pictures(comparison: Comparison) -> Iterable[Picture]:
 
 
 def _picture(section: str, figure: Figure, caption: str) -> Picture:
-    encoded = base64.b64encode(plots.png(figure)).decode("ascii")
-    return Picture(section, f"data:image/png;base64,{encoded}", caption)
+    return Picture(section, plots.data_uri(figure), caption)

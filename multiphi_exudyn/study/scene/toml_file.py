@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -44,12 +45,11 @@ def validated(form: type[Form], path: Path, data: Mapping[str, Any]) -> Form:
 def _complaint(form: type[BaseModel], error: ValidationError, data: Mapping[str, Any]) -> str:
     """Of every wrong field what was given and what is needed, in one line."""
     found: dict[str, tuple[bool, str, list[str]]] = {}
-    schema = form.model_json_schema()
     for item in error.errors(include_url=False):
         missing, unknown = item["type"] == "missing", item["type"] == "extra_forbidden"
         field = _field(item["loc"], data, missing)
         given = "nothing" if missing else _one_line(repr(item["input"]))
-        needed = _needed(item) + (did_you_mean(item["loc"][-1], _known(schema, data, item["loc"])) if unknown else "")
+        needed = _needed(item) + (did_you_mean(item["loc"][-1], _known(form, data, item["loc"])) if unknown else "")
         found.setdefault(field, (unknown, given, []))[2].append(needed)
     faults = [
         f"{field}: got {given}, need {' or '.join(dict.fromkeys(needs))}"
@@ -59,19 +59,25 @@ def _complaint(form: type[BaseModel], error: ValidationError, data: Mapping[str,
     return "; ".join(faults[:MOST]) + more
 
 
-def _known(schema: Mapping[str, Any], data: Any, location: Sequence[int | str]) -> set[str]:
+@functools.cache
+def _schema(form: type[BaseModel]) -> dict[str, Any]:
+    return form.model_json_schema()
+
+
+def _known(form: type[BaseModel], data: Any, location: Sequence[int | str]) -> set[str]:
     """Names of the fields that the table around a place may have."""
+    schema = _schema(form)
     forms = _forms(schema, schema, data)
     for part in location[:-1]:
         if isinstance(data, Mapping) and part in data:
-            inner = [form.get("properties", {}).get(part, form.get("additionalProperties", {})) for form in forms]
+            inner = [each.get("properties", {}).get(part, each.get("additionalProperties", {})) for each in forms]
         elif isinstance(data, list) and isinstance(part, int):
-            inner = [form.get("items", {}) for form in forms]
+            inner = [each.get("items", {}) for each in forms]
         else:
             continue  # a label that the validator gives to the branch of a union
         data = data[part]
-        forms = [each for form in inner if form for each in _forms(schema, form, data)]
-    return {name for form in forms for name in form.get("properties", {})}
+        forms = [each for branch in inner if branch for each in _forms(schema, branch, data)]
+    return {name for each in forms for name in each.get("properties", {})}
 
 
 def _forms(schema: Mapping[str, Any], form: Any, data: Any) -> list[Mapping[str, Any]]:
