@@ -120,9 +120,8 @@ def sliding(plain: Level) -> Level:
     _check(plain, sliders, answer)
     given = {field.name: getattr(plain, field.name) for field in fields(plain)}
     level = SlidingLevel(**given, plain=plain, sliders=sliders, added=added, answer=answer)
-    return replace(
-        level, force_rows=level.answered(plain.force_rows), force_rate_rows=level.answered(plain.force_rate_rows)
-    )
+    strained = np.where(plain.squares == 0, 0.0, plain.force_rows)  # what is left of others would couple rigid bodies
+    return replace(level, force_rows=level.answered(strained), force_rate_rows=level.answered(plain.force_rate_rows))
 
 
 def _answer(plain: Level, added: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
 from multiphi_exudyn.time.base_share import base_warnings
 from multiphi_exudyn.time.going_on import going_on, nudged
@@ -326,8 +327,9 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
     """States of which, of rigid links that would stick, an independent set does; the others push till it is decided."""
     found = np.zeros((0, len(model.base.directions)))
     for i, element in enumerate(model.contacts):
-        if element.held and element.rigid and element.states[states[i]].holds:
-            row = model.base.directions[:, i]
+        sticks, number, spring, _ = friction_spring(element)
+        if states[i] == sticks and spring == 0 and (element.held or not element.rigid):
+            row = model.base.directions[:, model.link_places[i][number]]
             left = row / np.linalg.norm(row)
             for _ in range(2):
                 left = left - (found @ left) @ found
@@ -335,7 +337,7 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
             if size > INDEPENDENT:
                 found = np.vstack([found, left / size])
             else:
-                states[i] = next(k for k, state in enumerate(element.states) if not state.holds)
+                states[i] = sticks + 1
     return states
 
 

@@ -292,3 +292,28 @@ def test_of_two_feet_of_a_rigid_body_one_sticks_for_both(amplitude):
         assert run.status == "ok"
         found.append(run.at("x", t))
     assert_allclose(*found, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [math.inf, 1e3])
+@pytest.mark.parametrize("height", [0.0, 0.3, 0.7])
+def test_a_sled_on_two_feet_stops_where_its_speed_is_spent(stiffness, height):
+    """Nothing but its feet holds it, along one line; they share its weight, m g, as its friction tips it."""
+    mu, weight, speed = 0.37, 9.81, 1.3
+    along = np.array([1.0, 0.0, height])
+    feet = [
+        mp.UnilateralContact(name, np.array([0.0, 1.0, x]), 0.0, stiffness, friction=mu, tangential=along)
+        for name, x in (("rear", -1.0), ("front", 1.0))
+    ]
+    model = mp.MultiPhiModel(mp.LinearStructure(np.diag([1.0, 1.0, 0.5]), np.zeros((3, 3))), feet, modes="all")
+    sunk, gravity = weight / (2 * stiffness), mp.ConstantLoad(np.array([0.0, -1.0, 0.0]), weight)
+    run = mp.simulate(model, 1.0, [0.0, -sunk, 0.0], [speed, 0.0, 0.0], [gravity])
+    t = np.linspace(0, 1, 41)
+    end = speed / (mu * weight)
+    assert run.status == "ok"
+    if math.isinf(stiffness) or height == 0.0:
+        s = np.minimum(t, end)
+        assert_allclose(run.displacement(t)[0], speed * s - mu * weight * s**2 / 2, atol=1e-11)
+        assert min(e.time for e in run.events if e.kind == "stick" and e.time > 0) == pytest.approx(end, rel=1e-12)
+    both = run.contact_force("rear", t) + run.contact_force("front", t)
+    assert_allclose(both, weight, rtol=1e-9)
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
