@@ -155,7 +155,10 @@ def is_apart(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
 
 @compiled
 def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, whole: float) -> float:
-    """How far the driven row goes until a row changes sides, CHANGING, to CHANGED_TO: itself where its w is zero."""
+    """How far the driven row goes until a row changes sides, CHANGING, to CHANGED_TO: itself where its w is zero.
+
+    Those that come to zero with it, as rows of its own direction do, stay where they are.
+    """
     r, shares, way = ints[problem + UNKNOWNS], ints[problem + SHARES], ints[problem + WAY]
     until, least = whole, INDEPENDENT * norm(numbers, way, r)
     ints[problem + CHANGING] = driven
@@ -180,7 +183,7 @@ def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, whole:
         ):
             closing = side * product(numbers, ints[problem + UNITS] + k * r, way, r)
             room = max(-side * numbers[ints[problem + RESULTS] + k], 0.0)
-            if closing > least and room / closing < until:
+            if closing > least and room / closing < min(until, (1.0 - ALIKE) * whole):
                 until = room / closing
                 ints[problem + CHANGING] = k
                 ints[problem + CHANGED_TO] = BETWEEN

@@ -6,5 +6,5 @@ loop's own flow. What its truncated modes could not hold, and what to distrust i
 
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, sampling,
 work, growing, record, saved, trajectory, defects, truncation, chatter, loop_record, loop, going_on, motion, refinement,
-reliability, simulate, many.
+rubbing, reliability, simulate, many.
 """

@@ -293,7 +293,8 @@ class Motion:
             a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
             a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
             + ("" if complete else " in the kept modes, need more of them"),
-            a.UNSETTLED: "impact: round-off decides which contacts push",
+            a.UNSETTLED: "no forces were found that agree with what moves: round-off decides which contacts push, or "
+            "friction is so high that they are not unique, need a smaller coefficient",
             a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
             a.GAINING: f"rigid contacts {names}: an impact with restitution and friction would make energy, need one "
             "of them alone",

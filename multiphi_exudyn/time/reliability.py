@@ -5,6 +5,8 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncated contact: ..."  static flexibility that a closed compliant level's modes leave out (level.py): peak
                               contact forces are off; known before any run
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
+    "backward slip: ..."      truncated friction that moves against its slip (rubbing.py)
+    "redundant friction: ..." which of several bears the load, and when they slip, is not unique (rubbing.py)
     "lost energy: ..."        what truncation took of the largest energy of the run
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
     "undamped modes: ..."     modes for which a list of modal ratios has none
@@ -37,6 +39,7 @@ from multiphi_exudyn.mechanics.damping import ModalDamping
 from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.modal_structure import ModalStructure
 from multiphi_exudyn.time.defects import Samples, indicator, total_defect
+from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -70,6 +73,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     found.extend(clusters)
     if model.validity is not None:
         found.extend(model.validity(trajectory))
+    found.extend(rubbing_warnings(trajectory.segments, model))
     found.extend(_load_pieces(trajectory))
     return tuple(found)
 

@@ -177,3 +177,17 @@ def test_compiled_it_is_what_it_is_in_python():
         given = problem(np.random.default_rng(seed), COULOMB, 4, 1, 0.0)
         for one, other in zip(solved(given)[:2], solved(given, run=as_they_are)[:2], strict=True):
             assert_allclose(one, other, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", [5171, 5710, 7798, 8755, 16593, 24086])
+def test_rows_of_one_direction_come_to_zero_together(seed):
+    """Each in turn is a hair before the driven one: none of them takes its place, and then gives it back."""
+    random = np.random.default_rng(seed)
+    row, other = random.normal(size=(2, 6))
+    random.choice([1.0, -1.0])
+    rows, b = np.array([row, -row, row, other]), random.normal(size=2)
+    values, high = np.array([-abs(b[0]), abs(b[0]), -abs(b[0]), b[1]]), random.uniform(0.5, 9.0, size=4)
+    low, leaders = np.zeros(4), np.full(4, NONE)
+    _, z, answer, _ = complementary(rows, None, values, np.full(4, 3.0), low, high)
+    assert answer == SOLVED
+    assert is_complementary(rows @ rows.T, values, low, high, leaders, np.zeros(4), z)

@@ -340,3 +340,33 @@ def test_a_run_that_ends_with_an_event_has_its_warnings(monkeypatch):
     assert "chatter" in run.message
     assert run.events[-1].time == run.t_end
     assert all(": " in warning for warning in run.warnings)
+
+
+class TestFriction:
+    def pads(self, static, velocity=0.0):
+        """Two on one point, under a load that ends below what they bear."""
+        structure = mp.LinearStructure([[1.0]], [[4.0]], points={"m": 0})
+        pads = [mp.Friction("a", "m", 1.0, static), mp.Friction("b", "m", 1.0, static, velocity=velocity)]
+        model = mp.MultiPhiModel(structure, pads, modes="all")
+        return mp.simulate(model, 1.0, loads=[mp.SampledLoad("m", [0.0, 1.0], [0.0, 1.0])])
+
+    def test_that_is_redundant_is_told_where_static_limits_make_it_ambiguous(self):
+        with pytest.warns(mp.MultiPhiWarning, match="redundant friction: 'b' follows from what sticks at 'a'.*67 % of"):
+            self.pads(1.5)
+
+    def test_of_constant_limits_or_on_another_belt_is_determined(self):
+        assert self.pads(None).warnings == self.pads(1.5, 2.0).warnings == ()
+
+    @pytest.mark.parametrize(("modes", "told"), [(7, ["backward slip"]), (9, []), ("all", [])])
+    def test_that_truncation_turns_round_is_told(self, modes, told):
+        """7 of 12 modes: a quarter of the time that it slips."""
+        along = {"m9": 1.0, "m7": -0.5}
+        rough = mp.UnilateralContact(
+            "c", {"m8": -1.0}, 0.0, 400.0, friction=0.4, tangential=along, tangential_stiffness=1e3
+        )
+        model = mp.MultiPhiModel(chain(12, stiffness=40.0), [rough], modes=modes)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            run = mp.simulate(model, 6.0, loads=[mp.HarmonicLoad("m2", 6.0, 0.7)])
+        assert [kind for kind in kinds(run) if kind == "backward slip"] == told
+        assert all("'c' moves against its slip for 26 %" in text for text in run.warnings if "backward" in text)
