@@ -261,14 +261,19 @@ class MultiPhiModel(Shown):
 
     def holding(self, rows: np.ndarray) -> MultiPhiModel:
         """The model whose base holds these rows (k, n) of loads too: itself, or one that it keeps for later runs."""
-        base = self.base
-        if base.complete:
-            return self
-        known = np.vstack([base.further, *(self.structure.row(link.direction) for link in self.links)])
-        new = [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
+        new = self.lacking(rows)
         if not new:
             return self
-        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(np.vstack([base.further, *new])))
+        further = np.vstack([self.base.further, *new])
+        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(further))
+
+    def lacking(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Those of some rows (k, n) for which an incomplete base has not been made, zero ones left out."""
+        if self.base.complete:
+            return []
+        links = [self.structure.row(link.direction) for link in self.links]
+        known = np.vstack([self.base.further, self.structure.point_rows, *links])
+        return [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
 
     def _widened(self, further: np.ndarray) -> MultiPhiModel:
         """This model with a base that holds further rows (k, n)."""
