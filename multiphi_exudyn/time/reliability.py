@@ -159,8 +159,8 @@ def _missing_modes(model: MultiPhiModel) -> Iterator[str]:
         yield (
             f"missing modes: the structure has its modes up to {structure.highest:g} Hz alone, so "
             f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
-            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes the "
-            "static flexibility of the points there"
+            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
+            "the static flexibility of the points there"
         )
 
 
