@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.build_base import build_base
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
-from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
+from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, TRIED, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
@@ -227,7 +227,7 @@ class MultiPhiModel(Shown):
         if isinstance(self.modes, str):
             return None
         most = self.modes.most if isinstance(self.modes, (UpTo, Tolerance)) else int(self.modes)
-        most = min(most, FIRST) if isinstance(self.modes, Tolerance) else most
+        most = min(most, TRIED) if isinstance(self.modes, Tolerance) else most
         return most if most < self.structure.n else None
 
     @property
