@@ -69,6 +69,8 @@ class MultiPhiBody:
         Of the run [s] that they are prepared for.
     matched_step : float or None
         Step [s] that its modes are matched to.
+    outside : tuple of str, default ()
+        Warnings of what the base of a large structure leaves out.
 
     Attributes
     ----------
