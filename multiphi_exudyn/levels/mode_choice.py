@@ -33,12 +33,13 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
-__all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "Tolerance", "UpTo", "chosen_modes", "is_count"]
+__all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "TRIED", "Tolerance", "UpTo", "chosen_modes", "is_count"]
 
 SMALL = 30  # degrees of freedom up to which all modes are kept: they cost less than a choice
 FEWEST = 6  # modes: a start or a load may move what no contact and no point tells of
 RIGID = 12  # modes beside a rigid stop, where the error of the rig's displacements is 1 % and hardly falls with more
 FIRST = 22  # modes that an incomplete base is built for before more are known to be needed
+TRIED = 12  # the same where runs of a Tolerance say what is needed: mostly fewer, else twice as many
 MOST = 60  # modes: levels beyond it take longer than most models are worth
 CONTACT_SHARE = 0.1  # of a closed level's flexibility at its contact: peak forces of the rig are right to 1 % below it
 POINT_SHARE = 0.01  # of the open level's flexibility at a point

@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.build_base import build_base
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
-from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, Tolerance, UpTo, chosen_modes, is_count
+from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, TRIED, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
@@ -233,7 +233,7 @@ class MultiPhiModel(Shown):
         if isinstance(self.modes, str):
             return None
         most = self.modes.most if isinstance(self.modes, (UpTo, Tolerance)) else int(self.modes)
-        most = min(most, FIRST) if isinstance(self.modes, Tolerance) else most
+        most = min(most, TRIED) if isinstance(self.modes, Tolerance) else most
         return most if most < self.structure.n else None
 
     @property
@@ -267,14 +267,19 @@ class MultiPhiModel(Shown):
 
     def holding(self, rows: np.ndarray) -> MultiPhiModel:
         """The model whose base holds these rows (k, n) of loads too: itself, or one that it keeps for later runs."""
-        base = self.base
-        if base.complete:
-            return self
-        known = np.vstack([base.further, *(self.structure.row(link.direction) for link in self.links)])
-        new = [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
+        new = self.lacking(rows)
         if not new:
             return self
-        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(np.vstack([base.further, *new])))
+        further = np.vstack([self.base.further, *new])
+        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(further))
+
+    def lacking(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Those of some rows (k, n) for which an incomplete base has not been made, zero ones left out."""
+        if self.base.complete:
+            return []
+        links = [self.structure.row(link.direction) for link in self.links]
+        known = np.vstack([self.base.further, self.structure.point_rows, *links])
+        return [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
 
     def _widened(self, further: np.ndarray) -> MultiPhiModel:
         """This model with a base that holds further rows (k, n)."""

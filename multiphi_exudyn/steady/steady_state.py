@@ -33,7 +33,7 @@ from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.steady.shooting import PeriodMap, Shooting
 from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.simulate import Run, started
+from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
@@ -215,10 +215,11 @@ def settled(
 ) -> SteadyState:
     """What ``steady_state`` gives, without its MultiPhiWarning; begin: x, x' (n,) and its ``start``."""
     _check(model, load, other_loads, periods, tolerance)
-    model, (displacement, velocity, start), loads = model.decided or model, begin, (load, *other_loads)
-    period = 1.0 / frequency(load)
+    (displacement, velocity, start), loads, period = begin, (load, *other_loads), 1.0 / frequency(load)
+    model = holding(model.decided or model, loads, start)
     run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
-    return _Search(PeriodMap(model, loads, period), load, tolerance).settle(_warned(run.trajectory()), periods)
+    search = _Search(PeriodMap(model, loads, period), load, tolerance, outside_of(run, model))
+    return search.settle(_warned(run.trajectory()), periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
@@ -263,11 +264,12 @@ class _Chunk:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search under way; see the module's docstring. warned: warnings of the chunks that were run."""
+    """A search under way; see the module's docstring. outside: warnings of its base and start; warned: of chunks."""
 
     map: PeriodMap
     load: PeriodicLoad
     tolerance: float
+    outside: tuple[str, ...]
     warned: list[tuple[str, ...]] = field(default_factory=list)
 
     def settle(self, trajectory: Trajectory, periods: int) -> SteadyState:
@@ -332,7 +334,7 @@ class _Search:
         own = {sentence.partition(": ")[0] for sentence in shown.warnings}
         before = grouped(("", sentences) for sentences in self.warned)
         earlier = [f"{group.kind}: before it settled, {group.example}" for group in before if group.kind not in own]
-        return (*shown.warnings, *earlier)
+        return (*shown.warnings, *self.outside, *earlier)
 
 
 def _warned(trajectory: Trajectory) -> Trajectory:

@@ -1,7 +1,7 @@
 """Base share: what the small base of a large structure does not hold of a start, of a row, or of its levels.
 
-A start is judged in the norm of the mass matrix, a row by its static flexibility. Loads need no warning: a run takes
-them into the base (MultiPhiModel.holding), as it does contacts and points.
+A start is judged in the norm of the mass matrix, a row by its static flexibility. A run takes what its loads act on
+into the base (MultiPhiModel.holding), as it does contacts and points; one that goes on keeps the base of its start.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ OUTSIDE = 1e-3  # of a start, or of the static flexibility at a row
 INEXACT = 1e-8  # of omega^2 of the levels on which a base was judged
 
 
-def base_warnings(model: MultiPhiModel, **start: np.ndarray | None) -> Iterator[str]:
-    """Of x and x' (n,) of a start by their names, and of the levels."""
+def base_warnings(model: MultiPhiModel, loads: np.ndarray, **start: np.ndarray | None) -> Iterator[str]:
+    """Of rows (k, n) of loads, of x and x' (n,) of a start by their names, and of the levels."""
     base = model.base
-    if base.complete:
-        return
     if base.error > INEXACT:
         yield f"base: omega^2 of levels may be off by {base.error:.2g}, need more modes, or modes='all'"
+    for row in model.lacking(loads):
+        yield from _told(model, model.outside(row), "the static flexibility at a load")
     for name, given in start.items():
         if given is not None:
             yield from _told(model, _of_start(model, np.asarray(given, float)), f"the start's {name}")

@@ -24,11 +24,11 @@ from multiphi_exudyn.levels.mode_choice import Tolerance, is_count
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.arguments import real_array
-from multiphi_exudyn.mechanics.loads import Load, patterns
+from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.base_share import row_warnings
 from multiphi_exudyn.time.motion import Motion, carry
-from multiphi_exudyn.time.simulate import Run, checked_end, warned
+from multiphi_exudyn.time.simulate import Run, checked_end, holding, warned
 from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
@@ -145,7 +145,7 @@ def simulate_many(
     from tqdm import tqdm
 
     end, starts = checked_end(model, t_end), _starts(model, displacements, velocities)
-    wider = model.holding(patterns(model.structure, loads))
+    wider = holding(model, loads)
     rows = [(isinstance(point, (str, Mapping)), model.structure.row(point)) for point in points]
     outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]
     Excitation.of(wider, loads, end)  # what is wrong with a load is so for all runs

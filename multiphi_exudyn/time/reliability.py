@@ -186,9 +186,20 @@ def _missing_modes(model: MultiPhiModel) -> Iterator[str]:
     if told:
         yield (
             f"missing modes: the structure has its modes up to {structure.highest:g} Hz alone, so "
-            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted; "
-            "give structure_from_modes the static flexibility of the points there"
+            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
+            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
+            "the static flexibility of the points there"
         )
+
+
+def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> str:
+    """How high above the highest mode [Hz] given modes swing on the stiffest of some contacts: sqrt(k h.M^-1 h)."""
+    k, lengths = model.base.stiffnesses[contacts], model.base.lengths[contacts]
+    swinging = np.sqrt(np.where(np.isfinite(k) & (k > 0), k, 0.0)) * lengths / (2 * math.pi)
+    most = int(np.argmax(swinging))
+    if not 0 < highest < swinging[most]:
+        return ""
+    return f" (on {k[most]:g} N/m these modes swing at up to {swinging[most]:.3g} Hz, where others would as well)"
 
 
 def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -> Iterator[str]:

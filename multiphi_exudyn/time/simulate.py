@@ -36,7 +36,18 @@ from multiphi_exudyn.time.trajectory import Start, Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Run", "Shared", "checked_end", "levels_of", "motion_of", "simulate", "started", "warned"]
+__all__ = [
+    "Run",
+    "Shared",
+    "checked_end",
+    "holding",
+    "levels_of",
+    "motion_of",
+    "outside_of",
+    "simulate",
+    "started",
+    "warned",
+]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
@@ -115,7 +126,7 @@ def simulate(
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     end = checked_end(model, t_end)
-    trajectory = warned(Run(_holding(model, loads, start), end, displacement, velocity, loads, compiled, start))
+    trajectory = warned(Run(holding(model, loads, start), end, displacement, velocity, loads, compiled, start))
     issue(trajectory.warnings)
     return trajectory
 
@@ -131,18 +142,34 @@ def warned(given: Run) -> Trajectory:
     """The answer with its warnings, none of them issued."""
     run, modes = started(given), given.model.modes
     trajectory = run.trajectory()
-    outside = base_warnings(trajectory.model, displacement=run.displacement, velocity=run.velocity)
+    outside = outside_of(run, trajectory.model)
     found = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *outside)
     return replace(trajectory, warnings=found) if found else trajectory
 
 
-def _holding(model: MultiPhiModel, loads: Sequence[Load], start: Trajectory | Equilibrium | None) -> MultiPhiModel:
-    """The model whose base holds what the loads act on; a run that goes on keeps that of its start."""
+def outside_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
+    """What a base leaves out of a run, and of further places (k, n) at which something acts, a sentence each."""
+    if model.base.complete:
+        return ()
+    acting = np.vstack([patterns(model.structure, run.loads), *rows])
+    return tuple(base_warnings(model, acting, displacement=run.displacement, velocity=run.velocity))
+
+
+def holding(
+    model: MultiPhiModel,
+    loads: Sequence[Load],
+    start: Trajectory | Equilibrium | None = None,
+    rows: Sequence[np.ndarray] = (),
+) -> MultiPhiModel:
+    """The model whose base holds what the loads act on; a run that goes on keeps that of its start.
+
+    rows: (k, n) of further places at which something acts.
+    """
     if isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
-    if isinstance(loads, tuple) and not loads:
+    if model.base.complete:
         return model
-    return model.holding(patterns(model.structure, loads))
+    return model.holding(np.vstack([patterns(model.structure, loads), *rows]))
 
 
 class Shared(Protocol):

@@ -17,7 +17,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.mode_choice import FIRST, Tolerance, UpTo
+from multiphi_exudyn.levels.mode_choice import TRIED, Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.defects import DefectHistory
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -78,12 +78,12 @@ def adapted(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) ->
     The open level begins with the modes that hold the static flexibility of every contact, and is given more until
     the indicator is below the tolerance; every other level has its modes up to the same frequency. All modes of the
     structure are the last that is tried where there are no more than the tolerance allows. The base, at first that of
-    FIRST modes, is extended to twice as many when they are asked for.
+    TRIED modes, is extended to twice as many when they are asked for.
     """
     tolerance = model.modes
     assert isinstance(tolerance, Tolerance), "who calls this has looked"
     most = min(tolerance.most, model.structure.n)
-    source = replace(model, modes=most if model.base.complete else min(most, FIRST))
+    source = replace(model, modes=most if model.base.complete else min(most, TRIED))
     level = source.level(())
     rigid = int(np.sum(level.omega == 0))
     count = max(_holding(level, tolerance.error), min(rigid + 1, most))

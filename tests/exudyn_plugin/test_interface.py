@@ -6,6 +6,7 @@ import math
 import exudyn as exu
 import numpy as np
 import pytest
+import scipy.sparse
 from exudyn.itemInterface import (
     CoordinateSpringDamper,
     LoadCoordinate,
@@ -468,3 +469,18 @@ def test_what_an_interface_cannot_hold_is_refused():
         CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
     with pytest.raises(ValueError, match="need TrapezoidalIndex2"):
         run(model, STEP, spring, solver=exu.DynamicSolverType.GeneralizedAlpha)
+
+
+def test_the_base_of_a_large_structure_is_given_what_the_interface_and_the_loads_act_on():
+    n = 700
+    stiffness = 1e6 * scipy.sparse.diags_array([2 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1])
+    structure = mp.LinearStructure(scipy.sparse.eye_array(n).tocsr(), stiffness.tocsr(), points={"end": n - 1})
+    model = mp.MultiPhiModel(structure, modes=4)
+    rows = np.eye(n)[[200, 431]]
+    assert all(model.outside(row) > 1e-3 for row in rows)
+    mbs = exu.SystemContainer().AddSystem()
+    given = {"interface": {"middle": rows[0]}, "loads": [mp.ConstantLoad(rows[1], 1.0)]}
+    CreateMultiPhiBody(mbs, model, name="b", **given)
+    assert all(mbs.variables["multiPhi"]["b"].model.outside(row) < 1e-12 for row in rows)
+    CreateMultiPhiBody(mbs, model, name="at a point", interface=("end",))
+    assert mbs.variables["multiPhi"]["at a point"].model is model

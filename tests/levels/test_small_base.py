@@ -142,6 +142,30 @@ class TestRowsFirstSeenInARun:
         on = mp.simulate(model, 0.7, start=run)
         assert on.model is run.model
 
+    def test_steady_states_and_frequency_responses_extend_it_too(self):
+        """An eighth of what the load bends lies outside the base of the contacts; all of it is in the amplitude."""
+        structure = dataclasses.replace(membrane(), damping=mp.RayleighDamping(20.0, 0.0))
+        model = mp.MultiPhiModel(structure, [stop("p", gap=1.0)], modes=MODES)
+        load, frequencies = mp.HarmonicLoad(self.ROW, 1.0, 1.0), [1.0, 1.5]
+        response = mp.frequency_response(model, load, frequencies)
+        alone = mp.steady_state(model, load)
+        wider = alone.trajectory.model
+        assert wider.outside(self.ROW) < 1e-12
+        assert {id(state.trajectory.model) for state in response.states} == {id(wider)}
+        assert not any(sentence.startswith("base") for sentence in response.warnings)
+        for hz, amplitude in zip(frequencies, response.amplitude(self.ROW), strict=True):
+            square = (2 * math.pi * hz) ** 2
+            matrix = structure.stiffness.astype(complex) - (square - 40j * math.pi * hz) * structure.mass
+            expected = abs(self.ROW @ scipy.sparse.linalg.spsolve(matrix.tocsc(), self.ROW))
+            assert_allclose(amplitude, expected, rtol=1e-2)  # the modes left out have no inertia
+
+    def test_a_load_outside_the_base_of_a_run_that_goes_on_is_told(self):
+        model = mp.MultiPhiModel(membrane(), modes=MODES)
+        start = mp.simulate(model, 0.01, displacement=model.level(()).shapes[:, 0])
+        with pytest.warns(mp.MultiPhiWarning, match="base: .* % of the static flexibility at a load lies outside"):
+            on = mp.simulate(model, 0.02, start=start, loads=[mp.ConstantLoad(self.ROW, 1.0)])
+        assert on.model is model
+
     def test_a_tolerance_decides_for_the_base_that_holds_them(self):
         model = mp.MultiPhiModel(membrane(), [stop("p", gap=0.001, stiffness=1e3)], modes=mp.Tolerance(0.05))
         run = self.run(model)

@@ -1,6 +1,7 @@
 """A structure by its modes alone moves as the one they are of; what they leave out is told, or completed."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -97,6 +98,17 @@ class TestWarning:
         with pytest.warns(mp.MultiPhiWarning, match=r"missing modes: .* up to 2[0-9.]+ Hz alone, so 'stop' acts"):
             run, _ = peak(modal(KEPT))
         assert sum(line.startswith("missing modes") for line in run.warnings) == 1
+
+    @pytest.mark.parametrize(("k", "told"), [(1e3, False), (1e8, True), (math.inf, False)])
+    def test_says_how_high_the_modes_swing_on_a_stiff_stop(self, k, told):
+        """Of few modes on a spring as stiff the highest frequency is that of their mass there on the spring."""
+        stopped = mp.MultiPhiModel(modal(KEPT), [mp.UnilateralContact("stop", "tip", 1.0, k)])
+        with pytest.warns(mp.MultiPhiWarning, match="missing modes"):
+            (sentence,) = mp.simulate(stopped, 0.01, velocity=np.ones(KEPT)).warnings
+        found = re.search(r"on 1e\+08 N/m these modes swing at up to ([0-9.e+]+) Hz", sentence)
+        assert (found is not None) == told
+        if found is not None:
+            assert float(found[1]) == pytest.approx(stopped.level(("stop",)).highest_frequency, rel=0.01)
 
     def test_is_silent_where_it_is_known_or_nothing_acts(self):
         known = peak(modal(KEPT, flexibility={"tip": FLEXIBILITY[-1, -1]}))[0]

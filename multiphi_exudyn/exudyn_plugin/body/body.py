@@ -69,6 +69,8 @@ class MultiPhiBody:
         Of the run [s] that they are prepared for.
     matched_step : float or None
         Step [s] that its modes are matched to.
+    outside : tuple of str, default ()
+        Warnings of what the base of a large structure leaves out.
 
     Attributes
     ----------
@@ -112,14 +114,20 @@ class MultiPhiBody:
     """
 
     def __init__(
-        self, name: str, motion: Motion, loads: Sequence[Load], end: float, matched_step: float | None
+        self,
+        name: str,
+        motion: Motion,
+        loads: Sequence[Load],
+        end: float,
+        matched_step: float | None,
+        outside: tuple[str, ...] = (),
     ) -> None:
         self.name = name
         self.model = motion.model
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
         self._time, self._told = math.nan, 0.0
-        self._motion, self._loads = motion, tuple(loads)
+        self._motion, self._loads, self._outside = motion, tuple(loads), outside
         self._size = self.model.level_at(()).modes
         self._own = OwnLoads(self.model, loads, self._size, 0.0, end)
         self._state = motion.static_state
@@ -191,7 +199,7 @@ class MultiPhiBody:
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
         interface = self.coordinates.interface
         turned = () if interface is None else interface.warnings
-        return (*warnings_of_body(self.model, self._record.of(self._events, truncated)), *turned)
+        return (*warnings_of_body(self.model, self._record.of(self._events, truncated)), *self._outside, *turned)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The level of elements in these states as the solver has it."""

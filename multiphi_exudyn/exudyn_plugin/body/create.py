@@ -26,7 +26,7 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.simulate import Run, started
+from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
@@ -68,7 +68,7 @@ def CreateMultiPhiBody(
     displacement, velocity : array (n,), default None
         x [m, rad] and x' [m/s, rad/s] at the start, None for zero.
     loads : sequence of loads, default ()
-        As of ``simulate``.
+        As of ``simulate``. The base of a large structure is given what they and the ``interface`` act on.
     matchedStepSize : float, default None
         The fixed step size [s] of the solver, to which modes are matched: the body alone is then exact at that step
         with TrapezoidalIndex2, or GeneralizedAlpha of spectralRadius 1; velocities of the node are those of the matched
@@ -148,13 +148,10 @@ def CreateMultiPhiBody(
     _check_step(matchedStepSize)
     check_drawing(drawing, color, model)
     nodes = interface_nodes(model.structure, interface)
-    body = MultiPhiBody(
-        name,
-        _motion(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True)),
-        loads,
-        PROVISIONAL,
-        matchedStepSize,
-    )
+    rows = [node.rows for node in nodes]
+    model = holding(model, loads, start, rows)
+    run = started(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True))
+    body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, outside_of(run, model, rows))
     moving = [link for link in model.links if link.velocity]
     if nodes and moving:
         name, speed = moving[0].name, moving[0].velocity
@@ -192,8 +189,8 @@ def _check_step(step: float | None) -> None:
 
 
 def _motion(run: Run) -> Motion:
-    """A motion at its start, checked as ``simulate`` checks it."""
-    motion = started(run).begun()
+    """A motion at its start."""
+    motion = run.begun()
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion
