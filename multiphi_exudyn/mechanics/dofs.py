@@ -89,7 +89,7 @@ def dof_table(given: Any, n: int) -> DofTable:
 
 
 def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
-    """Which of n degrees of freedom are held, (k,) ascending, from DoF indices, (node, component) or (node, "all")."""
+    """Which of n degrees of freedom are held, (k,) ascending: DoF indices, or places (node, component) of a table."""
     needed = 'need a list of DoF indices, (node, component) or (node, "all")'
     if isinstance(given, (str, bytes, Mapping)) or not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"fixed: got {given!r}, {needed}")
@@ -98,8 +98,11 @@ def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
         if isinstance(item, tuple) and len(item) == 2:
             held.update(known(f"fixed {item!r}", dofs).places("fixed", *item))
         elif isinstance(item, (int, np.integer)) and not isinstance(item, bool):
+            if dofs is not None:
+                told = f'(node, component) or (node, "all"), as ({item}, "all"): the rows are known by their nodes'
+                raise MultiPhiValueError(f"fixed: got {item}, need {told}")
             if not 0 <= item < n:
-                raise MultiPhiValueError(f'fixed: got DoF {item}, need 0 <= DoF < {n}; a node is (node, "all")')
+                raise MultiPhiValueError(f"fixed: got DoF {item}, need 0 <= DoF < {n}")
             held.add(int(item))
         else:
             raise MultiPhiTypeError(f"fixed: got {item!r}, {needed}")

@@ -58,8 +58,8 @@ class LinearStructure(Shown):
         What the rows of the matrices are: (node, component) of each, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6.
         None: not known. Afterwards a DofTable.
     fixed : iterable of int or (int, str), default ()
-        What the supports hold: degrees of freedom, (node, component) or (node, "all"). Matrices, points, dofs and fixed
-        itself are given in the numbering without supports; these rows and columns are then left out.
+        What the supports hold: degrees of freedom, or with dofs (node, component) or (node, "all"). Matrices, points,
+        dofs and fixed itself are given in the numbering without supports; these rows and columns are then left out.
     free : array (n,), default empty
         The degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
 

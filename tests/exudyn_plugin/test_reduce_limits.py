@@ -34,6 +34,34 @@ def off(system, reduction, trajectory, end=END, step=1e-4):
     return np.max(np.abs(found - theirs)) / np.max(np.abs(theirs))
 
 
+def compressed(aside=0.0, sideways=0.0):
+    """1.6 kg on a spring that is pressed by 8 cm, in space: unstable sideways, where a push may act or a speed be."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    start = {"initialDisplacement": [-0.08, 0.0, 0.0], "initialVelocity": [1.0, sideways, 0.0]}
+    mass = mbs.CreateMassPoint(name="mass", referencePosition=[0.5, 0.0, 0.0], mass=1.6, **start)
+    mbs.CreateSpringDamper(itemNumbers=[mbs.CreateGround(), mass], stiffness=4000.0, damping=8.0)
+    mbs.CreateForce(itemNumber=mass, loadVector=[80.0, 0.0, aside])
+    mbs.AddMarker(eii.MarkerNodeCoordinate(name="m1", nodeNumber=0, coordinate=0))
+    mbs.Assemble()
+    return PublishedSystem(container, mbs, "m1", END, 1e-4)
+
+
+def test_an_unstable_direction_in_which_nothing_moves_is_held_and_told():
+    system = compressed()
+    reduction = reduce(system.mbs)
+    trajectory = simulated(reduction)
+    (told,) = trajectory.warnings
+    assert told.startswith("left out: MainSystem 'mbs': an unstable direction (omega^2 = -464 1/s2), mainly of coord")
+    assert reduction.structure.n == 1
+    assert off(system, reduction, trajectory) < 1e-3
+
+
+@pytest.mark.parametrize("pushed", [{"aside": 1e-3}, {"sideways": 1e-3}])
+def test_an_unstable_direction_in_which_something_moves_is_refused(pushed, refused):
+    refused(ValueError, "stiffness: got a negative one (omega^2 = -464 1/s2)", reduce, compressed(**pushed).mbs)
+
+
 @pytest.mark.parametrize("kind", ["RotationEulerParameters", "RotationRxyz"])
 def test_a_pendulum_let_go_where_it_is_level_falls(kind):
     """Its stiffness is zero there, and round-off of a joint's forces of 20 N is neither a frequency nor instability."""

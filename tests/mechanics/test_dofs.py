@@ -92,15 +92,15 @@ class TestFixed:
         assert_array_equal(structure().free, np.arange(N))
 
     def test_what_is_fixed_needs_no_inertia(self):
-        assert structure(mass=MASS * (np.arange(N) > 0), fixed=[0]).n == N - 1
+        assert structure(mass=MASS * (np.arange(N) > 0), fixed=[(1, "ux")]).n == N - 1
 
     def test_a_change_keeps_what_is_free(self):
-        changed = replace(structure(fixed=[0, 5]), damping=ModalDamping(0.01))
+        changed = replace(structure(fixed=[(1, "ux"), (9, "uz")]), damping=ModalDamping(0.01))
         assert_array_equal(changed.free, [1, 2, 3, 4])
-        assert_array_equal(replace(changed, fixed=[0]).free, [2, 3, 4])
+        assert_array_equal(replace(changed, fixed=[(1, "uz")]).free, [2, 3, 4])
 
     def test_is_what_ties_to_the_ground_are(self):
-        held = structure(fixed=[0, 3])
+        held = structure(fixed=[(1, "ux"), (7, "uz")])
         tied = assemble({"a": structure(points={"p": 0, "q": 3})}, ties=[{"a.p": 1.0}, {"a.q": 1.0}])
         assert_array_equal(held.free, tied.free)
         assert_array_equal(held.stiffness, tied.stiffness)
@@ -113,13 +113,14 @@ class TestFixed:
     @pytest.mark.parametrize(
         ("kind", "changes", "begins"),
         [
-            (ValueError, {"fixed": [6]}, "fixed: got DoF 6, need 0 <= DoF < 6"),
-            (ValueError, {"fixed": [-1]}, "fixed: got DoF -1"),
-            (ValueError, {"fixed": range(6)}, "fixed: got all 6 degrees of freedom"),
+            (ValueError, {"fixed": [6], "dofs": None}, "fixed: got DoF 6, need 0 <= DoF < 6"),
+            (ValueError, {"fixed": [-1], "dofs": None}, "fixed: got DoF -1"),
+            (ValueError, {"fixed": range(6), "dofs": None}, "fixed: got all 6 degrees of freedom"),
             (ValueError, {"fixed": [(2, "all")]}, "fixed: got node 2, need one of 3 nodes"),
             (ValueError, {"fixed": [(1, "uy")]}, "fixed: got 'uy' of node 1"),
             (ValueError, {"fixed": [(1, "all")], "dofs": None}, "fixed (1, 'all'): got a node where"),
-            (ValueError, {"fixed": [5], "points": {"p": 5}}, "points['p']: got a place that is fixed"),
+            (ValueError, {"fixed": [5], "dofs": None, "points": {"p": 5}}, "points['p']: got a place that is fixed"),
+            (ValueError, {"fixed": [1]}, 'fixed: got 1, need (node, component) or (node, "all"), as (1, "all")'),
             (TypeError, {"fixed": 5}, "fixed: got 5, need a list"),
             (TypeError, {"fixed": "clamp"}, "fixed: got 'clamp', need a list"),
             (TypeError, {"fixed": [True]}, "fixed: got True, need a list"),

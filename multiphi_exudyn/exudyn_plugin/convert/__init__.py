@@ -4,5 +4,5 @@ The system is linearised at its current state; what it holds is taken over, made
 out. How far a reduced motion stays where that holds is checked against the system itself.
 
 Order: directions, items, geometric_stiffness, full_system, timed_loads, linearisation, matrix_checks, point_rows,
-frictions, contacts, fem_interface, linearize, linear_range, reduce.
+unstable, frictions, contacts, fem_interface, linearize, linear_range, reduce.
 """

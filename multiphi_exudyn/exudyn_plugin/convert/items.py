@@ -23,6 +23,7 @@ __all__ = [
     "is_curved",
     "is_of_spheres",
     "left_out_functions",
+    "left_out_instability",
     "left_out_objects",
     "linearised_functions",
     "load_item",
@@ -188,6 +189,12 @@ def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
     for kind in ("PreStep", "PostStep", "PostNewton", "PreNewtonResidual"):
         if getattr(mbs, f"Get{kind}UserFunction")():
             yield Item("mbs", 0, f"{kind}UserFunction"), "what it does in a run"
+
+
+def left_out_instability(where: str) -> Iterator[tuple[Item, str]]:
+    """Directions that are held because nothing moves them, though they are unstable; none if ``where`` is empty."""
+    if where:
+        yield Item("mbs", 0, "MainSystem"), f"an unstable direction {where}, in which nothing moves it"
 
 
 def grouped(told: Iterable[tuple[Item, str]]) -> list[str]:

@@ -59,7 +59,8 @@ class Linearisation:
 
     mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n).
     displacement, velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad].
-    symmetrised: of which matrices the other part is left out, a sentence each. contacts: rows (n_full,) by name.
+    symmetrised: of which matrices the other part is left out, a sentence each. held: an instability
+    in which nothing moves, if there is one. contacts: rows (n_full,) by name.
     spheres: by name, the contacts whose direction is that of q_0.
     loads, forces: of the system and of its objects, by index.
     """
@@ -74,6 +75,7 @@ class Linearisation:
     time: float
     largest: float
     symmetrised: tuple[str, ...] = ()
+    held: str = ""
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
     spheres: Mapping[str, Sphere] = field(default_factory=dict)
     loads: Mapping[int, TimedLoad] = field(default_factory=dict)

@@ -13,7 +13,7 @@ their geometric stiffness (geometric_stiffness.py).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -29,8 +29,9 @@ from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
     static_solver,
 )
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation
-from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import ASYMMETRY, Checked, checked_matrices
+from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import ASYMMETRY, Checked, UnstableState, checked_matrices
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
+from multiphi_exudyn.exudyn_plugin.convert.unstable import stable_directions
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -189,7 +190,7 @@ def linear_structure_from(
     with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
         with _inactive(mbs, objects):
-            found, basis = projected_matrices(mbs)
+            found, basis, _ = projected_matrices(mbs)
             _check_equilibrium(mbs, found.stiffness, basis)
         rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
@@ -267,8 +268,12 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
             mbs.SetObjectParameter(index, "activeConnector", True)
 
 
-def projected_matrices(mbs: Any, allowed: float = ASYMMETRY) -> tuple[Checked, np.ndarray]:
-    """M, K, C in z, (n, n), and the basis S, (n_full, n); allowed: see ``checked_matrices``.
+def projected_matrices(
+    mbs: Any, allowed: float = ASYMMETRY, pushes: np.ndarray | None = None
+) -> tuple[Checked, np.ndarray, str]:
+    """M, K, C in z, (n, n), the basis S, (n_full, n), and an instability that is held; allowed: ``checked_matrices``.
+
+    pushes (k, n_full): what may move the system, where an unstable direction is held if none of them does.
 
     What is round-off of the stiffness that forces give, or of a force over the system's size, is none: it would be a
     frequency, or an instability.
@@ -290,18 +295,34 @@ def projected_matrices(mbs: Any, allowed: float = ASYMMETRY) -> tuple[Checked, n
         row = (item["factor1"] * second - item["factor0"] * first) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis
+    try:
+        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, ""
+    except UnstableState as unstable:
+        if pushes is None:
+            raise
+        momentum = mass @ (basis.T @ mbs.systemData.GetODE2Coordinates_t(exu.ConfigurationType.Initial))
+        kept = stable_directions(mass, stiffness, damping, np.vstack([momentum, pushes @ basis]))
+        if kept is None:
+            raise
+        mass, stiffness, damping = (kept.T @ matrix @ kept for matrix in (mass, stiffness, damping))
+        basis = basis @ kept
+        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, unstable.where
 
 
-def linearised(mbs: Any, time: float) -> Linearisation:
-    """The system about its initial state, at a time [s], without contacts and loads by functions of time."""
-    found, basis = projected_matrices(mbs, SYMMETRISED)
-    mass, stiffness, damping = found.mass, found.stiffness, found.damping
+def linearised(mbs: Any, time: float, pushes: Sequence[np.ndarray]) -> Linearisation:
+    """The system about its initial state, at a time [s], without contacts and loads by functions of time.
+
+    pushes: rows (n_full,) of these contacts and loads.
+    """
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+    found, basis, held = projected_matrices(mbs, SYMMETRISED, np.vstack([forces(mbs, time), *pushes]))
+    mass, stiffness, damping = found.mass, found.stiffness, found.damping
     static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
     largest = _largest_coordinate(mbs)
-    return Linearisation(mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told)
+    return Linearisation(
+        mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told, held
+    )
 
 
 def _largest_coordinate(mbs: Any) -> float:

@@ -17,11 +17,19 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 
-__all__ = ["ASYMMETRY", "Checked", "checked_matrices", "coordinate_name"]
+__all__ = ["ASYMMETRY", "Checked", "UnstableState", "checked_matrices", "coordinate_name"]
 
 ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
 DIFFERENTIATED = 1e-9  # of the largest damping or the fastest mode's critical one: what differentiating forces leaves
 MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
+
+
+class UnstableState(MultiPhiValueError):
+    """The stiffness matrix has a negative eigenvalue; where: which one, and the coordinate that moves most."""
+
+    def __init__(self, where: str) -> None:
+        super().__init__(f"stiffness: got a negative one {where}, need a state that is stable, or a constraint there")
+        self.where = where
 
 
 @dataclass(frozen=True)
@@ -55,9 +63,8 @@ def checked_matrices(
         modes = complete_modes(mass, stiffness)
     except MultiPhiValueError as error:
         values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
-        raise MultiPhiValueError(
-            f"stiffness: got a negative one (omega^2 = {values[0]:.3g} 1/s2), mainly of "
-            f"{_of_largest(mbs, basis @ vectors[:, 0])}, need a state that is stable"
+        raise UnstableState(
+            f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {_of_largest(mbs, basis @ vectors[:, 0])}"
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))
     return Checked(mass, stiffness, _not_driving(damping, mass, modes), tuple(told))

@@ -30,6 +30,7 @@ from multiphi_exudyn.exudyn_plugin.convert.items import (
     grouped,
     has_contact,
     left_out_functions,
+    left_out_instability,
     left_out_objects,
     linearised_functions,
     load_item,
@@ -252,17 +253,18 @@ def reduce(
     now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
     with initial_is_current(mbs):
         gaps = {i: contact_distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
-        with smooth(mbs, objects, loads):
-            linear = linearised(mbs, now)
-            varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
-        rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
         frictions = frictions_of(mbs, objects)
         full_contacts: list[UnilateralContact | Friction] = [
             c for i in gaps for c in contacts_of(mbs, i, objects[i], gaps[i])
         ]
         full_contacts += [friction for friction in frictions.values() if isinstance(friction, Friction)]
-    full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
-    timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
+        full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
+        with smooth(mbs, objects, loads):
+            varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
+            timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
+            acting = (*timed.values(), *forces.values())
+            linear = linearised(mbs, now, [*full_rows.values(), *(row for load in acting for row in load.rows)])
+        rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
     own = linear.damping if np.any(linear.damping) else None
     given = own if damping is None else damping
     structure = LinearizedStructure(linear.mass, linear.stiffness, given, rows, coordinates=linear.basis)
@@ -274,6 +276,7 @@ def reduce(
         *left_out_objects(objects, names, {i: reason for i, reason in frictions.items() if isinstance(reason, str)}),
         *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
         *left_out_functions(mbs),
+        *left_out_instability(linear.held),
     )
     missing = missing_parts(left_out)
     if strict and missing:
@@ -286,7 +289,7 @@ def reduce(
         linear.basis.T @ linear.velocity,
         (
             *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
-            *(each for load in (*timed.values(), *forces.values()) for each in function_loads(load, linear.basis)),
+            *(each for load in acting for each in function_loads(load, linear.basis)),
         ),
         taken,
         left_out,
