@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
 from multiphi_exudyn import MultiPhiModel, cli, simulate
-from multiphi_exudyn.cli import stability_command
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.study.stability import catalogue_run, native_run
 from multiphi_exudyn.study.stability.case import Case, Problem
