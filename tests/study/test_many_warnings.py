@@ -135,7 +135,7 @@ def test_a_study_keeps_the_warnings_of_every_run(warning_runs, tmp_path, capsys)
     file = write(tmp_path / "study.toml", study | {"methods": [method], "timing": False})
     assert cli.main(["study", file, "--on", "serial", "--out", str(tmp_path / "out")]) == 0
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning: ")]
-    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference (start.displacement = 0.01), ")
+    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference; levels, r = 2 and r = 4); ")
     assert told[2].startswith("warning: sensitivity: 2 of 2 settings that were nudged")  # at the first point alone
     heads, *lines = (tmp_path / "out" / "runs.csv").read_text().splitlines()
     assert {"warnings", "horizon_s.0.01"} <= set(heads.split(","))
@@ -148,8 +148,7 @@ def test_a_studys_page_names_the_rows_of_each_kind():
     rows += [row("Multi-Phi", 0.1, setting={"modes": r}, warnings=[SHARE] if r < 6 else []) for r in (3, 4, 6)]
     result = result_of(rows, methods=METHODS)
     (told,) = warned_of_study(result)
-    names = "Multi-Phi (r = 3), Multi-Phi (r = 4)"
-    assert told == f"static share: 2 of 4 runs ({names}); Multi-Phi (r = 3): {SHARE.partition(': ')[2]}"
+    assert told == f"static share: 2 of 4 runs (Multi-Phi, r = 3 and r = 4); the first: {SHARE.partition(': ')[2]}"
     assert "Static share: 2 of 4 runs" in text_of(render_study(result))
 
 

@@ -26,7 +26,6 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     error_words,
     findings,
     shown_points,
-    timing_words,
 )
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.comparison.wording import percent
@@ -102,7 +101,7 @@ def test_a_busy_machine_and_unsteady_repeats_are_told():
     late = [replace(each, finished="2026-01-02T04:10:00Z") for each in (calm, busy)]
     results = [result_of([row("a", 0.1)], [first, each]) for each in late]
     doubts = [" ".join(findings(each).distrust) for each in results]
-    assert timing_words(results[1]).endswith("Load average of the machine meanwhile: 3.2 to 3.2.")
+    assert findings(results[1]).timing.endswith("Load average of the machine meanwhile: 3.2 to 3.2.")
     assert "not alone" not in doubts[0]
     assert "differ most" not in doubts[0]
     assert "not alone on the machine: the load average rose to 3.2" in doubts[1]

@@ -28,10 +28,9 @@ DRAWN: dict[str, tuple[str, float]] = {
 
 def over_all_points(result: StudyResult) -> pd.DataFrame:
     """Of each setting, method by method: points with an error, its median and largest, and the median time [s]."""
-    frame = pd.DataFrame(
-        {"method": s.method, "setting": words(s.setting) or "–", "error": s.error, "online_s": s.online_s}
-        for s in settings(result)
-    ).astype({"error": float, "online_s": float})
+    cells = [(s.method, words(s.setting) or "–", s.error, s.online_s) for s in settings(result)]
+    frame = pd.DataFrame(cells, columns=["method", "setting", "error", "online_s"])
+    frame = frame.astype({"error": float, "online_s": float})
     of_setting = frame.groupby(["method", "setting"], sort=False)
     return of_setting.agg(
         points=("error", "count"), median=("error", "median"), worst=("error", "max"), online_s=("online_s", "median")

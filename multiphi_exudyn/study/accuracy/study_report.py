@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.accuracy import study_figures
@@ -35,12 +34,11 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     error_words,
     findings,
     most_accurate,
-    share,
     shown_points,
-    timing_words,
 )
+from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.plots import data_uri
-from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.measures import metrics
 
 __all__ = ["render_study"]
@@ -72,17 +70,8 @@ class Point:
 
 def render_study(result: StudyResult) -> str:
     """The page as HTML."""
-    environment = Environment(
-        loader=PackageLoader("multiphi_exudyn.study.accuracy"), autoescape=True, undefined=StrictUndefined
-    )
-    environment.filters |= {
-        "percent": percent,
-        "seconds": seconds,
-        "times": times,
-        "words": words,
-        "cell": cell_words,
-        "share": share,
-    }
+    environment = environment_of(__package__ or "")
+    environment.filters |= {"words": words, "cell": cell_words}
     failed = [row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"]
     return environment.get_template(TEMPLATE).render(
         result=result,
@@ -94,7 +83,6 @@ def render_study(result: StudyResult) -> str:
         kinds=[False, True] if any(method.refine for method in result.study.methods) else [False],
         full=full_methods(result),
         error_words=error_words,
-        timing=timing_words(result),
         overall=over_all_points(result).to_dict("records") if len(points(result)) > 1 else [],
         response=_response(result),
         along=[(axis, _along(result, axis), tables_along(result, axis)) for axis in _axes(result)],

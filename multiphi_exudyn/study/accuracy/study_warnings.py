@@ -2,31 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, longest, named, settings, words
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from multiphi_exudyn.study.sweep.store import Row
-from multiphi_exudyn.time.warning_groups import grouped
+from multiphi_exudyn.time.warning_groups import WarningGroup, grouped
 
 __all__ = ["warned"]
+
+NAMED = 3  # settings of a method that are named one by one
 
 
 def warned(result: StudyResult) -> list[str]:
     """What the models warn of, a sentence for each kind, and how long their runs are determined."""
     rows = [row for row in (*result.rows, *result.budgets) if row.status == "ok"]
-    found = [group.told(len(rows)) for group in grouped(_warnings(row) for row in rows)]
-    return found + list(_nudged(result))
+    found = grouped((str(number), _warnings(row)) for number, row in enumerate(rows))
+    return [_told(group, [rows[int(run)] for run in group.runs], len(rows)) for group in found] + list(_nudged(result))
 
 
-def _warnings(row: Row) -> tuple[str, list[str]]:
-    """A run in words, and its warnings; of a budget those of its rungs."""
-    given = row.parameters
-    near = {f"{field} ×": factor for field, factor in given["nearby"].items()}
-    fields = words({**given["at"], **given["setting"], **near})
-    sentences = [each for rung in row.values.get("rungs", {}).values() for each in rung["warnings"]]
-    return f"{given['method']}{f' ({fields})' if fields else ''}", row.values.get("warnings", sentences)
+def _warnings(row: Row) -> list[str]:
+    """Of a run; of a budget those of its rungs."""
+    rungs = row.values.get("rungs", {}).values()
+    return list(row.values.get("warnings", [sentence for rung in rungs for sentence in rung["warnings"]]))
+
+
+def _told(group: WarningGroup, rows: Sequence[Row], of: int) -> str:
+    """A kind of warning: how many runs have it, of which settings of which methods, and what the first one says."""
+    methods = dict[str, dict[str, None]]()
+    for row in rows:
+        methods.setdefault(row.parameters["method"], {})[words(row.parameters["setting"])] = None
+    which = "; ".join(_method(method, [s for s in settings if s]) for method, settings in methods.items())
+    return f"{group.kind}: {len(rows)} of {of} runs ({which}); the first: {group.example}"
+
+
+def _method(name: str, settings: Sequence[str]) -> str:
+    shown = settings if len(settings) <= NAMED else [f"{settings[0]} to {settings[-1]}"]
+    return f"{name}, {' and '.join(shown)}" if shown else name
 
 
 def _nudged(result: StudyResult) -> Iterable[str]:

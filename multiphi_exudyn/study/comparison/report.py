@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.comparison import contact_plots, plots
@@ -14,7 +13,7 @@ from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotal
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
-from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.zoom import embedded, zoom_data
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
@@ -55,12 +54,8 @@ class Picture:
 
 def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequence[LossTable]) -> str:
     """The page as HTML."""
-    environment = Environment(
-        loader=PackageLoader("multiphi_exudyn.study.comparison"), autoescape=True, undefined=StrictUndefined
-    )
-    end = ROUND_OFF * comparison.bench.t_end
-    until = {"until": lambda given: "whole run" if given >= end else f"{given:.3f} s"}
-    environment.filters |= {"percent": percent, "seconds": seconds, "times": times} | until
+    environment, end = environment_of(__package__ or ""), ROUND_OFF * comparison.bench.t_end
+    environment.filters["until"] = lambda given: "whole run" if given >= end else f"{given:.3f} s"
     zoom = zoom_data(comparison)
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["engineering", "listed", "percent", "seconds", "sentence", "times"]
+__all__ = ["engineering", "listed", "percent", "seconds", "sentence", "share", "times"]
 
 
 def percent(value: float | None) -> str:
@@ -16,6 +16,11 @@ def percent(value: float | None) -> str:
     if abs(share) < 0.1:
         return f"{share:.1g} %"
     return f"{share:.1f} %" if abs(share) >= 10 else f"{share:.2f} %"
+
+
+def share(value: float) -> str:
+    """A tolerance as it was given: "5 %", "0.5 %"."""
+    return f"{100 * value:g} %"
 
 
 def seconds(value: float | None) -> str:

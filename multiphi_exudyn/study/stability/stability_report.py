@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from multiphi_exudyn.study.comparison.wording import percent, seconds, sentence
+from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
 from multiphi_exudyn.study.stability.outcome import CaseResult
 from multiphi_exudyn.study.stability.summary import failures, headline, summaries, warned
@@ -20,14 +18,12 @@ TEMPLATE = "stability.html.j2"
 
 def render_stability(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> str:
     """The page as HTML."""
-    page = Environment(
-        loader=PackageLoader("multiphi_exudyn.study.stability"), autoescape=True, undefined=StrictUndefined
-    )
-    page.filters |= {"figure": figure, "percent": percent, "seconds": seconds}
+    page = environment_of(__package__ or "")
+    page.filters["figure"] = figure
     return page.get_template(TEMPLATE).render(
         results=results,
         headline=headline(results),
-        warned=[sentence(told) for told in warned(results)],
+        warned=warned(results),
         summaries=summaries(results),
         failures=failures(results),
         quick=quick,

@@ -1,0 +1,37 @@
+"""Pages and their sentences from the templates beside a package, with numbers as a reader takes them in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, share, times
+
+__all__ = ["environment_of", "sentences"]
+
+FILTERS = (engineering, listed, percent, seconds, sentence, share, times)
+
+
+def environment_of(package: str) -> Environment:
+    """The templates of a package; those of HTML escape what is filled in."""
+    environment = Environment(
+        loader=PackageLoader(package),
+        autoescape=lambda name: ".html" in (name or ""),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {function.__name__: function for function in FILTERS}
+    return environment
+
+
+def sentences(package: str, template: str, parts: Iterable[str], **values: Any) -> dict[str, tuple[str, ...]]:
+    """Of each macro among ``parts`` the paragraphs that these values leave: a sentence or two each, on one line."""
+    module = environment_of(package).get_template(template).make_module(values)
+    texts = {name: str(getattr(module, name)()) for name in parts}
+    return {
+        name: tuple(" ".join(paragraph.split()) for paragraph in text.split("\n\n") if paragraph.strip())
+        for name, text in texts.items()
+    }
