@@ -17,6 +17,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
+__all__ += ["struck_defects"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,27 @@ def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...
         after.entries[key] = DefectForm(factor(displaced), factor(moving), modes)
     way: DefectForm = after.entries[key]
     return way
+
+
+def struck_defects(level: LoadedLevel) -> np.ndarray:
+    """|w / Omega|^2 (c,) of a rigid contact that an impulse of one strikes and that opens again; nan for others.
+
+    The level's modes turn it into V V^T h, of which Q leaves what is across h and the closed rigid contacts. Unknown
+    where contacts rub: their impulse has another direction.
+    """
+    own, base = level.level, level.level.base
+    found = np.full(len(base.contacts), np.nan)
+    rigid = np.array([i for i, contact in enumerate(base.contacts) if contact.rigid], int)
+    if not len(rigid) or any(contact.further or contact.held for contact in base.contacts):
+        return found
+    given = base.directions[:, rigid]
+    moved, across = np.split(
+        allowed(base, held_rigidly(level), np.hstack([own.vectors @ (own.vectors.T @ given), given])), 2, axis=1
+    )
+    lengths = np.sum(across * across, axis=0)
+    along = np.divide(np.sum(across * moved, axis=0), lengths, out=np.zeros(len(rigid)), where=lengths > 0)
+    found[rigid] = np.sum(over_omega(base, moved - across * along) ** 2, axis=0)
+    return found
 
 
 def factor(rows: np.ndarray) -> np.ndarray:

@@ -1,8 +1,9 @@
 """Defects of a run as they happen: what levels entered cannot hold, added up for its warnings (defect_forms.py).
 
 At the start d = y - V xi - y_inf and w = (v - V xi') / Omega, row by row; between levels by the triangular factors
-of their map. A rigid contact that is struck and does not stay closed takes more out than the factors know: the sum is
-then nan, and so it is where an instant passed through further levels.
+of their map. A rigid contact that is struck and opens again takes more out than the factors know: where it alone is
+struck, that goes with the square of its impulse; where several are, or an instant passed through further levels, the
+sum is nan.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from multiphi_exudyn.events.arrays import (
     SHARED,
     SPEED,
     STATES,
+    STRUCK_DEFECTS,
 )
 from multiphi_exudyn.events.maps import find_map
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
@@ -46,6 +48,9 @@ def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
     """Adds |d|^2 + |w / Omega|^2 between two states of an instant with the changes that are listed."""
     struck, way = who_is_struck(ints, numbers, after), -1
     if ints[JUDGED] == 0 or (struck == NOBODY and ints[before + LEVEL] == ints[after + LEVEL]):
+        return
+    if struck == LEAVES and ints[before + LEVEL] == ints[after + LEVEL]:
+        numbers[DEFECTS] += left_by_impact(ints, numbers, ints[ints[after + LEVEL] + STRUCK_DEFECTS])
         return
     if struck != LEAVES:
         way = find_map(ints, ints[before + LEVEL], ints[after + LEVEL])
@@ -77,6 +82,18 @@ def who_is_struck(ints: Ints, numbers: Numbers, after: int) -> int:
         if numbers[ints[CHANGE_IMPULSES] + k] > 0.0 and ints[change + 1] != SHARED:
             result = max(result, LEAVES if ints[states + ints[change]] == OPEN else STAYS)
     return result
+
+
+@compiled
+def left_by_impact(ints: Ints, numbers: Numbers, sizes: int) -> float:
+    """|w / Omega|^2 of a contact that was struck and has opened again; nan where there are several."""
+    count, result = 0, math.nan
+    for k in range(ints[CHANGE_COUNT]):
+        change, impulse = ints[CHANGES] + k * CHANGE_WIDTH, numbers[ints[CHANGE_IMPULSES] + k]
+        if impulse > 0.0 and ints[change + 1] != SHARED:
+            count += 1
+            result = impulse * impulse * numbers[sizes + ints[change]]
+    return result if count == 1 else math.nan
 
 
 @compiled

@@ -8,6 +8,7 @@ import numpy as np
 
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.defect_forms import struck_defects
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import asked_state, signal_row, signals_of
@@ -46,6 +47,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.STATES: put("ints", level.states),
         a.RESPONSE: _put_response(buffers, modal),
         a.FREE_SIZES: put("numbers", _free_sizes(modal)) if buffers.ints[a.PRESCRIBED] else -1,
+        a.STRUCK_DEFECTS: put("numbers", struck_defects(level)) if buffers.ints[a.JUDGED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(buffers, level, exits, kept),
         a.EXIT_COUNT: firsts[-1],

@@ -13,7 +13,7 @@ from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.round_off import sign_of
 
-__all__ = ["Event", "Loss", "Phase", "Row", "State", "event_table", "total_loss"]
+__all__ = ["Event", "Loss", "Phase", "Row", "State", "event_table", "total_impulse", "total_loss"]
 
 
 class Phase(Enum):
@@ -168,6 +168,16 @@ def total_loss(events: Sequence[Event]) -> Loss:
     """The energies that left at all events, some of which are kept in arrays (time/record.py)."""
     kept = getattr(events, "loss", None)
     return sum((event.loss for event in events), Loss()) if kept is None else kept
+
+
+def total_impulse(events: Sequence[Event], contact: str, first: float, last: float) -> float:
+    """What a contact was struck with [N s] in [first, last] [s]; some events are kept in arrays (time/record.py)."""
+    kept = getattr(events, "impulse", None)
+    if kept is not None:
+        return float(kept(contact, first, last))
+    within = [event for event in events if first <= event.time <= last]
+    struck = sum(event.impulse for event in within if event.contact == contact)
+    return struck + sum(impulse for event in within for name, impulse in event.shared if name == contact)
 
 
 @dataclass(frozen=True)

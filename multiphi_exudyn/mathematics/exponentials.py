@@ -55,8 +55,8 @@ class Exponentials:
             result[..., chained - 1] += self.powers[chained] / self.unit * coefficients[..., chained]
         return result
 
-    def integrals(self, duration: float) -> np.ndarray:
-        """Integral of every phi_j over [0, duration], (p,)."""
+    def integrals(self, duration: float | np.ndarray) -> np.ndarray:
+        """Integral of every phi_j over [0, duration], (p,), or (k, p) for durations (k, 1)."""
         return exponential_integrals(self.rates, self.powers, duration, self.unit)
 
     def shifted(self, coefficients: np.ndarray, delay: float) -> np.ndarray:
@@ -75,7 +75,9 @@ class Exponentials:
         return matrix
 
 
-def exponential_integrals(rates: np.ndarray, powers: np.ndarray, duration: float, unit: float) -> np.ndarray:
+def exponential_integrals(
+    rates: np.ndarray, powers: np.ndarray, duration: float | np.ndarray, unit: float
+) -> np.ndarray:
     """Integral of (t / unit)^d exp(s t) over [0, duration], elementwise; d small.
 
     In units of time: by parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.

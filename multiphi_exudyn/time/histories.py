@@ -16,7 +16,7 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.state import Event
+from multiphi_exudyn.events.state import Event, total_impulse
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.history_figure import history_figure
 from multiphi_exudyn.time.segment import Segment, Segments, listed
@@ -159,15 +159,7 @@ class Histories(Shown, ABC):
         first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
         if first > last:
             raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
-        pushed = sum(
-            segment.integral(row(segment.level), max(first, segment.start), min(last, segment.end))
-            for segment in self.segments
-            if segment.end > first and segment.start < last and np.any(row(segment.level))
-        )
-        within = [event for event in self.events if first <= event.time <= last]
-        struck = sum(event.impulse for event in within if event.contact == contact)
-        struck += sum(impulse for event in within for name, impulse in event.shared if name == contact)
-        return float(pushed + struck)
+        return self._segments.integral(row, first, last) + total_impulse(self.events, contact, first, last)
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
         """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out.

@@ -7,6 +7,7 @@ however many threads there are. What is not asked for is not kept.
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,10 +28,12 @@ from multiphi_exudyn.mechanics.arguments import real_array
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.base_share import row_warnings
+from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
+from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.simulate import Run, checked_end, holding, warned
 from multiphi_exudyn.time.trajectory import Start, Trajectory
-from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
+from multiphi_exudyn.time.warning_groups import grouped, issue
 
 __all__ = ["ManyRuns", "simulate_many"]
 
@@ -168,6 +171,7 @@ class _Task:
     def __init__(self, given: Run, starts: list[_Start], points: tuple[At, ...], times: np.ndarray) -> None:
         self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
         self.levels = BoundedCache[object, LoadedLevels](KEPT)
+        self._rows: tuple[MultiPhiModel | None, list[np.ndarray]] = None, []
         self._points, self._times, count = points, times, len(starts)
         self._samples, self._ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self._events, self._told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
@@ -212,11 +216,18 @@ class _Task:
 
     def _sample(self, number: int, trajectory: Trajectory) -> None:
         known = self._times <= trajectory.t_end
-        if not (trajectory.segments and np.any(known)):
+        if not (trajectory.segments and known.any()):
             return
-        with kept_back():
-            for place, point in enumerate(self._points):
-                self._samples[number, place, known] = trajectory.at(point, self._times[known])
+        segments, times = listed(trajectory.segments), self._times[known]
+        for place, row in enumerate(self._rows_of(trajectory.model)):
+            self._samples[number, place, known] = segments.values(times, "right", functools.partial(point_row, row))
+
+    def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
+        """The points' rows (m,) in the base coordinates of the model that runs end with, one for most of them."""
+        if self._rows[0] is not model:
+            rows = [model.base.modes.shapes.T @ model.structure.row(point) for point in self._points]
+            self._rows = model, rows
+        return self._rows[1]
 
 
 class _Worker:

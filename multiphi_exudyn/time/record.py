@@ -121,6 +121,21 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``."""
         return self._record.values(times, side, row)
 
+    def _integral(
+        self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
+    ) -> float:
+        """See ``Segments``; in closed form at once where no channel is a function of time."""
+        if level.excitation.prescribed:
+            return super()._integral(level, row, places, starts, ends)
+        response, r, n = level.modal.response, level.modal.modes, level.width
+        x, v = self.states(places, starts - self.starts[places])[:, :, :n]
+        c = x[:, :r] @ response.from_displacement.T + v[:, :r] @ response.from_velocity.T
+        if level.driven:
+            c = c + response.from_force @ level.asymptotic.drive
+        terms = row[:r] @ response.shapes + row[n : n + r] @ response.basis.derivative(response.shapes)
+        moved = (c * terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
+        return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
+
     @functools.cached_property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
@@ -139,6 +154,12 @@ class Events(Made[Event]):
     def loss(self) -> Loss:
         """The energies [J] that left at all of them."""
         return Loss(*self._record.amounts[:, 1:-1].sum(axis=0).tolist())
+
+    def impulse(self, contact: str, first: float, last: float) -> float:
+        """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
+        names, (kinds, amounts) = [name for name, _ in self._record.told], (self._record.kinds, self._record.amounts)
+        own = (kinds[:, 0] == names.index(contact)) & (amounts[:, 0] >= first) & (amounts[:, 0] <= last)
+        return float(amounts[own, -1].sum())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
@@ -227,11 +248,13 @@ class Record:
         return not self._parts and (self._last is None or "kinds" not in self._last)
 
     def _add(self, taken: dict[str, np.ndarray]) -> None:
-        self._parts = self._parts or {name: Growing(empty) for name, empty in EMPTY.items()}
         parts, rows = self._parts, taken.get("rows", EMPTY["rows"])
-        rows[:, 2] += parts["kinds"].count
-        rows[:, 3] += parts["coordinates"].count
-        rows[rows[:, 4] >= 0, 4] += parts["phases"].count
+        if parts:
+            rows[:, 2] += parts["kinds"].count
+            rows[:, 3] += parts["coordinates"].count
+            rows[rows[:, 4] >= 0, 4] += parts["phases"].count
+        else:
+            self._parts = parts = {name: Growing(empty) for name, empty in EMPTY.items()}
         for name, part in taken.items():
             parts[name].add(part)
 
@@ -248,7 +271,7 @@ class Record:
         return EMPTY["phases"] if self.eventless else np.flatnonzero(self.kinds[:, 1] != a.SHARED)
 
     @functools.cached_property
-    def _told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
+    def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
         """The name of every contact, and its states."""
         return [(contact.name, contact.states) for contact in self._contacts]
 
@@ -276,7 +299,7 @@ class Record:
 
         n: the most coordinates of a level; those that a level has not are zero.
         """
-        visited = np.unique(self.rows[places, 0]).tolist()
+        visited = sorted(set(self.rows[places, 0].tolist()))
         width = max((self.levels[number].level.modes for number in visited), default=0)
         result = np.zeros((2, len(places), width))
         given = np.ascontiguousarray(places), np.ascontiguousarray(after), len(places), width, result.ravel()
@@ -287,8 +310,8 @@ class Record:
 
     def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
         """row.(xi, xi', 1) (k,) at times (k,) [s]; row: (2 n + 1,) of a level with n coordinates."""
-        first, last = owners(self.spans[:, 0], np.array([np.min(times), np.max(times)]), side).tolist()
-        visited = np.unique(self.rows[first : last + 1, 0]).tolist()
+        first, last = owners(self.spans[:, 0], np.array([times.min(), times.max()]), side).tolist()
+        visited = sorted(set(self.rows[first : last + 1, 0].tolist()))
         width = max(self.levels[number].level.modes for number in visited)
         functions, result = np.zeros((len(self.levels), 2 * width + 1)), np.empty(len(times))
         for number in visited:
@@ -387,7 +410,7 @@ class Record:
         before = int(self.places[i - 1]) + 1 if i else 0
         time, *lost, impulse = self.amounts[place].tolist()
         contact, entered, left = self.kinds[place].tolist()
-        shared = tuple((self._told[self.kinds[k, 0]][0], float(self.amounts[k, -1])) for k in range(before, place))
-        name, states = self._told[contact]
+        shared = tuple((self.told[self.kinds[k, 0]][0], float(self.amounts[k, -1])) for k in range(before, place))
+        name, states = self.told[contact]
         kind = event_kind(states, left, entered)
         return Event(time, name, kind, Loss(*lost), impulse, shared, states[entered].name)

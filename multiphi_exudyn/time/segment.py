@@ -158,6 +158,22 @@ class Segments(Sequence[Segment], ABC):
     def works(self) -> tuple[float, float, float]:
         """Work [J] of damping, of loads and stops that vary in time, and of friction."""
 
+    def integral(self, row: Callable[[LoadedLevel], np.ndarray], first: float, last: float) -> float:
+        """Integral over [first, last] [s] of row.(xi, xi', 1); row: (2 n + 1,) of a level with n coordinates."""
+        total, starts, ends = 0.0, np.maximum(self.starts, first), np.minimum(self.ends, last)
+        for number, level in enumerate(self.levels):
+            if np.any(function := row(level)):
+                places = np.flatnonzero((self.numbers == number) & (starts < ends))
+                total += self._integral(level, function, places, starts[places], ends[places]) if len(places) else 0.0
+        return total
+
+    def _integral(
+        self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
+    ) -> float:
+        """The same from ``starts`` to ``ends`` in segments ``places`` (k,) of one level."""
+        given = zip(places.tolist(), starts.tolist(), ends.tolist(), strict=True)
+        return sum(self[place].integral(row, start, end) for place, start, end in given)
+
     def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
         """Places (k,) of the segments that hold at times (k,) [s]."""
         return owners(self.starts, times, side)

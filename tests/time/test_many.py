@@ -12,6 +12,7 @@ from small_structures import bed, chain, stop
 import multiphi_exudyn as mp
 from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.time import many
+from multiphi_exudyn.time.warning_groups import kept_back
 
 END = 6.0
 TIMES = np.linspace(0, END, 13)
@@ -30,7 +31,7 @@ def alone(given, starts, **options):
     """What ``simulate_many`` keeps, from runs one by one of a model that has built nothing."""
     runs = []
     for x in starts:
-        with many.kept_back():
+        with kept_back():
             runs.append(mp.simulate(given, END, displacement=x, **options))
     return runs
 

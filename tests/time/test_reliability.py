@@ -313,7 +313,7 @@ class TestHorizon:
         assert pickle.loads(pickle.dumps(run)).horizon(1e-3) == run.horizon(1e-3)
 
 
-@pytest.mark.parametrize("kind", ["compliant", "mixed"])
+@pytest.mark.parametrize("kind", ["compliant", "rigid", "mixed"])
 def test_what_the_loop_adds_up_of_defects_is_the_sum_of_them(kind):
     known = 0
     for seed in range(30):
