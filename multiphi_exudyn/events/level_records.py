@@ -34,11 +34,10 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     return _record(buffers, given)
 
 
-def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequence[int]) -> int:
-    """The record of a level with a number; watched: elements that can ask first while all are armed."""
+def put_level(buffers: Buffers, level: LoadedLevel, number: int) -> int:
+    """The record of a level with a number, whose exits are all watched."""
     own, modal, put, parts, exits = level.level, level.modal, buffers.put, level_parts(level), exits_of(level)
     firsts = np.searchsorted([i for i, _ in exits], range(len(level.states) + 1))
-    ends = [k for i in watched for k in range(firsts[i], firsts[i + 1])]
     given = {
         a.NUMBER: number,
         a.MODES: modal.modes,
@@ -48,8 +47,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, watched: Sequen
         a.EXITS: _put_exits(buffers, level, exits),
         a.EXIT_COUNT: len(exits),
         a.FIRST_EXITS: put("ints", firsts),
-        a.ENDS: put("ints", ends),
-        a.END_COUNT: len(ends),
+        a.WATCHED: put("ints", range(len(exits))),
+        a.WATCHED_COUNT: len(exits),
         **_frequencies(buffers, modal.omega),
         a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),

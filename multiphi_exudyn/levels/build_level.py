@@ -48,7 +48,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     gap_rows[_following(base, held)] = 0.0  # by definition, whatever a soft mode leaves
     forces, rates = _force_rows(base, closed, squares, vectors, damping, gap_rows[closed])
     return Level(
-        closed=tuple(base.links[i].name for i in closed),
+        closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
         base=base,
         squares=squares,

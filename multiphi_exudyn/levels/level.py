@@ -114,9 +114,9 @@ class Level(Shown):
     Attributes
     ----------
     closed : tuple of str
-        Names of its closed contacts.
+        Names of its closed contacts; of a force law, of the links that its segment has beside those of segment "0".
     indices : tuple of int
-        The same as positions in the base.
+        Positions in the base of all links that hold.
     base : ModalBase
         The coordinates that all levels share.
     squares : array (r,)

@@ -94,13 +94,12 @@ class OwnLoads:
         return self.loaded.further(stepped.states, key, lambda: self._conditions(stepped, step, direct))
 
     def _conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
-        level, ends = self.loaded.level(stepped.states), self.loaded.ends(stepped.states)
-        ways = [(*way, row) for way, row in zip(exits_of(level), signal_rows(level), strict=True) if way[0] in ends]
-        rows = [row for *_, row in ways]
+        level = self.loaded.level(stepped.states)
+        rows = signal_rows(level)
         if self.varies:
             return driven_conditions(stepped, level, rows, step)
         carried = np.zeros((len(rows), direct.shape[1]))
-        for k, (element, exit_, _) in enumerate(ways):
+        for k, (element, exit_) in enumerate(exits_of(level)):
             for place, force in force_shares(level, element, exit_):
                 carried[k] += force * direct[place]
         return plain_conditions(stepped, rows, step, carried)
