@@ -55,6 +55,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         vectors=vectors,
         damping=_projected_damping(damping, squares, vectors),
         gap_rows=gap_rows,
+        speed_rows=gap_rows,
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],

@@ -127,6 +127,8 @@ class Level(Shown):
         Phi_l^T C Phi_l [1/s].
     gap_rows : array (c, r)
         gap_i = gap_rows[i].eta + ... for every contact of the model.
+    speed_rows : array (c, r)
+        gap_i' = speed_rows[i].eta', as impacts see it: without the quasi-static part of what varies (events/channels).
     force_rows, force_rate_rows : array (k, r)
         Contact forces of the closed contacts from eta and eta'.
     neutral : array (m, z)
@@ -157,6 +159,7 @@ class Level(Shown):
     vectors: np.ndarray
     damping: np.ndarray
     gap_rows: np.ndarray
+    speed_rows: np.ndarray
     force_rows: np.ndarray
     force_rate_rows: np.ndarray
     neutral: np.ndarray
@@ -204,11 +207,6 @@ class Level(Shown):
     def damping_matrix(self) -> np.ndarray:
         """Of the motion (r, r) [1/s]: D, but where contacts slide."""
         return self.damping
-
-    @property
-    def speed_rows(self) -> np.ndarray:
-        """Gap velocities (c, r) from eta', as impacts see them."""
-        return self.gap_rows
 
     @functools.cached_property
     def static_shares(self) -> dict[str, float]:
@@ -271,6 +269,7 @@ class Level(Shown):
             vectors=self.vectors[:, :modes],
             damping=self.damping[:modes, :modes],
             gap_rows=self.gap_rows[:, :modes],
+            speed_rows=self.speed_rows[:, :modes],
             force_rows=self.force_rows[:, :modes],
             force_rate_rows=self.force_rate_rows[:, :modes],
             computed=self.computed[:modes],
