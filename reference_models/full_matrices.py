@@ -23,7 +23,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, expanded
+from multiphi_exudyn.mechanics.element import AnyLink
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.full_beam_settings import FullBeamSettings
@@ -70,7 +71,7 @@ def run_matrices(
 
     varying: the load that changes, (n, k) at times (k,) [s], beside the static one.
     damping: C (n, n), in place of the structure's own description of it.
-    laws: force laws; gaps are given of their springs.
+    laws: force laws; their gaps are q less the place of their centres.
 
     Every contact has a finite stiffness and, unless it is viscous, acts on one coordinate, or between two with opposite
     coefficients.
@@ -88,16 +89,16 @@ def run_matrices(
         _solve(mbs, t_end, steps, cpu_limit_s)
         wall_s = time.perf_counter() - started
         q, q_t = (np.array(mbs.GetSensorStoredData(sensor)) for sensor in sensors)
-    springs = [*contacts, *expanded(laws)]
-    gaps = {c.name: q[:, 1:] @ structure.row(c.direction) + c.gap for c in springs}
+    elements: list[AnyLink] = [*contacts, *laws]
+    gaps = {link.name: q[:, 1:] @ structure.row(link.direction) + link.gap for link in elements}
     work = (q[:, 1:] - q[0, 1:]) @ f
     if varying is not None:
         power = np.sum(varying(q[:, 0]).T * q_t[:, 1:], axis=1)
         work = work + cumulative_trapezoid(power, q[:, 0], initial=0)
     kinetic = np.sum(q_t[:, 1:] * (structure.mass @ q_t[:, 1:].T).T, axis=1) / 2
-    energy = kinetic + _strain(structure, springs, gaps, q[:, 1:])
+    energy = kinetic + _strain(structure, contacts, gaps, q[:, 1:])
     for law in laws:
-        energy = energy + law.constant * (q[:, 1:] @ structure.row(law.at) - law.centre)
+        energy = energy + law.energy(q[:, 1:] @ structure.row(law.at))
     return MatrixRun(q[:, 0], gaps, energy, kinetic, work, wall_s)
 
 
@@ -221,7 +222,7 @@ def _solve(mbs: Any, t_end: float, steps: int, cpu_limit_s: float | None) -> Non
 
 def _strain(
     structure: LinearStructure,
-    contacts: Sequence[Contact],
+    contacts: Sequence[UnilateralContact],
     gaps: dict[str, np.ndarray],
     q: np.ndarray,
 ) -> np.ndarray:

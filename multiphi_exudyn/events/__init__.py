@@ -14,7 +14,8 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     5       recovering                    phases.phase_of, waiting.watch
     6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again
     7       a viscous contact             switching.is_relaxing
-    8       the chains of a force law     phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
+    8       a force law asks              changes.turn_wishes, changes.segment_at
+    8       and changes                   switching.is_firm, decision.is_latest
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes
     10      a contact with friction       changes.turn_wishes, phases.is_denied
     10      a rigid one that strikes      impact.rub, resting.sliding_level, rebounds.hear_touching

@@ -45,7 +45,9 @@ __all__ = ["Buffers"]
 
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
 PRESCRIBED = 46  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
-KINDS, CHAINS, CHAIN_COUNT, STIFFNESSES, DIRECTIONS = 4, 5, 6, 7, 8
+KINDS, STIFFNESSES, DIRECTIONS = 4, 7, 8
+SEGMENTS = 5  # of a force law the link of its first knot, and how many knots are above and below; zero of others
+KNOTS = 6  # of all force laws
 STICKS, HELD_LINKS, SPRINGS, DROPS = (
     113,
     114,
@@ -91,7 +93,7 @@ ROWS, VALUES, VALUE_SIZES, IMPULSES, FURTHER, MOVED, SMALL_PROBLEM, CHANGE = 73,
 LOWEST, HIGHEST, LEADERS, RATIOS, WANTED = range(203, 208)  # of a small problem: its bounds; speeds wanted
 RESTITUTIONS, LASTS, GROUPS = range(208, 211)  # of elements; who begins its last bounce; who is struck with whom
 ASKING, AGAIN, HEARD, FREED, PENDING, PULLING, STRIKING, WISHES, SINGLES, DENIED = range(81, 91)  # sets
-HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST, CHAIN_MARKS = range(91, 100)
+HELD, CLOSED, JOINED, UNION, KEY, COMPLIANT_KEY, TOUCHING, RESTING_LIST = range(91, 99)
 JOIN_NUMBERS, PUSHED, RESTING_SIZES, ACCELERATION_TERMS, RELEASED_TERMS = range(100, 105)
 
 JUDGED = 211  # whether levels leave modes out, so that defects are added up
@@ -113,7 +115,8 @@ TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-RUN_NUMBERS = 44
+GIVEN_SPRINGS = 44  # strain energy [J] of the links that hold at the start, all in one
+RUN_NUMBERS = 45
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
 # ---------------------------------------------------------------------- other records, ints
@@ -124,7 +127,7 @@ OPEN, CLOSE = 0, 1  # states of a contact
 STICK, SLIP_FORWARD, SLIP_BACKWARD = 0, 1, 2  # of friction
 ARMED, RECOVERING, REFUSED, HELD_BACK, LANDING = 0, 1, 2, 3, 4
 
-NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, ENDS, END_COUNT = range(10)
+NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, WATCHED, WATCHED_COUNT = range(10)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
 DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
 RUBBINGS = 23  # how many forces of friction go with others in the last of them

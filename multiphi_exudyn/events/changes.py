@@ -26,6 +26,7 @@ from multiphi_exudyn.events.arrays import (
     OK,
     OPEN,
     RIGID,
+    SEGMENTS,
     SPRINGS,
     STATES,
     STICKS,
@@ -36,11 +37,22 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
-from multiphi_exudyn.events.signals import row_sign
+from multiphi_exudyn.events.signals import gap, row_sign
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
-__all__ = ["NOBODY", "bears_nothing", "clear", "enter", "flag_asking", "is_held", "note", "transfer", "turn_wishes"]
+__all__ = [
+    "NOBODY",
+    "bears_nothing",
+    "clear",
+    "enter",
+    "flag_asking",
+    "is_held",
+    "note",
+    "segment_at",
+    "transfer",
+    "turn_wishes",
+]
 
 NOBODY = -1  # in place of the state that an element asks for
 
@@ -54,7 +66,7 @@ def flag_asking(ints: Ints, asking: int, flags: int) -> None:
 
 @compiled
 def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
-    """10. Where the state that an element of WORKED asks for hangs on a speed, the one that belongs to its sign."""
+    """8, 10. Where the state that an element of WORKED asks for hangs on a speed or a place, the one that it says."""
     level = ints[WORKED + LEVEL]
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
@@ -63,6 +75,25 @@ def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
             sign = row_sign(ints, numbers, WORKED, exit_ + TURN, 0.0)
             if sign != 0:
                 ints[asking + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
+    for i in range(ints[ELEMENTS]):
+        if ints[asking + i] != NOBODY and ints[ints[SEGMENTS] + 3 * i] > 0:
+            segment = segment_at(ints, numbers, WORKED, i)
+            if segment != ints[ints[level + STATES] + i]:
+                ints[asking + i] = segment
+
+
+@compiled
+def segment_at(ints: Ints, numbers: Numbers, state: int, element: int) -> int:
+    """8. The segment of a force law in which its place lies."""
+    given, passed = ints[SEGMENTS] + 3 * element, 0
+    first, above, below = ints[given], ints[given + 1], ints[given + 2]
+    while passed < above and gap(ints, numbers, state, first + passed) < 0.0:
+        passed += 1
+    if passed > 0:
+        return passed
+    while passed < below and gap(ints, numbers, state, first + above + passed) < 0.0:
+        passed += 1
+    return above + passed if passed > 0 else 0
 
 
 @compiled

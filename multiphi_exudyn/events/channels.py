@@ -24,22 +24,7 @@ from multiphi_exudyn.levels.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
-__all__ = ["Channels", "ExtendedLevel"]
-
-
-@dataclass(frozen=True, repr=False)
-class ExtendedLevel(Level):
-    """A level in the coordinates xi = (eta, w) (r + q): its rows and vectors have q more columns.
-
-    speeds: gap velocities (c, r + q) without the quasi-static part. squares and damping are zero on w.
-    """
-
-    speeds: np.ndarray
-
-    @property
-    def speed_rows(self) -> np.ndarray:
-        """Gap velocities (c, r + q) as impacts see them."""
-        return self.speeds
+__all__ = ["Channels"]
 
 
 @dataclass(frozen=True)
@@ -118,8 +103,8 @@ class Channels:
         terms = np.abs(moved) + np.abs(level.vectors) @ np.abs(centre)
         return cls(force, rate, carried, shapes, terms, contact_force, contact_rate)
 
-    def extended(self, level: Level, stops: np.ndarray) -> ExtendedLevel:
-        """The level in the coordinates xi; stops: s (c, q)."""
+    def extended(self, level: Level, stops: np.ndarray) -> Level:
+        """The level in the coordinates xi = (eta, w) (r + q); squares and damping are zero on w. stops: s (c, q)."""
         directions, sizes = level.base.directions.T, level.base.magnitudes[0].T
         gap_columns, speeds = directions @ self.shapes - stops, directions @ self.carried - stops
         held = level.following[:, None]  # the channels move these by round-off only
@@ -130,7 +115,7 @@ class Channels:
         fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops such a channel does not move
         gap_columns, speeds = np.where(fixed, -stops, gap_columns), np.where(fixed, -stops, speeds)
         q = self.force.shape[1]
-        return ExtendedLevel(
+        return Level(
             closed=level.closed,
             indices=level.indices,
             base=level.base,
@@ -139,12 +124,12 @@ class Channels:
             damping=np.pad(level.damping, (0, q)),
             gap_rows=np.hstack([level.gap_rows, gap_columns]),
             following=level.following,
+            speed_rows=np.hstack([level.gap_rows, speeds]),
             force_rows=np.hstack([level.force_rows, self.contact_force]),
             force_rate_rows=np.hstack([level.force_rate_rows, self.contact_force_rate]),
             neutral=level.neutral,
             computed=np.concatenate([level.computed, np.zeros(q)]),
             kept_beyond=level.kept_beyond,
-            speeds=np.hstack([level.gap_rows, speeds]),
         )
 
 

@@ -36,10 +36,10 @@ bases of two levels need not agree, so the law says what happens then; each sent
    open with g < 0, it is refused as in 6: armed when g has risen to zero, closed when its force in the level with it
    closed has. It may stay closed only with a force >= 0, and may open where its force would be negative.
    -> switching.is_relaxing
-8. The springs of a force law are compliant contacts whose closed sets are nested. While all of them are armed only
-   the ends of its chains can ask, the last closed and the first open spring, and only they are looked at. The two that
-   meet at the law's centre have the same gap with opposite sign and exchange at one instant.
-   -> phases.update_phases, phases.mark_chains, waiting.watch, waiting.who_asks
+8. A force law asks at either end of its segment for the next one, and changes always. Where truncation has left it
+   further beyond, for that in which it lies; it goes on from there, at the same instant, until it lies where it is, but
+   not back to where it has just come from.
+   -> changes.segment_at, changes.turn_wishes, switching.is_firm, decision.is_latest
 9. A sign is that of the first derivative that is not round-off.
    -> signals.row_sign, signals.rate_sign, phases.becomes
 10. A contact with friction that closes sticks where it hits; without a spring it slides in the direction in which it
@@ -105,6 +105,7 @@ from multiphi_exudyn.events.arrays import (
     FRICTION,
     HEARD,
     KINDS,
+    KNOTS,
     LANDING,
     LEVEL,
     LOST,
@@ -141,7 +142,7 @@ from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
-MOST_RETURNS = 3  # changes of an element at one instant, from which on it stays where truncated levels disagree
+MOST_RETURNS = 3  # changes of an element from or to a state at an instant, from which on it stays there
 ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
 
 
@@ -214,7 +215,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
             return status
     else:
         update_phases(ints, numbers, waves, WORKED, -1)
-    for _ in range(ROUNDS + c):
+    for _ in range(ROUNDS + c + ints[KNOTS]):
         keep_entered(ints, numbers)
         left = find_refused(ints)
         if left == 0:
@@ -290,12 +291,13 @@ def is_turned(ints: Ints, exit_number: int) -> int:
 
 @compiled
 def is_latest(ints: Ints, element: int, asked: int) -> int:
-    """1 where an element was the last to change at this instant, from the state asked for, or has changed often."""
+    """8. 1 where an element was the last to change at this instant, from the state asked for, or has changed often."""
     last, left, count = NOBODY, NOBODY, 0
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
         last = ints[ints[CHANGES] + k * CHANGE_WIDTH]
         left = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
-        count += 1 if last == element else 0
+        touched = left == asked or ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == asked
+        count += 1 if last == element and touched else 0
     return 1 if (last == element and left == asked) or count > MOST_RETURNS else 0
 
 

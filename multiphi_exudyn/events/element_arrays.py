@@ -18,7 +18,7 @@ __all__ = ["describe_elements"]
 
 
 def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
-    """Kinds, chains, stiffnesses, directions and springs of all elements, behind the run record."""
+    """Kinds, stiffnesses, directions and springs of all elements, behind the run record."""
     put = buffers.put
     buffers.take("ints", a.RUN_INTS)
     buffers.take("numbers", a.RUN_NUMBERS)
@@ -26,9 +26,10 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     viscous = base.dampings > 0
     kinds = np.where(np.isinf(base.stiffnesses), a.RIGID, np.where(viscous, a.VISCOUS, a.COMPLIANT))[:c]
     kinds[[i for i in model.held if i < c]] = a.SLIDING
-    chains = np.full(c, -1)
-    for number, chain in enumerate(model.chains):
-        chains[list(chain)] = number
+    segments = np.zeros((c, 3), int)
+    for i, law in base.laws.items():
+        if law.further:
+            segments[i] = base.link_places[i][1], *law.knots_beside
     limits, rubs = np.zeros((2, c)), np.zeros((2, c))
     for i, element in enumerate(model.contacts):
         if isinstance(element, Friction) and element.rigid:
@@ -44,8 +45,8 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.WHOLE: int(model.whole),
         a.JUDGED: int(not model.whole),
         a.KINDS: put("ints", kinds),
-        a.CHAINS: put("ints", chains),
-        a.CHAIN_COUNT: len(model.chains),
+        a.SEGMENTS: put("ints", segments),
+        a.KNOTS: sum(len(law.further) for law in base.laws.values()),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),
         a.DIRECTIONS: put("numbers", units.T),
         a.LIMITS: put("numbers", limits[0]),

@@ -21,7 +21,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential, differentiated, translated
-from multiphi_exudyn.mechanics.force_law import LawSpring
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
 from multiphi_exudyn.mechanics.time_functions import Sampled, TimeFunction
 
@@ -256,9 +256,8 @@ class _Channels:
             self._move(fixed, self._history(load.course))
 
     def _check_stop(self, name: str) -> None:
-        contact = self._model.contacts[self._model.index(name)]
-        if isinstance(contact, LawSpring):
-            raise MultiPhiTypeError(f"stop motion of {name!r}: got a spring of a force law, need a contact")
+        if isinstance(self._model.contacts[self._model.index(name)], ForceLaw):
+            raise MultiPhiTypeError(f"stop motion of {name!r}: got a force law, need a contact")
 
     def _check_smooth(self, stop: np.ndarray, course: TimeFunction) -> None:
         """Refuse samples where they move a rigid contact's stop."""

@@ -144,6 +144,15 @@ class LevelArrays:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
             if len(held):
                 numbers[start + m + q : start + m + q + len(held)] = placed
+        numbers[a.GIVEN_SPRINGS] = self._springs(key)
+
+    def _springs(self, key: Sequence[int]) -> float:
+        """Strain energy [J] that the links have in the place of GIVEN which hold in these states."""
+        base, ints, n = self.levels.model.base, self.ints, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
+        links = [k for k in self.levels.model.links_held(key) if np.isfinite(base.stiffnesses[k])]
+        rows = self.numbers[ints[self._base + a.GAPS] :][: len(base.links) * (n + 1)].reshape(-1, n + 1)[links]
+        gaps = rows[:, :-1] @ self.numbers[ints[a.GIVEN + a.PLACE] :][:n] + rows[:, -1]
+        return 0.5 * float(base.stiffnesses[links] @ (gaps * gaps))
 
     def set_state(
         self, level: int, place: np.ndarray, speed: np.ndarray, phases: Sequence[int], measured: Measure = measure
@@ -232,7 +241,7 @@ class LevelArrays:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
         self.scratch.reserve(n, free, int(np.sum(self._exits.of(level.states))))
-        record = put_level(self.buffers, level, number, self._exits, self.levels.ends(level.states))
+        record = put_level(self.buffers, level, number, self._exits)
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
 

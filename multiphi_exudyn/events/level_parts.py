@@ -31,7 +31,7 @@ def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
         a.FOLLOWS: form.follows,
         a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
     }
-    if own.speed_rows is not own.gap_rows:
+    if own is not modal:
         parts[a.SPEEDS] = np.column_stack([own.speed_rows, np.zeros(len(own.gap_rows))])
     if np.any(moved):
         parts[a.CARRIED] = np.hstack([moved @ modal.vectors, moved @ channels.carried])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
@@ -36,11 +34,10 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     return _record(buffers, given)
 
 
-def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, watched: Sequence[int]) -> int:
-    """The record of a level with a number; watched: elements that can ask first while all are armed."""
+def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable) -> int:
+    """The record of a level with a number, whose exits are all watched."""
     own, modal, put, parts, kept = level.level, level.modal, buffers.put, level_parts(level), exits.of(level.states)
     firsts = exits.firsts(kept).tolist()
-    ends = [k for i in watched for k in range(firsts[i], firsts[i + 1])]
     given = {
         a.NUMBER: number,
         a.MODES: modal.modes,
@@ -52,8 +49,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.EXITS: _put_exits(buffers, level, exits, kept),
         a.EXIT_COUNT: firsts[-1],
         a.FIRST_EXITS: put("ints", firsts),
-        a.ENDS: put("ints", ends),
-        a.END_COUNT: len(ends),
+        a.WATCHED: put("ints", range(firsts[-1])),
+        a.WATCHED_COUNT: firsts[-1],
         **_frequencies(buffers, modal.omega),
         a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),

@@ -29,14 +29,13 @@ T = TypeVar("T")
 
 @dataclass
 class _Known:
-    """What is kept of a level: ``links`` that hold in it, its ``ends``, maps to other levels by their states.
+    """What is kept of a level: ``links`` that hold in it, maps to other levels by their states.
 
     further: what others make of it, by their keys.
     """
 
     level: LoadedLevel
     links: tuple[int, ...]
-    ends: tuple[int, ...] = ()
     ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
     further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(FURTHER))
 
@@ -65,7 +64,6 @@ class LoadedLevels:
         self.arrays: Any = None
         self.held: Any = None
         self.starts = BoundedCache[float, Any](STARTS)
-        self._all = tuple(range(len(model.contacts)))
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
@@ -170,25 +168,3 @@ class LoadedLevels:
         if target.states not in ways:
             ways[target.states] = Transition(source, target)
         return ways[target.states]
-
-    def ends(self, states: tuple[int, ...]) -> tuple[int, ...]:
-        """Elements that can ask first while all are armed: of a force law the ends of its chains."""
-        if not self.model.chains:
-            return self._all
-        known = self._of(states)
-        if not known.ends:
-            chains, held = self.model.chains, set(known.links)
-            linked = {i for chain in chains for i in chain}
-            found = {i for i in self._all if i not in linked}
-            for chain in chains:
-                found.update(_ends(chain, held))
-            known.ends = tuple(sorted(found))
-        return known.ends
-
-
-def _ends(chain: tuple[int, ...], closed: set[int]) -> tuple[int, ...]:
-    """Last closed and first open spring of a chain; the whole chain where its closed springs are not the first ones."""
-    count = sum(i in closed for i in chain)
-    if not all(i in closed for i in chain[:count]):
-        return chain
-    return chain[max(count - 1, 0) : count + 1]

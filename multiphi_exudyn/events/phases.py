@@ -1,4 +1,4 @@
-"""Phases: how every exit of a state stands, by sentences 1, 5, 6 and 8 of the law (decision.py).
+"""Phases: how every exit of a state stands, by sentences 1, 5 and 6 of the law (decision.py).
 
 An exit is ARMED, RECOVERING, REFUSED or HELD_BACK. s is its signal.
 """
@@ -9,13 +9,8 @@ from multiphi_exudyn.events.arrays import (
     AGAIN,
     ARMED,
     ASKED,
-    CHAIN_COUNT,
-    CHAIN_MARKS,
-    CHAINS,
     CHANNELS,
     ELEMENT,
-    END_COUNT,
-    ENDS,
     ENTERED,
     EXIT_COUNT,
     EXIT_INTS,
@@ -46,6 +41,8 @@ from multiphi_exudyn.events.arrays import (
     SETTLED,
     SIGNAL,
     STATES,
+    WATCHED,
+    WATCHED_COUNT,
     WORK_WAVES,
     WORKED,
 )
@@ -61,10 +58,8 @@ __all__ = [
     "first_exit",
     "hold_back",
     "is_denied",
-    "is_end",
     "is_refused",
     "keep_entered",
-    "mark_chains",
     "opening",
     "phase_of",
     "update_phases",
@@ -104,51 +99,21 @@ def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int,
 
 @compiled
 def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refused: int) -> None:
-    """6, 8. The phase in which every exit of a state stands; refused: flags of those that asked in vain, -1 for none.
-
-    While all springs of a law's chains are armed only the ends of the chains can ask, and only they are looked at.
-    """
+    """6. The phase in which every exit of a state stands; refused: flags of those that asked in vain, -1 for none."""
     level, phases = ints[state + LEVEL], ints[state + PHASES]
     count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
     for k in range(count):
         ints[phases + k] = ARMED
-    for e in range(ints[level + END_COUNT]):
-        k = ints[ints[level + ENDS] + e]
+    for e in range(ints[level + WATCHED_COUNT]):
+        k = ints[ints[level + WATCHED] + e]
         ints[phases + k] = phase_of(ints, numbers, waves, state, exits + k * EXIT_INTS)
         if ints[phases + k] != ARMED:
             settled = 0
-    if settled == 0 and ints[CHAIN_COUNT] > 0:
-        mark_chains(ints, state)
-        for k in range(count):
-            chain = ints[ints[CHAINS] + ints[exits + k * EXIT_INTS + ELEMENT]]
-            if chain >= 0 and ints[ints[CHAIN_MARKS] + chain] == 1 and is_end(ints, level, k) == 0:
-                ints[phases + k] = phase_of(ints, numbers, waves, state, exits + k * EXIT_INTS)
     if refused >= 0:
         for k in range(count):
             if ints[refused + ints[exits + k * EXIT_INTS + ELEMENT]] == 1 and ints[phases + k] != ARMED:
                 ints[phases + k] = REFUSED
     ints[state + SETTLED] = settled
-
-
-@compiled
-def mark_chains(ints: Ints, state: int) -> None:
-    """8. Flags (chains,) of the chains with an exit that is not armed."""
-    exits, phases = ints[ints[state + LEVEL] + EXITS], ints[state + PHASES]
-    for chain in range(ints[CHAIN_COUNT]):
-        ints[ints[CHAIN_MARKS] + chain] = 0
-    for k in range(ints[ints[state + LEVEL] + EXIT_COUNT]):
-        chain = ints[ints[CHAINS] + ints[exits + k * EXIT_INTS + ELEMENT]]
-        if chain >= 0 and ints[phases + k] != ARMED:
-            ints[ints[CHAIN_MARKS] + chain] = 1
-
-
-@compiled
-def is_end(ints: Ints, level: int, exit_number: int) -> int:
-    """1 where an exit is among those that are always looked at."""
-    for e in range(ints[level + END_COUNT]):
-        if ints[ints[level + ENDS] + e] == exit_number:
-            return 1
-    return 0
 
 
 @compiled

@@ -35,7 +35,7 @@ class ScratchArrays:
         self._struck = max(2 * self._rigid + self._rough, int(sliding), 1)
         self._together = self._rigid + int(np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0))  # held at once
         self.coordinates = self.exponentials = self.exits = 0
-        self.changes = ROUNDS * (3 * self._elements + 1)
+        self.changes = ROUNDS * (3 * self._elements + 1) + int(ints[a.KNOTS])
         self.powers = ints[a.FORCED_ROOM] = POWERS
         self._take(self._sets())
         buffers.ints[a.CHANGE_ROOM] = self.changes
@@ -87,7 +87,7 @@ class ScratchArrays:
         m = int(ints[a.COORDINATES])
         return {
             "ints": dict.fromkeys(OF_ELEMENTS, 2 * c + 1)
-            | {a.CHAIN_MARKS: int(ints[a.CHAIN_COUNT]), a.SMALL_PROBLEM: problem_ints(struck), a.LEADERS: struck}
+            | {a.SMALL_PROBLEM: problem_ints(struck), a.LEADERS: struck}
             | {a.CHANGES: a.CHANGE_WIDTH * changes},
             "numbers": dict.fromkeys((*OF_A_PROBLEM, a.IMPULSES, a.FURTHER, a.RESTING_SIZES), struck)
             | {a.PUSHED: c, a.JOIN_NUMBERS: m * max(1, min(self._together, m)), a.CHANGE_IMPULSES: changes}

@@ -26,6 +26,7 @@ from multiphi_exudyn.events.arrays import (
     FIRST_CHANGE,
     FREED,
     GIVEN,
+    GIVEN_SPRINGS,
     IMPULSES,
     KINDS,
     LEVEL,
@@ -41,11 +42,9 @@ from multiphi_exudyn.events.arrays import (
     REACHED,
     RIGID,
     SETTLED,
-    SLIDING,
     SLOWED,
     STATES,
     STICKS,
-    STIFFNESSES,
     STRAIN,
     STRIKING,
     TOUCHING,
@@ -59,7 +58,6 @@ from multiphi_exudyn.events.energies import lose
 from multiphi_exudyn.events.impact import collide
 from multiphi_exudyn.events.maps import find_level, find_map, move
 from multiphi_exudyn.events.rebounds import rebound
-from multiphi_exudyn.events.signals import gap
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.striking import impact, list_changes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -110,7 +108,7 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         return status
     ints[TRANSITIONS_NOW] += strikes
     lose(ints, numbers, SLOWED, REACHED, 0.0, LOST)
-    numbers[LOST + STRAIN] += springs(ints, numbers, GIVEN)
+    numbers[LOST + STRAIN] += numbers[GIVEN_SPRINGS]
     for k in range(LOSSES):
         numbers[LOST + k] += numbers[LOST_AT_START + k]
     return OK
@@ -158,15 +156,3 @@ def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: i
         ints[ints[result + PHASES] + i] = ARMED
     ints[result + SETTLED] = 1
     return OK
-
-
-@compiled
-def springs(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Strain energy [J] of the compliant contacts that are closed in the key of a state's level, and of friction."""
-    states, total = ints[ints[state + LEVEL] + STATES], 0.0
-    for i in range(ints[ELEMENTS]):
-        sliding = ints[ints[KINDS] + i] == SLIDING
-        if ints[states + i] == ints[ints[STICKS] + i] if sliding else ints[states + i] != OPEN:
-            depth = gap(ints, numbers, state, i)
-            total += 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
-    return total

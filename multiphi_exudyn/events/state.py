@@ -111,7 +111,7 @@ class Event:
     contact : str
         Name of the contact or the friction.
     kind : str
-        "close" or "open"; of friction "stick" or "slip".
+        "close" or "open"; of friction "stick" or "slip"; of a force law "segment".
     loss : Loss
         The energies [J] that the whole instant has taken, carried by its first event: ``impact``,
         ``truncation_kinetic``, ``truncation_strain``, ``damping``, ``friction``, and ``stop_work``, which is what
@@ -121,7 +121,7 @@ class Event:
     shared : tuple of (str, float)
         Name and impulse [N s] of contacts that are closed and stay so in the impact, carried by its first event.
     state : str
-        The state that is entered, as a contact that closes may stick or slip.
+        The state that is entered, as a contact that closes may stick or slip; of a force law the segment.
 
     Examples
     --------

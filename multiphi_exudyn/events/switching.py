@@ -103,7 +103,7 @@ def try_wishes(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def is_firm(ints: Ints, element: int, asked: int) -> int:
-    """3. 1 where an element of WORKED takes its exit into a state whatever that state says."""
+    """3, 8. 1 where an element of WORKED takes its exit into a state whatever that state says."""
     level = ints[WORKED + LEVEL]
     first = ints[level + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):

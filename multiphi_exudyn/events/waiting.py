@@ -1,4 +1,4 @@
-"""Waiting: for which signals a motion waits, and who asks when they fall, by sentences 1, 5, 6 and 8 of the law.
+"""Waiting: for which signals a motion waits, and who asks when they fall, by sentences 1, 5 and 6 of the law.
 
 The first descent of a signal, of its opposite or of its rate through zero (zero_crossing.py) makes an exit ask, or
 arms it.
@@ -12,16 +12,11 @@ from multiphi_exudyn.events.arrays import (
     ARMED,
     ASKED,
     ASKING,
-    CHAIN_COUNT,
-    CHAIN_MARKS,
-    CHAINS,
     CHANNELS,
     CONSTANTS,
     CURRENT,
     ELEMENT,
     ELEMENTS,
-    END_COUNT,
-    ENDS,
     EXIT_COUNT,
     EXIT_INTS,
     EXITS,
@@ -45,11 +40,13 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SWING,
     WAITING,
+    WATCHED,
+    WATCHED_COUNT,
     WORK_WAVES,
 )
 from multiphi_exudyn.events.changes import NOBODY
 from multiphi_exudyn.events.flow import signal_waves
-from multiphi_exudyn.events.phases import entered_signal, is_end, mark_chains
+from multiphi_exudyn.events.phases import entered_signal
 from multiphi_exudyn.events.signals import held_part, mapped_terms
 from multiphi_exudyn.events.state_arrays import accelerate
 from multiphi_exudyn.mathematics.basis_arrays import differentiate
@@ -62,23 +59,14 @@ __all__ = ["arm", "flag_again", "watch", "who_asks"]
 
 @compiled
 def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """1, 5, 6, 8. Signals whose first descent is next, of the flow from CURRENT; how many, or NEED.
+    """1, 5, 6. Signals whose first descent is next, of the flow from CURRENT; how many, or NEED.
 
     Of each the exit, and whether that then asks or is armed, in WAITING. The phases are those of REACHED.
     """
     level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
-    if ints[REACHED + SETTLED] == 1:
-        for e in range(ints[level + END_COUNT]):
-            count = wait_for(ints, numbers, waves, count, ints[ints[level + ENDS] + e], 0, 1.0, 0, 1)
-        return count
-    if ints[CHAIN_COUNT] > 0:
-        mark_chains(ints, REACHED)
-    for k in range(ints[level + EXIT_COUNT]):
-        exit_ = ints[level + EXITS] + k * EXIT_INTS
-        chain = ints[ints[CHAINS] + ints[exit_ + ELEMENT]]
-        if is_end(ints, level, k) == 0 and (chain < 0 or ints[ints[CHAIN_MARKS] + chain] == 0):
-            continue
-        phase = ints[phases + k]
+    for e in range(ints[level + WATCHED_COUNT]):
+        k = ints[ints[level + WATCHED] + e]
+        exit_, phase = ints[level + EXITS] + k * EXIT_INTS, ints[phases + k]
         if phase in (ARMED, LANDING):
             count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
             continue
@@ -142,7 +130,7 @@ def wait_for(
 
 @compiled
 def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
-    """1, 8. ASKING: of the elements whose signals fall at an instant those that then ask; how many."""
+    """1. ASKING: of the elements whose signals fall at an instant those that then ask; how many."""
     level, flags, waiting, asking = ints[CURRENT + LEVEL], ints[FALLEN], ints[WAITING], 0
     for i in range(ints[ELEMENTS]):
         ints[ints[ASKING] + i] = NOBODY

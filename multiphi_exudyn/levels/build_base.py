@@ -13,14 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse
 
-from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
+from multiphi_exudyn.levels.modal_base import ModalBase, parallel
 from multiphi_exudyn.mathematics.lowest_modes import HeldRows, LowestModes, lowest_modes
 from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.element import AnyLink, Link, links_of
-from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.element import AnyLink, Element, Link, link_places, links_of
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["build_base"]
@@ -31,7 +30,7 @@ COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest 
 
 def build_base(
     structure: LinearStructure,
-    contacts: Sequence[Contact],
+    contacts: Sequence[Element],
     modes: int | str,
     less: ModalBase | None = None,
     further: np.ndarray | None = None,
@@ -50,8 +49,9 @@ def build_base(
     if complete:
         found = LowestModes(complete_modes(_dense(structure.mass), _dense(structure.stiffness)), structure.n, 0.0)
     else:
-        distinct = sorted(set(direction_indices(links)))
-        stiffness = np.array([_largest_stiffness(links, i) for i in distinct])
+        first = np.array(parallel(rows.T), int)
+        distinct = np.unique(first)
+        stiffness = np.array([_largest_stiffness(contacts, np.flatnonzero(first == own)) for own in distinct])
         held = np.vstack([rows[distinct], points, further])
         found = _small(structure, held, _samples(stiffness, int(modes)), int(modes), less)
     own = found.modes.turned(points)
@@ -96,10 +96,15 @@ def _samples(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
     return [HeldRows(rows, stiffness[rows], modes) for rows in held]
 
 
-def _largest_stiffness(links: Sequence[AnyLink], of: int) -> float:
-    """The largest total stiffness [N/m] that the links of a direction have, of a force law on one of its sides."""
-    same = [link.stiffness for link, first in zip(links, direction_indices(links), strict=True) if first == of]
-    return float(max(np.max(np.cumsum(same)), 0.0))
+def _largest_stiffness(contacts: Sequence[Element], same: np.ndarray) -> float:
+    """The largest stiffness [N/m] that an element has in one of its states in the direction of these links."""
+    links, places = links_of(contacts), link_places(contacts)
+    found = [
+        sum(links[own[k]].stiffness for k in state.holds if own[k] in same)
+        for element, own in zip(contacts, places, strict=True)
+        for state in element.states
+    ]
+    return max(*found, 0.0)
 
 
 def _pushed(structure: LinearStructure, link: AnyLink) -> np.ndarray:

@@ -48,7 +48,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     damped = base.damped(vectors, closed)
     forces, rates = _force_rows(base, closed, squares, vectors, damped, gap_rows[closed])
     return Level(
-        closed=tuple(base.links[i].name for i in closed),
+        closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
         base=base,
         squares=squares,
@@ -56,6 +56,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         damping=_projected_damping(base, closed, squares, vectors, damped),
         gap_rows=gap_rows,
         following=following,
+        speed_rows=gap_rows,
         force_rows=forces,
         force_rate_rows=rates,
         neutral=vectors[:, zero if np.sum(zero) > rigid_body else np.zeros_like(zero)],

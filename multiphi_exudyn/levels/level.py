@@ -114,9 +114,9 @@ class Level(Shown):
     Attributes
     ----------
     closed : tuple of str
-        Names of its closed contacts.
+        Names of its closed contacts; of a force law, of the links that its segment has beside those of segment "0".
     indices : tuple of int
-        The same as positions in the base.
+        Positions in the base of all links that hold.
     base : ModalBase
         The coordinates that all levels share.
     squares : array (r,)
@@ -129,6 +129,8 @@ class Level(Shown):
         gap_i = gap_rows[i].eta + ... for every contact of the model.
     following : array (c,)
         Whether the closed rigid contacts alone determine a contact's gap; of other contacts loads move it as well.
+    speed_rows : array (c, r)
+        gap_i' = speed_rows[i].eta', as impacts see it: without the quasi-static part of what varies (events/channels).
     force_rows, force_rate_rows : array (k, r)
         Contact forces of the closed contacts from eta and eta'.
     neutral : array (m, z)
@@ -160,6 +162,7 @@ class Level(Shown):
     damping: np.ndarray
     gap_rows: np.ndarray
     following: np.ndarray
+    speed_rows: np.ndarray
     force_rows: np.ndarray
     force_rate_rows: np.ndarray
     neutral: np.ndarray
@@ -207,11 +210,6 @@ class Level(Shown):
     def damping_matrix(self) -> np.ndarray:
         """Of the motion (r, r) [1/s]: D, but where contacts slide."""
         return self.damping
-
-    @property
-    def speed_rows(self) -> np.ndarray:
-        """Gap velocities (c, r) from eta', as impacts see them."""
-        return self.gap_rows
 
     @functools.cached_property
     def static_shares(self) -> dict[str, float]:
@@ -274,6 +272,7 @@ class Level(Shown):
             vectors=self.vectors[:, :modes],
             damping=self.damping[:modes, :modes],
             gap_rows=self.gap_rows[:, :modes],
+            speed_rows=self.speed_rows[:, :modes],
             force_rows=self.force_rows[:, :modes],
             force_rate_rows=self.force_rate_rows[:, :modes],
             computed=self.computed[:modes],

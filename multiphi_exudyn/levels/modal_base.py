@@ -24,13 +24,13 @@ from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.element import AnyLink, is_oblique, link_places, links_of
-from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, LawSpring
+from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 
-__all__ = ["ModalBase", "direction_indices"]
+__all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
-CANCELLED = 1e-13  # of sum |k|: a total stiffness of a chain below it is round-off of zero
+CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,7 +49,7 @@ class ModalBase(Shown):
     damping: np.ndarray
     directions: np.ndarray
     pushes: np.ndarray
-    contacts: tuple[Contact, ...]
+    contacts: tuple[Element, ...]
     complete: bool
     mass: Matrix
     exact: int
@@ -138,19 +138,8 @@ class ModalBase(Shown):
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:
-        """``direction_indices`` of the links, all others of one direction up to its sign taken together as well."""
-        first = direction_indices(self.links)
-        plain = [i for i, link in enumerate(self.links) if not isinstance(link, LawSpring)]
-        for k, i in enumerate(plain):
-            before = [j for j in plain[:k] if first[j] == j]
-            first[i] = next((before[same] for same in self._parallel(i, before)), i)
-        return first
-
-    def _parallel(self, i: int, others: list[int]) -> np.ndarray:
-        """Which of these contacts have the direction of one up to its sign, and the same measure of a gap along it."""
-        one, other = self.directions[:, [i]], self.directions[:, others]
-        apart = np.minimum(np.max(np.abs(one - other), axis=0), np.max(np.abs(one + other), axis=0))
-        return np.flatnonzero(apart <= PARALLEL * np.max(np.abs(other), axis=0))
+        """For every link itself, or the first one that has its direction up to its sign."""
+        return parallel(self.directions)
 
     @functools.cached_property
     def direction_signs(self) -> np.ndarray:
@@ -160,21 +149,26 @@ class ModalBase(Shown):
 
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:
-        """Every force law by the position of its first spring."""
-        given = ((i, self.links[i]) for i in sorted(set(self.direction_indices)))
-        return {i: link.law for i, link in given if isinstance(link, LawSpring)}
+        """Every force law by its position."""
+        return {i: element for i, element in enumerate(self.contacts) if isinstance(element, ForceLaw)}
 
-    def label(self, contact: int) -> str:
-        """What a link is called: its name, for a spring of a force law the law's, with friction that of its contact."""
-        given = self.links[self.oblique.get(contact, contact)]
-        return given.law.name if isinstance(given, LawSpring) else given.name
+    def label(self, link: int) -> str:
+        """What a link is called: its name, of a force law the law's, with friction that of its contact."""
+        element = next(i for i, places in enumerate(self.link_places) if link in places)
+        own = element in self.laws or link in self.oblique
+        return self.links[element if own else link].name
+
+    def pressing(self, element: int) -> dict[int, int]:
+        """The links of an element that have no held place, and the sign of their directions to its own."""
+        places = [k for k in self.link_places[element] if not self.links[k].held]
+        return {k: int(self.direction_signs[k] * self.direction_signs[element]) for k in places}
 
     @functools.cached_property
     def preload(self) -> np.ndarray:
         """Load (m,) of the constant forces of all force laws."""
         total = np.zeros(self.modes.count)
         for i, law in self.laws.items():
-            total += law.constant * law.springs[0].side * self.directions[:, i]
+            total -= law.constant * self.directions[:, i]
         return total
 
     @functools.cached_property
@@ -289,7 +283,13 @@ class ModalBase(Shown):
         return forces
 
 
-def direction_indices(links: Sequence[AnyLink]) -> list[int]:
-    """For every link itself, or its law's first spring, which has the same direction up to its sign."""
-    first: dict[ForceLaw, int] = {}
-    return [first.setdefault(c.law, i) if isinstance(c, LawSpring) else i for i, c in enumerate(links)]
+def parallel(directions: np.ndarray) -> list[int]:
+    """For every column of (m, l) itself, or the first one that is the same up to its sign."""
+    first, alone = list[int](), list[int]()
+    for i, one in enumerate(directions.T):
+        others = directions[:, alone]
+        apart = [np.max(np.abs(one[:, None] - sign * others), axis=0) for sign in (1, -1)]
+        same = np.flatnonzero(np.minimum(*apart) <= PARALLEL * np.max(np.abs(others), axis=0))
+        first.append(alone[same[0]] if len(same) else i)
+        alone += [] if len(same) else [i]
+    return first

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,6 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "TRIED", "Tolerance", "UpTo", "chosen_modes", "is_count"]
@@ -124,13 +123,11 @@ class Tolerance:
 def chosen_modes(
     structure: LinearStructure,
     base: ModalBase,
-    chains: Sequence[Sequence[int]],
     level: Callable[[tuple[int, ...], int], Level],
 ) -> int:
     """The number of modes r for ``None``; see the module's docstring. More than the base serves: to choose anew there.
 
-    chains: positions of every force law's springs on either side, from its centre outward. level: of closed contacts by
-    their positions, with its lowest so many modes at least or all that it has.
+    level: of links that hold by their positions, with its lowest so many modes at least or all that it has.
     """
     count = max(FEWEST, base.modes.rigid + 1)
     if any(link.rigid for link in base.links):
@@ -139,8 +136,8 @@ def chosen_modes(
     of_points = _of_points(base, rows @ base.modes.shapes)
     count = max(count, of_points if base.complete else min(of_points, FIRST))
     most = min(MOST, base.served)
-    for closed in _alone(base, chains):
-        bound = most if not base.contacts[closed[0]].held else min(most, max(count, RIGID))
+    for closed in _alone(base):
+        bound = most if not base.links[closed[0]].held else min(most, max(count, RIGID))
         count = count if count >= bound else _of_contact(level, closed, count, bound)
         if bound == count == base.served and not base.complete and not _held(level(closed, count).truncated(count)):
             return min(2 * count, MOST)
@@ -156,13 +153,17 @@ def _of_points(base: ModalBase, rows: np.ndarray) -> int:
     return base.modes.rigid + 1 + int(np.max(np.sum(missing, axis=1), initial=0))
 
 
-def _alone(base: ModalBase, chains: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
-    """Positions of closed contacts: every compliant one alone, every side of a force law where it is stiffest."""
-    single = [(i,) for i, c in enumerate(base.contacts) if not isinstance(c, LawSpring) and not c.rigid]
-    stiffest = [
-        tuple(sorted(chain[: 1 + int(np.argmax(np.cumsum(base.stiffnesses[list(chain)])))])) for chain in chains
-    ]
-    return single + stiffest
+def _alone(base: ModalBase) -> list[tuple[int, ...]]:
+    """Positions of links that hold: every compliant element's first one alone, a force law's where it is stiffest."""
+    single = [(i,) for i, element in enumerate(base.contacts) if i not in base.laws and not element.rigid]
+    return single + [links for links in (_stiffest(base, i) for i in base.laws) if links]
+
+
+def _stiffest(base: ModalBase, law: int) -> tuple[int, ...]:
+    """The links that hold in the stiffest segment of a force law."""
+    places = base.link_places[law]
+    segments = [tuple(places[k] for k in state.holds) for state in base.laws[law].states]
+    return max(segments, key=lambda links: float(np.sum(base.stiffnesses[list(links)])))
 
 
 def _of_contact(level: Callable[[tuple[int, ...], int], Level], closed: tuple[int, ...], fewest: int, most: int) -> int:

@@ -15,16 +15,15 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.build_base import build_base
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.levels.level import Level, LevelOverride
-from multiphi_exudyn.levels.modal_base import ModalBase, direction_indices
+from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, TRIED, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.lowest_modes import left_out
 from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
-from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, Given, LawSpring, expanded
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
@@ -51,7 +50,7 @@ class MultiPhiModel(Shown):
     structure : LinearStructure
         M, C, K and points.
     contacts : sequence of UnilateralContact, Friction and ForceLaw, default ()
-        Any number, each with its own name. A force law is kept as the chain of its springs.
+        Any number, each with its own name.
     modes : int, "all", UpTo, Tolerance or None, default None
         Number r of modes of every level, all that it has where they are fewer. ``UpTo``: those up to a frequency.
         ``Tolerance``: the first run under ``simulate`` decides, once for this model. None: as many as hold the static
@@ -92,7 +91,7 @@ class MultiPhiModel(Shown):
     """
 
     structure: LinearStructure
-    contacts: Sequence[Given] = ()
+    contacts: Sequence[Element] = ()
     modes: int | str | UpTo | Tolerance | None = None
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
@@ -156,22 +155,14 @@ class MultiPhiModel(Shown):
 
     @functools.cached_property
     def force_laws(self) -> tuple[ForceLaw, ...]:
-        """The force laws among what was given."""
-        return tuple(dict.fromkeys(contact.law for contact in self.contacts if isinstance(contact, LawSpring)))
-
-    @functools.cached_property
-    def chains(self) -> tuple[tuple[int, ...], ...]:
-        """Positions of every law's springs on either side of its centre, from there outward."""
-        sides: dict[tuple[ForceLaw, int], list[int]] = {}
-        for i, contact in enumerate(self.contacts):
-            if isinstance(contact, LawSpring):
-                sides.setdefault((contact.law, contact.side), []).append(i)
-        return tuple(map(tuple, sides.values()))
+        """The force laws among the contacts."""
+        return tuple(contact for contact in self.contacts if isinstance(contact, ForceLaw))
 
     @functools.cached_property
     def general(self) -> bool:
-        """Whether there are elements with other states than open and closed."""
-        return any(not _opens_and_closes(contact) for contact in self.contacts)
+        """Whether there are elements that do more than their links: some have held places, or push."""
+        states = (state for contact in self.contacts for state in contact.states)
+        return bool(self.held) or any(state.push for state in states)
 
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
@@ -194,9 +185,14 @@ class MultiPhiModel(Shown):
         return tuple(i for i, places in enumerate(self.link_places) if not set(places).isdisjoint(self.held))
 
     def pressing_links(self, element: int) -> list[int]:
-        """Positions of the links whose gap is that of an element's first one: they press with and without friction."""
-        places = self.link_places[element]
-        return [places[0], *(k for k in places[1:] if is_oblique(self.links[k]))]
+        """Positions of the links that press where a contact is closed, with and without friction.
+
+        Their gap is that of its first one. Of a force law, those that hold where it is not in segment "0".
+        """
+        own, *further = self.link_places[element]
+        if isinstance(self.contacts[element], ForceLaw):
+            return further
+        return [own, *(k for k in further if is_oblique(self.links[k]))]
 
     def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
         """Positions of the links that hold where the elements are in these states: they name the modes."""
@@ -211,14 +207,8 @@ class MultiPhiModel(Shown):
 
     @functools.cached_property
     def levels_possible(self) -> int:
-        """Number of levels: 2 for every contact times the segments of every law."""
-        single = (len(c.states) for c in self.contacts if not isinstance(c, LawSpring))
-        return math.prod(single) * math.prod(law.levels for law in self.force_laws)
-
-    @property
-    def directions(self) -> int:
-        """Number of directions in which there are contacts; a law has one."""
-        return len(set(direction_indices(self.contacts)))
+        """Number of levels: the product of the states of all elements."""
+        return math.prod(len(contact.states) for contact in self.contacts)
 
     @property
     def most_modes(self) -> int | None:
@@ -243,7 +233,7 @@ class MultiPhiModel(Shown):
             return None
         while "chosen" not in self._shared:
             base = self._shared_base()
-            found = chosen_modes(self.structure, base, self.chains, self._with_modes)
+            found = chosen_modes(self.structure, base, self._with_modes)
             if self._serves(base, found):
                 self._shared["chosen"] = found
             else:
@@ -324,8 +314,7 @@ class MultiPhiModel(Shown):
 
     def _most_kept(self, r: int) -> int:
         """Number of levels with r modes that ``CACHE_BYTES`` hold."""
-        m, c = self._shared_base().modes.count, len(self.contacts)
-        of_a_mode = m + 30 * r + 2 * c
+        of_a_mode = self._shared_base().modes.count + 30 * r + 2 * len(self.links)
         return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
 
     @functools.cached_property
@@ -356,9 +345,9 @@ class MultiPhiModel(Shown):
         Parameters
         ----------
         closed : iterable of str, or mapping of str to str, default ()
-            Names of the closed contacts, all others open. Or {name: state}: "closed" of a contact, "stick", "slip+" or
-            "slip-" of friction; the others are in their first state, contacts open. States that differ by constant
-            forces alone have one level.
+            Names of the closed contacts, all others open, force laws in segment "0". Or {name: state}: "closed" of a
+            contact, "stick", "slip+" or "slip-" of friction, "+1", "-1", ... of a force law; the others are in their
+            first state, contacts open. States that differ by constant forces alone have one level.
 
         Raises
         ------
@@ -371,7 +360,15 @@ class MultiPhiModel(Shown):
             return self.level_at(self.links_held(self._states(closed)))
         if isinstance(closed, str) or not isinstance(closed, Iterable):
             raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names, or {{name: state}}")
-        return self.level_at(tuple(sorted({self.index(name) for name in closed})))
+        own = {i for i, element in enumerate(self.contacts) if isinstance(element, ForceLaw) and element.stiffness}
+        return self.level_at(tuple(sorted({self._closed(name) for name in closed} | own)))
+
+    def _closed(self, name: str) -> int:
+        """Position of a contact that is closed, or friction that sticks."""
+        i = self.index(name)
+        if isinstance(self.contacts[i], ForceLaw):
+            raise MultiPhiValueError(f"closed: got the force law {name!r}, need {{{name!r}: segment}}")
+        return i
 
     def _states(self, given: Mapping[str, str]) -> tuple[int, ...]:
         """Numbers of the states of all elements."""
@@ -528,20 +525,16 @@ def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
         raise type(error)(f"contact {link.name!r}: {error}") from error
 
 
-def _contacts(given: Any) -> tuple[Contact, ...]:
-    """Contacts, every law by its chain of springs."""
+def _contacts(given: Any) -> tuple[Element, ...]:
+    """Contacts as they are given."""
     needed = "UnilateralContact, Friction or ForceLaw"
     if not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
     items = tuple(given)
     for item in items:
-        if not isinstance(item, (Element, ForceLaw)):
+        if not isinstance(item, Element):
             raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
-    return expanded(items)
-
-
-def _opens_and_closes(element: Contact) -> bool:
-    return isinstance(element, LawSpring) or (isinstance(element, UnilateralContact) and not element.further)
+    return items
 
 
 def _check_overrides(given: Any) -> None:

@@ -49,7 +49,7 @@ from multiphi_exudyn.mechanics.element import ElementState, Exit
 __all__ = ["Equilibrium", "equilibrium", "floating", "pressing"]
 
 SLACK = 1e-11  # of the sizes of a function on the path: nearer to zero it has reached it
-CHANGES = 20  # for every contact on the path: more is an exchange without end
+CHANGES = 20  # for every link on the path: more is an exchange without end
 
 
 @dataclass(frozen=True)
@@ -134,15 +134,13 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """
     rigid = np.isinf(base.stiffnesses)
     count = len(base.contacts)
-    pressed = np.flatnonzero((base.gaps < 0)[:count] & ~rigid[:count])
-    standing = _Standing([0] * count, np.zeros(len(base.links)))
-    for i in pressed.tolist():
-        standing.states[i] = 1
-    first = base.directions[:, pressed] @ (base.stiffnesses[pressed] * base.gaps[pressed])
+    standing = _Standing([_first_state(base, i) for i in range(count)], np.zeros(len(base.links)))
+    sprung = [k for k in standing.closed(base) if not rigid[k]]
+    first = base.directions[:, sprung] @ (base.stiffnesses[sprung] * base.gaps[sprung])
     ends = np.array([first, load + base.preload])
     lifts = np.where(rigid, np.maximum(-base.gaps, 0.0), 0.0)
     s, path = 0.0, _path(base, standing, ends, lifts)
-    for _ in range(CHANGES * (1 + count)):
+    for _ in range(CHANGES * (1 + len(base.links))):
         change = _next_change(base, standing, path, s)
         if change is None:
             return path.configuration[1], _stretches(base, standing, path)
@@ -152,8 +150,8 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
             standing = _Standing(before.states.copy(), before.held.copy())
             _enter(base, standing, path, s, element, state)
             entered = _path(base, standing, ends, lifts)
-            touches = "open" in (left.name, standing.of(base, element).name)
-            if not touches or _lasts(base, standing, entered, s, element, state == asked):
+            touches = "open" in (left.name, standing.of(base, element).name) or element in base.laws
+            if not touches or _lasts(base, standing, entered, s, element, left.name, state == asked):
                 break
         else:
             raise NumericalFailure(
@@ -189,6 +187,12 @@ def floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief
             f"{name} and would press on {base.links[int(pressed[0])].name!r}, need a gap there, or supports"
         )
     return y
+
+
+def _first_state(base: ModalBase, element: int) -> int:
+    """The state of an element where nothing has moved yet."""
+    given, still = base.contacts[element], [0.0] * len(base.link_places[element])
+    return [state.name for state in given.states].index(given.first_state(base.gaps[element], *still))
 
 
 def _next_change(base: ModalBase, standing: _Standing, path: _Path, s: float) -> tuple[float, int, int] | None:
@@ -249,16 +253,17 @@ def _alternatives(base: ModalBase, standing: _Standing, element: int, asked: int
     return [asked, *(k for k, state in enumerate(states) if state.name != "open" and k != asked)]
 
 
-def _lasts(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int, asked: bool) -> bool:
+def _lasts(base: ModalBase, standing: _Standing, path: _Path, s: float, element: int, left: str, asked: bool) -> bool:
     """Whether a contact that has closed or opened at s does not turn the path back; one that slides at once slides on.
 
-    asked: whether it has the state that it asked for, in which it may stick at first and slide afterwards.
+    Nor a force law from one segment into the next. left: the state before. asked: whether it has the state that it
+    asked for, in which it may stick at first and slide afterwards.
     """
     state = standing.of(base, element)
     for exit_ in state.exits:
         ends, size = path.signal(base.link_places[element], exit_, standing.held, s)
         falls = ends[0] - ends[1] > SLACK * size
-        turns_back = "open" in (state.name, exit_.asked)
+        turns_back = exit_.asked == left or "open" in (state.name, exit_.asked)
         slides_back = not asked and path.at(s, ends) <= SLACK * size
         if falls and (turns_back or slides_back):
             return False

@@ -27,6 +27,7 @@ have changed (or a change in truncated modes), the exit says by its firmness wha
     friction |T| <= F, T = -lambda, rigid or by a spring in series
                      stick (the link holds, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
                      exit s q', back into stick, taken once; those of stick always taken
+    force law        a segment: its links hold, exits q' - q and q - q'' at its ends, taken once
 """
 
 from __future__ import annotations
@@ -165,7 +166,7 @@ class AnyLink(Protocol):
 
 @runtime_checkable
 class Element(AnyLink, Protocol):
-    """An element by its links and its states; contacts and the springs of force laws are elements.
+    """An element by its links and its states; contacts, friction and force laws are elements.
 
     It is its own first link; further: the others. drop: the part of the energy of its held link's spring that is lost
     where the state in which it holds is left.

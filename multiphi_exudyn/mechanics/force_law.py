@@ -1,15 +1,17 @@
-"""Force law: a local continuous nonlinearity as a chain of levels.
+"""Force law: a local continuous nonlinearity as one element, whose state is its segment.
 
     force on the structure -F(q) along p,   q = p.x
 
-F is followed by straight segments between knots on the law itself. With a central knot q_m this is a sum of one-sided
-springs, each a compliant contact, whose closed sets are nested:
+F is followed by straight segments between knots on the law itself. q_m, its centre, is the zero of F nearest to q = 0,
+without any the place nearest to q = 0. From the segment at q_m, of slope k_m,
 
-    F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q),   q_j >= q_m >= q'_j
+    F(q) = F(q_m) + k_m (q - q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q),   q_j >= q_m >= q'_j
 
-dk_j [N/m] is the change of slope at a knot, negative where the law softens. Knots where the slope does not change are
-left out. F(q_m) is a constant force of every level. q_m is the zero of F nearest to q = 0, without any the place
-nearest to q = 0. Strain energy is the integral of the segmented law from q_m. Beyond the span its last segments go on.
+dk_j [N/m] is the change of slope at a knot, negative where the law softens. So the element has a link for k_m and one
+for each dk_j (element.py), and its states are nested: in segment +i those of the first i knots above q_m hold, in -i
+those below. Each has two exits, where q reaches one end of the segment or the other, into the next. Knots where the
+slope does not change are left out. F(q_m) is a constant force of every level. Strain energy is the integral of the
+segmented law from q_m. Beyond the span its last segments go on.
 
 Where the knots stand is in piecewise_linear_fit.py.
 """
@@ -18,19 +20,19 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import Element, ElementState, Link, contact_states
+from multiphi_exudyn.mechanics.element import TAKEN_ONCE, ElementState, Exit, Link, Share
 from multiphi_exudyn.mechanics.structure import At
 
-__all__ = ["Contact", "ForceLaw", "Given", "LawSpring", "expanded"]
+__all__ = ["ForceLaw"]
 
 Function = Callable[[Any], Any]
 
@@ -45,12 +47,10 @@ class ForceLaw:
 
         force on the structure -F(q) along p,   q = p.x
 
-        F(q) = F(q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q)
-        q_j >= q_m >= q'_j
-
-    F is followed by straight segments between knots that lie on it, which is a sum of one-sided springs dk_j [N/m],
-    negative where the law softens. q_m is the zero of F nearest to q = 0. Beyond the span its last segments go on. Two
-    laws are equal only if they are the same object.
+    F is followed by straight segments between knots that lie on it. The segment that q is in is the law's state: "0" at
+    q_m, the zero of F nearest to q = 0, "+1", "+2", ... above it, "-1", "-2", ... below. Beyond the span its last
+    segments go on. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
+    object.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class ForceLaw:
         knots, forces, centre, error = self._followed() if callable(self.law) else self._tabulated()
         slopes = np.diff(forces) / np.diff(knots)
         if not np.any(slopes):
-            raise MultiPhiValueError(f"{self._called} law: got a constant force, need one that changes (or a load)")
+            raise MultiPhiValueError(f"{self._named} law: got a constant force, need one that changes (or a load)")
         for name, value in (("knots", knots), ("forces", forces), ("centre", centre), ("error", error)):
             object.__setattr__(self, name, value)
 
@@ -126,6 +126,14 @@ class ForceLaw:
         """The segmented law at q, (k,) [N]."""
         lines = np.clip(np.searchsorted(self.knots, q, side="right") - 1, 0, len(self.knots) - 2)
         return np.asarray(self.forces[lines] + self.slopes[lines] * (q - self.knots[lines]))
+
+    def energy(self, q: float | np.ndarray) -> np.ndarray:
+        """Integral of the segmented law from q_m to q, (k,) [J]."""
+        total = self.constant * (q - self.centre) + 0.5 * self.stiffness * (q - self.centre) ** 2
+        for side, links in ((1, self._above), (-1, self._below)):
+            for link in links:
+                total += 0.5 * link.stiffness * np.minimum(0.0, link.gap - side * q) ** 2
+        return np.asarray(total)
 
     @functools.cached_property
     def slopes(self) -> np.ndarray:
@@ -137,51 +145,114 @@ class ForceLaw:
         """F(q_m) [N]."""
         return float(self.force(self.centre))
 
+    # ------------------------------------------------------------------ element
+
+    damping: ClassVar[float] = 0.0
+    velocity: ClassVar[float] = 0.0
+    drop: ClassVar[float] = 0.0
+    rigid: ClassVar[bool] = False
+    held: ClassVar[bool] = False
+
+    @property
+    def direction(self) -> At:
+        """p."""
+        return self.at
+
+    @property
+    def gap(self) -> float:
+        """-q_m [m]."""
+        return -self.centre
+
+    @functools.cached_property
+    def stiffness(self) -> float:
+        """k_m [N/m], of the softer segment where two meet at q_m."""
+        return float(self.slopes[self._central])
+
+    @functools.cached_property
+    def _central(self) -> int:
+        """The number of its segment."""
+        place, last = int(np.searchsorted(self.knots, self.centre)), len(self.slopes) - 1
+        beside = min(place, last), max(place - 1, 0)
+        return min(beside, key=lambda k: abs(self.slopes[k]))
+
     @property
     def levels(self) -> int:
         """Number of levels it makes: segments of different slope."""
-        at_centre = sum(spring.gap == spring.side * self.centre for spring in self.springs)
-        return len(self.springs) + (at_centre < 2)
+        return len(self.states)
+
+    @property
+    def knots_beside(self) -> tuple[int, int]:
+        """Number of knots where the slope changes, above segment "0" and below it."""
+        return len(self._above), len(self._below)
+
+    @property
+    def further(self) -> tuple[Link, ...]:
+        """A link for every change of slope: those above q_m from it outward, then those below it."""
+        return (*self._above, *self._below)
 
     @functools.cached_property
-    def springs(self) -> tuple[LawSpring, ...]:
-        """The chain of one-sided springs: those above q_m from it outward, then those below it."""
-        slopes, knots, middle = self.slopes, self.knots, int(np.searchsorted(self.knots, self.centre))
-        up, down = max(len(slopes) - middle, 1), max(middle, 1)  # where q_m is an end, its line goes on beyond it
-        above = np.diff(slopes[-up:], prepend=0.0), knots[middle : middle + up]
-        below = np.diff(slopes[:down][::-1], prepend=0.0), knots[middle + 1 - down : middle + 1][::-1]
-        return (*self._chain(*above, 1), *self._chain(*below, -1))
+    def _above(self) -> tuple[Link, ...]:
+        m = self._central
+        return self._chain("+", np.diff(self.slopes[m:]), self.knots[m + 1 : -1])
 
-    def _chain(self, changes: np.ndarray, places: np.ndarray, side: int) -> list[LawSpring]:
-        bent = np.abs(changes) > STRAIGHT * np.max(np.abs(self.slopes))
-        sign = "+" if side > 0 else "-"
-        return [
-            LawSpring(f"{self.name}{sign}{i}", _times(self.at, -side), side * float(q), float(k), self, side)
+    @functools.cached_property
+    def _below(self) -> tuple[Link, ...]:
+        m = self._central
+        return self._chain("-", np.diff(self.slopes[m::-1]), self.knots[m:0:-1])
+
+    def _chain(self, sign: str, changes: np.ndarray, places: np.ndarray) -> tuple[Link, ...]:
+        bent, side = np.abs(changes) > STRAIGHT * np.max(np.abs(self.slopes)), float(f"{sign}1")
+        return tuple(
+            Link(f"{self.name}{sign}{i}", _times(self.at, -side), side * float(q), float(k))
             for i, (k, q) in enumerate(zip(changes[bent], places[bent], strict=True), start=1)
-        ]
+        )
+
+    @functools.cached_property
+    def states(self) -> tuple[ElementState, ...]:
+        """The segments: that at q_m, those above it from there outward, then those below it."""
+        up, down = len(self._above), len(self._below)
+        return tuple(self._segment(i) for i in (*range(up + 1), *range(-1, -down - 1, -1)))
+
+    def _segment(self, i: int) -> ElementState:
+        """Segment i, with the links of those between it and q_m."""
+        chain = range(1, i + 1) if i > 0 else range(len(self._above) + 1, len(self._above) + 1 - i)
+        own = (0,) if self.stiffness else ()
+        return ElementState(_called(i), "segment", tuple(self._ways(i)), holds=(*own, *chain))
+
+    def _ways(self, i: int) -> Iterator[Exit]:
+        """Out of segment i: outward where the next link's gap closes, inward where that of the last one opens."""
+        up, down = len(self._above), len(self._below)
+        for side, first, count in ((1, 1, up), (-1, up + 1, down)):
+            if 0 <= side * i < count:
+                yield _exit(i + side, first + abs(i), 1.0)
+            if side * i > 0:
+                yield _exit(i - side, first + abs(i) - 1, -1.0)
+
+    def first_state(self, gap: float, rate: float, *rates: float) -> str:
+        """The segment in which a run starts that begins with q - q_m [m]."""
+        q = self.centre + gap
+        return _called(sum(q > link.gap for link in self._above) - sum(-q > link.gap for link in self._below))
 
     # ------------------------------------------------------------------ segments
 
     @property
-    def _called(self) -> str:
+    def _named(self) -> str:
         return f"force law {self.name!r}"
 
     def _tabulated(self) -> tuple[np.ndarray, np.ndarray, float, float]:
         given = {"tolerance": self.tolerance, "segments": self.segments, "span": self.span}
         for name, value in given.items():
             if value is not None:
-                raise MultiPhiValueError(f"{self._called} {name}: got {value!r} for a table, need none")
+                raise MultiPhiValueError(f"{self._named} {name}: got {value!r} for a table, need none")
         try:
             knots, forces = (np.array(column, dtype=float) for column in self.law)  # type: ignore[union-attr]
         except (TypeError, ValueError) as error:
             needed = "need a function, or two arrays: q ascending, and F"
-            raise MultiPhiTypeError(f"{self._called} law: got {type(self.law).__name__}, {needed}") from error
+            raise MultiPhiTypeError(f"{self._named} law: got {type(self.law).__name__}, {needed}") from error
         if knots.ndim != 1 or knots.shape != forces.shape or len(knots) < 2:
-            raise MultiPhiValueError(
-                f"{self._called} law: got shapes {knots.shape} and {forces.shape}, need (k,) twice"
-            )
+            raise MultiPhiValueError(f"{self._named} law: got shapes {knots.shape} and {forces.shape}, need (k,) twice")
         if not (np.all(np.isfinite(knots)) and np.all(np.isfinite(forces)) and np.all(np.diff(knots) > 0)):
-            raise MultiPhiValueError(f"{self._called} law: got a table of q and F, need finite numbers and q ascending")
+            raise MultiPhiValueError(f"{self._named} law: got a table of q and F, need finite numbers and q ascending")
         centre = _centre(knots, forces)
         if centre not in knots:
             place = int(np.searchsorted(knots, centre))
@@ -213,7 +284,7 @@ class ForceLaw:
         count = sum(len(index) - 1 for index in spread(sides, values, error))
         if count > MOST_SEGMENTS:
             raise MultiPhiValueError(
-                f"{self._called} tolerance: got {self.tolerance!r}, which needs more than {MOST_SEGMENTS} segments, "
+                f"{self._named} tolerance: got {self.tolerance!r}, which needs more than {MOST_SEGMENTS} segments, "
                 "need a larger one"
             )
         return with_segments(sides, values, count, error)
@@ -221,27 +292,27 @@ class ForceLaw:
     def _checked_span(self) -> tuple[float, float]:
         span = self.span
         if not (isinstance(span, (tuple, list, np.ndarray)) and len(span) == 2 and all(map(is_real, span))):
-            raise MultiPhiTypeError(f"{self._called} span: got {span!r}, need (q_lo, q_hi) for a function")
+            raise MultiPhiTypeError(f"{self._named} span: got {span!r}, need (q_lo, q_hi) for a function")
         low, high = float(span[0]), float(span[1])
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise MultiPhiValueError(f"{self._called} span: got {span!r}, need finite q_lo < q_hi")
+            raise MultiPhiValueError(f"{self._named} span: got {span!r}, need finite q_lo < q_hi")
         return low, high
 
     def _checked_accuracy(self) -> int | float:
         """Number of segments (int), or the tolerance."""
         if (self.tolerance is None) == (self.segments is None):
             received = f"got tolerance {self.tolerance!r} and segments {self.segments!r}"
-            raise MultiPhiValueError(f"{self._called}: {received}, need exactly one of them for a function")
+            raise MultiPhiValueError(f"{self._named}: {received}, need exactly one of them for a function")
         if self.segments is None:
             if not is_real(self.tolerance):
-                raise MultiPhiTypeError(f"{self._called} tolerance: got {self.tolerance!r}, need a number")
+                raise MultiPhiTypeError(f"{self._named} tolerance: got {self.tolerance!r}, need a number")
             if not (self.tolerance is not None and 0 < self.tolerance < 1):
-                raise MultiPhiValueError(f"{self._called} tolerance: got {self.tolerance!r}, need 0 < tolerance < 1")
+                raise MultiPhiValueError(f"{self._named} tolerance: got {self.tolerance!r}, need 0 < tolerance < 1")
             return float(self.tolerance)
         if not isinstance(self.segments, (int, np.integer)) or isinstance(self.segments, bool):
-            raise MultiPhiTypeError(f"{self._called} segments: got {self.segments!r}, need an integer")
+            raise MultiPhiTypeError(f"{self._named} segments: got {self.segments!r}, need an integer")
         if not 2 <= self.segments <= MOST_SEGMENTS:
-            raise MultiPhiValueError(f"{self._called} segments: got {self.segments!r}, need 2 to {MOST_SEGMENTS}")
+            raise MultiPhiValueError(f"{self._named} segments: got {self.segments!r}, need 2 to {MOST_SEGMENTS}")
         return int(self.segments)
 
     def _sampled(self, q: np.ndarray) -> np.ndarray:
@@ -255,9 +326,7 @@ class ForceLaw:
             values = self._one_by_one(q)
         if not np.all(np.isfinite(values)):
             worst = float(q[np.argmin(np.isfinite(values))])
-            raise MultiPhiValueError(
-                f"{self._called} law: gives no finite force at q = {worst:g}, need one on the span"
-            )
+            raise MultiPhiValueError(f"{self._named} law: gives no finite force at q = {worst:g}, need one on the span")
         return values
 
     def _one_by_one(self, q: np.ndarray) -> np.ndarray:
@@ -265,49 +334,17 @@ class ForceLaw:
         try:
             return np.array([float(self.law(place)) for place in q.tolist()])
         except (TypeError, ValueError, ArithmeticError) as error:
-            raise MultiPhiTypeError(f"{self._called} law: fails ({error}), need a function of q [m] in N") from error
+            raise MultiPhiTypeError(f"{self._named} law: fails ({error}), need a function of q [m] in N") from error
 
 
-@dataclass(frozen=True, eq=False)
-class LawSpring:
-    """One spring of a law's chain: a compliant contact whose stiffness [N/m] may be negative.
-
-    name, direction, gap, stiffness: as of a UnilateralContact. law: whose chain; side: +1 above q_m, -1 below it.
-    """
-
-    name: str
-    direction: At
-    gap: float
-    stiffness: float
-    law: ForceLaw
-    side: int
-    rigid: ClassVar[bool] = False
-    damping: ClassVar[float] = 0.0
-    velocity: ClassVar[float] = 0.0
-    held: ClassVar[bool] = False
-    further: ClassVar[tuple[Link, ...]] = ()
-    drop: ClassVar[float] = 0.0
-
-    @property
-    def states(self) -> tuple[ElementState, ...]:
-        """Open and closed (element.py)."""
-        return contact_states(rigid=False, viscous=False)
-
-    def first_state(self, gap: float, rate: float, *rates: float) -> str:
-        """The state in which a run starts that begins with a gap [m]."""
-        return "open" if gap >= 0 else "closed"
+def _called(segment: int) -> str:
+    """The name of the state."""
+    return f"{segment:+d}" if segment else "0"
 
 
-Contact: TypeAlias = Element  # a UnilateralContact, a LawSpring, or another one by its states
-Given: TypeAlias = Any  # an Element or a ForceLaw when it is given, a Contact once it is expanded
-
-
-def expanded(given: Sequence[Given]) -> tuple[Contact, ...]:
-    """Contacts, every law by its chain of springs."""
-    contacts: list[Contact] = []
-    for item in given:
-        contacts.extend(item.springs if isinstance(item, ForceLaw) else (item,))
-    return tuple(contacts)
+def _exit(into: int, link: int, side: float) -> Exit:
+    """The exit into a segment where a link's gap falls through zero, or rises through it for a side of -1."""
+    return Exit(_called(into), firmness=TAKEN_ONCE, further=(Share(link, gap=side),))
 
 
 def _times(at: At, factor: float) -> At:

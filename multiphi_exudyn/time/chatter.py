@@ -19,10 +19,10 @@ def window(model: MultiPhiModel) -> int:
 
 
 def allowed(model: MultiPhiModel) -> float:
-    """How many of them a period of the highest kept mode may hold; a swing passes every spring of a law twice."""
-    return EVENTS_PER_PERIOD * _plain(model) + 2 * sum(map(len, model.chains))
+    """How many of them a period of the highest kept mode may hold; a swing passes every knot of a law twice."""
+    return EVENTS_PER_PERIOD * _plain(model) + 2 * sum(law.levels for law in model.force_laws)
 
 
 def _plain(model: MultiPhiModel) -> int:
-    """Number of contacts that are no springs of a law, at least 1."""
-    return max(1, len(model.contacts) - sum(map(len, model.chains)))
+    """Number of contacts that are no force laws, at least 1."""
+    return max(1, len(model.contacts) - len(model.force_laws))

@@ -1,6 +1,6 @@
 """Rows of a level: what is asked of a motion as linear functions of the level's coordinates.
 
-    x of a point    phi.(Phi_l xi + x_inf,l)          gap  g = h.x + gap       lambda  of a closed contact
+    x of a point    phi.(Phi_l xi + x_inf,l)          gap  g = h.x + gap       lambda  of what presses
     T = -lambda of the held link while it sticks; while it slips -push, or s mu N where it goes with the force of a link
     place of the patch on the counter-surface: the held place w while it sticks, w + q - stretch else, q of that link
 
@@ -54,12 +54,13 @@ def patch_row(element: int, level: LoadedLevel) -> np.ndarray:
 
 
 def pressing_row(element: int, level: LoadedLevel) -> np.ndarray:
-    """lambda [N] of a contact's normal link, with friction or without."""
-    own = level.level
-    for link in own.base.link_places[element]:
-        if link in own.indices and not own.base.links[link].held:
-            return _link_row(level, link)
-    return np.zeros(2 * own.modes + 1)
+    """lambda [N] of a contact, with friction or without; of a force law -F."""
+    base, row = level.level.base, np.zeros(2 * level.level.modes + 1)
+    row[-1] = -base.laws[element].constant if element in base.laws else 0.0
+    for link, sign in base.pressing(element).items():
+        if link in level.level.indices:
+            row += sign * _link_row(level, link)
+    return row
 
 
 def _held_link(level: LoadedLevel, element: int) -> int:

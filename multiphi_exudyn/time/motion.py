@@ -33,6 +33,7 @@ NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
 SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
+NOT_FINITE = "the motion is not finite"
 
 carry, measured = entry(advance), entry(measure)
 
@@ -158,6 +159,8 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
+            if self._state is not None and not np.all(np.isfinite(self._state.displacement)):
+                raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as failure:
             singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
             self.message = f"at t = {self.time:.9g} s: {singular}{failure}"
@@ -284,7 +287,7 @@ class Motion:
             return self._unavailable
         complete = self.model.level_at(()).modes == self.model.base.modes.count
         sentences = {
-            a.NOT_FINITE: "the motion is not finite",
+            a.NOT_FINITE: NOT_FINITE,
             a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
             f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
             "need fewer modes or a shorter run",

@@ -16,8 +16,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase
 from multiphi_exudyn.mathematics.compiled import entry
-from multiphi_exudyn.mechanics.element import ElementState, event_kind
-from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
 from multiphi_exudyn.time.sampling import sample_rows, sample_states
@@ -199,7 +198,7 @@ class Record:
     amounts (m, 8): time [s], six losses [J], impulse [N s]. arrays: those of the loop.
     """
 
-    def __init__(self, contacts: Sequence[Contact], arrays: LevelArrays) -> None:
+    def __init__(self, contacts: Sequence[Element], arrays: LevelArrays) -> None:
         self._contacts, self.arrays = contacts, arrays
         self.count = 0  # of segments
         self.levels: list[LoadedLevel] = []

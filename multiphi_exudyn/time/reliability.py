@@ -36,7 +36,6 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.damping import ModalDamping
-from multiphi_exudyn.mechanics.force_law import LawSpring
 from multiphi_exudyn.mechanics.modal_structure import ModalStructure
 from multiphi_exudyn.time.defects import Samples, indicator, total_defect
 from multiphi_exudyn.time.rubbing import rubbing_warnings
@@ -180,7 +179,7 @@ def _missing_modes(model: MultiPhiModel) -> Iterator[str]:
     structure = model.structure
     if not isinstance(structure, ModalStructure):
         return
-    names = [link.law.name if isinstance(link, LawSpring) else link.name for link in model.contacts]
+    names = [link.name for link in model.contacts]
     places = [{at} if isinstance(at, str) else {*at} for at in (link.direction for link in model.contacts)]
     told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
     if told:

@@ -48,7 +48,7 @@ __all__ = ["SavedTrajectory", "load_trajectory", "save"]
 
 FORMAT = 1
 CONTACT, FRICTION = ("gap", "contact_force"), ("friction_force", "slip")
-KINDS = ("close", "open", "stick", "slip")
+KINDS = ("close", "open", "stick", "slip", "segment")
 LOSSES = len(dataclasses.fields(Loss))
 STRAIN = tuple(field.name for field in dataclasses.fields(StrainForm))
 
@@ -369,7 +369,7 @@ def _segments(levels: Sequence[Any], arrays: Mapping[str, np.ndarray]) -> tuple[
 
 
 def _elements(events: Sequence[Event]) -> Iterator[str]:
-    """Names of whatever changes: springs of force laws are no contacts that are asked for."""
+    """Names of whatever changes: force laws are no contacts that are asked for."""
     for event in events:
         yield event.contact
         yield from (name for name, _ in event.shared)

@@ -323,20 +323,18 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
                 f"displacement: lies {-gaps[i]:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
                 "(static_equilibrium gives an admissible start)"
             )
-        depth = gaps[i] if gaps[i] < -near[i] and not contact.held else 0.0
+        depth = 0.0 if abs(gaps[i]) <= near[i] else gaps[i]
         named = contact.first_state(depth, *rates[list(model.link_places[i])].tolist())
         states[i] = [state.name for state in contact.states].index(named)
         if contact.rigid and not contact.held and gaps[i] <= near[i]:
             states[i] = CLOSE
     states = _independent(model, states)
-    closed = [i for i, contact in enumerate(model.contacts) if states[i] != OPEN and not contact.held]
-    touching = tuple(i for i in closed if model.contacts[i].rigid)
+    touching = tuple(i for i, c in enumerate(model.contacts) if c.rigid and not c.held and states[i] != OPEN)
     stretches = run.stretches or {}
     held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
     left = stops.copy()
     left[list(model.held)] -= held
-    stuck = [i for i, contact in enumerate(model.contacts) if contact.held and states[i] == 0]
-    sprung = tuple(sorted([*(i for i in closed if i not in touching), *stuck]))
+    sprung = tuple(k for k in model.links_held(states.tolist()) if k not in touching)
     return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
 
 

@@ -78,3 +78,15 @@ def _event(function: Callable[[float, np.ndarray], float], direction: int) -> Ca
 
     event.terminal, event.direction = True, direction
     return event
+
+
+def force_of_links(law, q):
+    """F (k,) of a law at places q (k,), from the links that hold in its states there."""
+    links, total = (law, *law.further), np.full(len(q), law.constant)
+    states = {state.name: state for state in law.states}
+    for i, place in enumerate(q):
+        held = [links[k] for k in states[law.first_state(place - law.centre, 0.0)].holds]
+        for link in held:
+            sign = -1.0 if link.name.startswith(f"{law.name}+") else 1.0
+            total[i] += sign * link.stiffness * (sign * place + link.gap)
+    return total

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from small_structures import chain
-from true_law import with_forces
+from true_law import force_of_links, with_forces
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.force_law import LawSpring
 from reference_models.rig import rig_beam
 
 START = np.array([0.3, 0.8, 1.5])
@@ -91,13 +90,30 @@ class TestSegments:
         assert np.min(errors) > 0.9 * np.max(errors)
 
     @pytest.mark.parametrize("name", LAWS)
-    def test_are_the_sum_of_the_springs(self, name):
+    def test_are_what_the_links_of_each_state_make(self, name):
         found, q = law(LAWS[name][0]), np.linspace(-3, 3, 301)
-        total = np.full(len(q), found.constant)
-        for spring in found.springs:
-            gap = -spring.side * q + spring.gap
-            total += spring.side * spring.stiffness * np.maximum(0, -gap)
-        assert_allclose(total, found.force(q), rtol=0, atol=1e-12 * np.max(np.abs(total)))
+        assert_allclose(force_of_links(found, q), found.force(q), rtol=0, atol=1e-12 * np.max(np.abs(found.force(q))))
+
+    @pytest.mark.parametrize("name", LAWS)
+    def test_have_the_integral_of_the_force_for_energy(self, name):
+        found, q = law(LAWS[name][0]), np.linspace(-3, 3, 20_001)
+        energy = found.energy(q)
+        assert float(found.energy(found.centre)) == 0
+        assert_allclose(np.gradient(energy, q)[1:-1], found.force(q)[1:-1], atol=1e-3 * np.max(np.abs(found.force(q))))
+
+    @pytest.mark.parametrize("name", LAWS)
+    def test_are_states_with_an_exit_to_each_neighbour(self, name):
+        found = law(LAWS[name][0])
+        order = sorted(found.states, key=lambda state: int(state.name))
+        for i, state in enumerate(order):
+            beside = {other.name for k in (i - 1, i + 1) if 0 <= k < len(order) for other in [order[k]]}
+            assert {exit_.asked for exit_ in state.exits} == beside
+            assert len(state.exits) == len(beside)
+
+    def test_a_knot_where_the_slope_does_not_change_is_no_exit(self):
+        found = mp.ForceLaw("m0", ([-2, -1, 0, 1, 2], [-3, -1, 0, 1, 2]))
+        assert [state.name for state in found.states] == ["0", "-1"]
+        assert [len(state.exits) for state in found.states] == [1, 1]
 
     def test_beyond_the_span_the_last_ones_go_on(self):
         found = law(hardening)
@@ -154,8 +170,11 @@ class TestModel:
         assert_allclose(found.displacement(T), expected.displacement(T), rtol=0, atol=1e-13)
         assert [e.time for e in found.events] == pytest.approx([e.time for e in expected.events], rel=1e-13)
         assert found.stats.levels_possible == expected.stats.levels_possible == 2
-        (spring,) = found.model.contacts
-        assert (spring.gap, spring.stiffness) == (0.3, 50.0)
+        (own,) = found.model.contacts
+        (spring,) = own.further
+        assert (own.stiffness, spring.gap, spring.stiffness) == (0.0, 0.3, 50.0)
+        assert_allclose(found.contact_force("law", T), expected.contact_force("stop", T), rtol=0, atol=1e-11)
+        assert_allclose(found.contact_intervals("law"), expected.contact_intervals("stop"), rtol=1e-13)
 
     def test_two_slopes_have_their_own_periods(self):
         one = mp.MultiPhiModel(
@@ -163,7 +182,7 @@ class TestModel:
         )
         trajectory = mp.simulate(replace(one, modes="all"), 10.0, velocity=np.array([3.0]))
         times = [e.time for e in trajectory.events]
-        assert_allclose(np.unique(np.round(np.diff(times), 12)), [0, np.pi / 3, np.pi / 2], atol=1e-12)
+        assert_allclose(np.unique(np.round(np.diff(times), 12)), [np.pi / 3, np.pi / 2], atol=1e-12)
         assert_allclose(np.max(trajectory.at("m0", np.linspace(0, 1, 2001))), 1.0, atol=1e-6)
         assert trajectory.status == "ok"
 
@@ -173,15 +192,23 @@ class TestModel:
         few = replace(m, modes=1)
         assert few.force_laws == m.force_laws == (first, second)
         assert few.contacts == m.contacts
-        assert all(isinstance(c, LawSpring) for c in m.contacts if c.name != "stop")
+        assert [c.name for c in m.contacts] == ["a", "stop", "b"]
         assert m.levels_possible == 2 * first.levels * second.levels == 2 * 32 * 32
         assert few.level(()).modes == 1
+
+    def test_a_level_is_named_by_the_segment(self, refused):
+        m = model(law(hardening, segments=4), mp.UnilateralContact("stop", "m0", 0.5, 3.0))
+        assert m.level(()) is m.level({"law": "0"})
+        assert m.level(("stop",)) is m.level({"stop": "closed"})
+        assert m.level({"law": "+1", "stop": "closed"}).closed == ("stop", "law+1")
+        refused(ValueError, "closed: got the force law 'law', need {'law': segment}", m.level, ("law",))
+        refused(ValueError, "state of 'law': got '+9'", m.level, {"law": "+9"})
 
     @pytest.mark.parametrize("slope", [-0.2, -0.5, -3.0, 0.7, 0.0])
     def test_levels_of_signed_slopes_are_those_of_the_dense_matrix(self, slope):
         structure = chain(5)
         m = mp.MultiPhiModel(structure, [mp.ForceLaw("m4", ([-2, 0, 1, 2], [-4, 0, 2, 2 + slope]))], modes="all")
-        level = m.level(tuple(c.name for c in m.contacts if c.side > 0))
+        level = m.level({"law": "+1"} if slope != 2 else {})
         dense = np.array(structure.stiffness)
         dense[4, 4] += slope
         assert_allclose(level.squares, np.linalg.eigvalsh(dense), rtol=1e-12, atol=1e-14)
@@ -195,7 +222,7 @@ class TestModel:
         slopes = np.array([-0.9, -3.0]) * stiff
         for slope in slopes:
             m = mp.MultiPhiModel(structure, [mp.ForceLaw("node3", ([0, 1], [0, slope]))], modes="all")
-            level = m.level(tuple(c.name for c in m.contacts if c.side > 0))
+            level = m.level(())
             w = m.base.modes.shapes.T @ structure.row("node3")
             own = level.squares[:3]  # roots of the secular equation 1 + k sum w^2 / (Omega^2 - omega^2) = 0
             residual = 1 + slope * np.sum(w**2 / (m.base.modes.omega**2 - own[:, None]), axis=1)
@@ -290,14 +317,23 @@ class TestMotion:
         assert relative(run.displacement(T), true) < 6e-3
         assert np.ptp(run.energy(T)) < 1e-11 * run.ledger.initial
 
-    def test_the_exchange_at_the_centre_is_one_instant(self):
+    def test_every_event_is_one_transition_into_the_segment_beside(self):
         run = mp.simulate(model(law(hardening)), 30.0, displacement=START)
-        centre = [e for e in run.events if e.contact in ("law+1", "law-1")]
-        crossings = [e.time for e in centre if e.contact == "law+1"]
-        assert len(crossings) > 5
-        assert crossings == [e.time for e in centre if e.contact == "law-1"]
-        assert run.stats.transitions == len(run.events) - len(crossings)
-        assert np.max(np.abs(run.at("m2", np.array(crossings)))) < 1e-13
+        entered = [int(event.state) for event in run.events]
+        assert len(entered) > 50
+        assert run.stats.transitions == len(entered)
+        assert {event.kind for event in run.events} == {"segment"}
+        assert set(np.abs(np.diff(entered))) == {1}
+        (own,) = run.model.contacts
+        knots = np.array([abs(run.at("m2", e.time) - own.knots[1:-1]).min() for e in run.events])
+        assert np.max(knots) < 1e-12
+
+    def test_its_force_is_that_of_the_segment_it_is_in(self):
+        run = mp.simulate(model(law(magnet, segments=16)), 10.0, displacement=START)
+        (own,) = run.model.contacts
+        q = run.at("m2", T)
+        assert_allclose(run.contact_force("law", T), -own.force(q), rtol=0, atol=1e-12)
+        assert_allclose(run.gap("law", T), q - own.centre, rtol=0, atol=1e-14)
 
     def test_keeps_its_energy_over_five_thousand_events(self):
         stiff = chain(1, stiffness=100.0)
@@ -307,14 +343,33 @@ class TestMotion:
         energy = run.energy(np.array([0.0, run.t_end]))
         assert abs(energy[1] / energy[0] - 1) < 1e-10
 
-    def test_looks_at_the_ends_of_its_chains_only(self):
+    def test_looks_at_two_exits_whatever_its_segments(self):
         run = mp.simulate(model(law(hardening, segments=200)), 5.0, displacement=START)
-        loaded = next(levels for _, levels in run.model.loaded.items())
         for segment in run.segments:
-            assert len(loaded.ends(segment.level.states)) <= 3
+            assert len(segment.level.states) == 1
+            assert len(segment.phases) == 2
         few = mp.simulate(model(law(hardening, segments=20)), 5.0, displacement=START)
         each = [r.stats.function_evaluations / r.stats.events for r in (few, run)]
         assert each[1] < 1.2 * each[0]
+
+    @pytest.mark.parametrize("compiled", [True, False])
+    def test_a_step_across_many_segments_at_one_instant_is_found(self, compiled):
+        """Two modes cannot hold the start, so that the law finds itself elsewhere."""
+        structure, own = chain(6), law(hardening, "m5", segments=200)
+        stop = mp.UnilateralContact("stop", "m1", 0.2)
+        start = np.linspace(0, 1.5, 6)
+        m = mp.MultiPhiModel(structure, [own, stop], modes=2)
+        run = mp.simulate(m, 30.0 if compiled else 1.0, displacement=start, compiled=compiled)
+        assert run.status == "ok"
+        at_once = [int(event.state) for event in run.events if event.time == 0]
+        before = int(own.first_state(1.5, 0.0))
+        assert max(abs(a - b) for a, b in zip([before, *at_once], at_once, strict=False)) > 1, "at once into it"
+        assert len(at_once) < abs(before - at_once[-1]), "not one by one"
+        assert len(set(at_once)) == len(at_once), "and not to and fro"
+        t = np.linspace(0, run.t_end, 1001)
+        off = np.abs(run.contact_force("law", t) + own.force(run.at("m5", t)))
+        assert np.max(off) < 1e-4 * np.max(np.abs(own.forces))
+        assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial
 
     def test_growth_without_end_is_a_status(self):
         run = mp.simulate(model(mp.ForceLaw("m2", ([-1, 0, 1], [9, 0, -9]))), 1e4, displacement=1e-3 * START)
@@ -324,7 +379,7 @@ class TestMotion:
     def test_an_early_event_of_a_growing_motion_is_found_whatever_the_horizon(self):
         m = model(mp.ForceLaw("m2", ([-1, 0, 1, 2], [9, 0, -9, 60])))
         short, long = (mp.simulate(m, end, displacement=1e-3 * START) for end in (3.0, 300.0))
-        assert np.min(m.level(("law+1",)).squares) < -4
+        assert np.min(m.level(()).squares) < -4
         assert long.status == "ok"
         assert short.events[0].time == pytest.approx(long.events[0].time, rel=1e-13)
         assert abs(long.ledger.residual) < 1e-9
@@ -337,10 +392,10 @@ class TestMotion:
         assert sum(end - start for start, end in run.contact_intervals("stop")) > 0.5
         assert abs(run.ledger.residual) < 1e-9
 
-    def test_refuses_moving_springs(self, refused):
+    def test_refuses_to_move_as_a_stop(self, refused):
         m = model(law(hardening, segments=4))
-        moving = mp.StopMotion("law+1", mp.Smooth(lambda t: 0.1 * t, 1e-6))
-        refused(TypeError, "stop motion of 'law+1'", mp.simulate, m, 1.0, loads=[moving])
+        moving = mp.StopMotion("law", mp.Smooth(lambda t: 0.1 * t, 1e-6))
+        refused(TypeError, "stop motion of 'law'", mp.simulate, m, 1.0, loads=[moving])
 
 
 class TestEquilibrium:

@@ -187,10 +187,10 @@ class TestTheJudgeKnowsLaws:
         harder = dataclasses.replace(problem.contacts[0], law=(knots, 1.001 * forces))
         assert "m beyond the contact law" in complaints(dataclasses.replace(problem, contacts=[harder]), trajectory)
 
-    def test_of_springs_that_do_not_add_up_to_their_law(self):
+    def test_of_links_that_do_not_add_up_to_their_law(self):
         problem = BY_NAME["law-clearance-both-sides"].build(True)
         law = problem.contacts[0]
-        vars(law)["springs"] = law.springs[:1]
+        vars(law)["_below"] = ()
         trajectory = simulate(problem.model(), problem.t_end, problem.displacement)
         assert "m beyond the contact law" in complaints(problem, trajectory)
 

@@ -40,7 +40,7 @@ from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mathematics.signal_bounds import HERMITE
 
-__all__ = ["Conditions", "StepTest", "driven_conditions", "jump_times", "plain_conditions"]
+__all__ = ["Conditions", "StepTest", "conditions_of", "jump_times"]
 
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a contact's function: what no test needs to tell from zero
 
@@ -185,35 +185,43 @@ class StepTest:
         self._numbers[TOLD] = t
 
 
-# ---------------------------------------------------------------------- under constant loads
+def conditions_of(
+    stepped: SteppedLevel, level: LoadedLevel, rows: list[Row], step: float, direct: np.ndarray
+) -> Conditions:
+    """For the functions ``rows`` (c,) of xi in one level, and steps of length ``step`` [s].
 
-
-def plain_conditions(stepped: SteppedLevel, rows: list[Row], step: float, direct: np.ndarray) -> Conditions:
-    """For the functions ``rows`` (c,) in one level, and steps of length ``step`` [s]; direct: L (c, m) for them."""
-    s, places = stepped.size, stepped.loaded.excitation.channels
-    (along, held), (rate, _) = (np.split(part, [s], axis=1) for part in _padded(stepped, rows, places))
-    none = np.zeros_like(along)
-    value, third = np.hstack([along, rate, none]), np.hstack([none, along, rate]) * (step / 3)
-    constants = np.array([row.constant for row in rows]).reshape(-1, 1)
-    scales = _scales(stepped, along, rate, constants[:, 0], step)[:, None]
-    behind, both, ahead = (
-        np.hstack([functions @ stepped.physical, constants, direct, held]) / scales
-        for functions in (value - third, value, value + third)
-    )
-    norm, points = _energy_norm(stepped), direct.shape[1]
-    return Conditions(behind, both, ahead, norm, points, places, 0, bool(np.any(direct)))
-
-
-def _scales(
-    stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, constants: np.ndarray, step: float
-) -> np.ndarray:
-    """The factors (c,) of max |S z'| at the start, by which the conditions are divided.
-
-    Free motion has no fourth derivative: then round-off of the way that max |S z'| makes in a step, or for a contact
-    that no mode moves of its gap, stands in for it.
+    direct: L (c, m) for them, of no columns under loads that vary. Free motion has no fourth derivative: then round-off
+    of the way that max |S z'| makes in a step, or for a contact that no mode moves of its gap, stands in for it.
     """
-    scale = HERMITE * step**4 * _gains(stepped, along, rate, 3)
-    return np.asarray(np.maximum(scale, _least(along, rate, constants, step)) * _swell(stepped, step))
+    s, q = stepped.size, level.excitation.prescribed
+    (along, held), (rate, _) = (
+        np.split(part, [s + q], axis=1) for part in _padded(stepped, rows, level.excitation.channels)
+    )
+    own, own_rate, none = along[:, :s], rate[:, :s], np.zeros((len(rows), s))
+    order, share = (1, step**2 / 8) if q else (3, HERMITE * step**4)
+    gains, swell = _gains(stepped, own, own_rate, order), _swell(stepped, step)
+    constants = np.array([row.constant for row in rows]).reshape(-1)
+    scales = np.maximum(share * gains, _least(along, rate, constants, step)) * swell
+    first, second, third = _bounds(level.excitation, step)
+    forced = _forced(level, first, second)
+    extra = (np.linalg.norm(own_rate, axis=1) + step * gains * swell) * forced
+    extra += np.abs(along[:, s:]) @ second + np.abs(rate[:, s:]) @ third
+    beside = np.hstack([(constants - share * extra)[:, None], direct, held, along[:, s:], rate[:, s:]])
+    value, turned = np.hstack([own, own_rate, none]), np.hstack([none, own, own_rate]) * (step / 3)
+    behind, both, ahead = (
+        np.hstack([functions @ stepped.physical, beside]) / scales[:, None]
+        for functions in (value - turned, value, value + turned)
+    )
+    count = len(rows) if not q else 0
+    entries = direct.shape[1], held.shape[1], 2 * q
+    return Conditions(behind[:count], both, ahead[:count], _energy_norm(stepped), *entries, bool(np.any(direct)))
+
+
+def _forced(level: LoadedLevel, first: np.ndarray, second: np.ndarray) -> float:
+    """Bound of |p'| from those of |w'| and |w''| (q,)."""
+    q = len(first)
+    force, force_rate = np.abs(level.channels.force[:, :q]), np.abs(level.channels.force_rate[:, :q])
+    return float(np.linalg.norm(force @ first + force_rate @ second))
 
 
 def _least(along: np.ndarray, rate: np.ndarray, constants: np.ndarray, step: float) -> np.ndarray:
@@ -266,38 +274,15 @@ def _gains(stepped: SteppedLevel, along: np.ndarray, rate: np.ndarray, power: in
     return np.asarray(np.linalg.norm(np.hstack([-rate @ _pulling(stepped), along - rate @ damping]), axis=1))
 
 
-# ---------------------------------------------------------------------- under loads that vary
-
-
-def driven_conditions(stepped: SteppedLevel, level: LoadedLevel, rows: list[Row], step: float) -> Conditions:
-    """For the functions ``rows`` (c,) of xi in one level, and steps of length ``step`` [s]."""
-    s, q, share = stepped.size, level.excitation.prescribed, step**2 / 8
-    along, rate = _padded(stepped, rows, level.excitation.channels)
-    (along, held), rate = np.split(along, [s + q], axis=1), rate[:, : s + q]
-    modal = np.hstack([along[:, :s], rate[:, :s]])
-    constants = np.array([row.constant for row in rows]).reshape(-1)
-    first, second, third = (np.array(bounds) for bounds in zip(*_bounds(level.excitation, step), strict=True))
-    force, force_rate = np.abs(level.channels.force[:, :q]), np.abs(level.channels.force_rate[:, :q])
-    forced = float(np.linalg.norm(force @ first + force_rate @ second))
-    gains = _gains(stepped, along[:, :s], rate[:, :s], 1) * _swell(stepped, step)
-    extra = np.linalg.norm(rate[:, :s], axis=1) * forced + step * forced * gains
-    extra += np.abs(along[:, s:]) @ second + np.abs(rate[:, s:]) @ third
-    scales = np.maximum(share * gains, _least(along, rate, constants, step))[:, None]
-    value = np.hstack([modal, np.zeros((len(rows), s))]) @ stepped.physical
-    both = np.hstack([value, (constants - share * extra)[:, None], held, along[:, s:], rate[:, s:]]) / scales
-    norm, places = _energy_norm(stepped), held.shape[1]
-    return Conditions(both[:0], both, both[:0], norm, 0, places, 2 * q, direct=False)
-
-
 def jump_times(excitation: Excitation) -> np.ndarray:
     """When a channel jumps, ascending [s]."""
     times = np.unique(np.concatenate([history.jump_times() for history in excitation.histories]))
     return np.asarray(times[times > 0])
 
 
-def _bounds(excitation: Excitation, step: float) -> list[tuple[float, float, float]]:
-    """Bounds of |w'|, |w''|, |w'''| of every channel, kinks counted for steps of this length."""
-    return [_smooth_bounds(history, step) for history in excitation.histories]
+def _bounds(excitation: Excitation, step: float) -> np.ndarray:
+    """Bounds (3, q) of |w'|, |w''|, |w'''| of the channels, kinks counted for steps of this length."""
+    return np.array([_smooth_bounds(history, step) for history in excitation.histories]).reshape(-1, 3).T
 
 
 def _smooth_bounds(history: PiecewiseExponential, step: float) -> tuple[float, float, float]:

@@ -166,11 +166,10 @@ def graphics_of(
 
 def _stops(model: MultiPhiModel, drawing: Drawing) -> dict[int, np.ndarray]:
     """Contact's index -> centre (3,) of its block."""
-    in_laws = {i for chain in model.chains for i in chain}
     centres = {
         i: drawing.stop(model.structure.row(contact.direction), contact.gap)
         for i, contact in enumerate(model.contacts)
-        if i not in in_laws
+        if i not in model.base.laws
     }
     return {i: centre for i, centre in centres.items() if centre is not None}
 

@@ -16,12 +16,7 @@ from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exits import exits_of, force_shares, signal_rows
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase, State
-from multiphi_exudyn.exudyn_plugin.body.certified_step import (
-    Conditions,
-    driven_conditions,
-    jump_times,
-    plain_conditions,
-)
+from multiphi_exudyn.exudyn_plugin.body.certified_step import Conditions, conditions_of, jump_times
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads import Load
@@ -94,16 +89,13 @@ class OwnLoads:
         return self.loaded.further(stepped.states, key, lambda: self._conditions(stepped, step, direct))
 
     def _conditions(self, stepped: SteppedLevel, step: float, direct: np.ndarray) -> Conditions:
-        level, ends = self.loaded.level(stepped.states), self.loaded.ends(stepped.states)
-        ways = [(*way, row) for way, row in zip(exits_of(level), signal_rows(level), strict=True) if way[0] in ends]
-        rows = [row for *_, row in ways]
-        if self.varies:
-            return driven_conditions(stepped, level, rows, step)
+        level = self.loaded.level(stepped.states)
+        rows = signal_rows(level)
         carried = np.zeros((len(rows), direct.shape[1]))
-        for k, (element, exit_, _) in enumerate(ways):
+        for k, (element, exit_) in enumerate(exits_of(level)):
             for place, force in force_shares(level, element, exit_):
                 carried[k] += force * direct[place]
-        return plain_conditions(stepped, rows, step, carried)
+        return conditions_of(stepped, level, rows, step, carried)
 
     def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:
         """Phases of a state that was entered with others: who has risen since is armed again, or still lands."""

@@ -25,6 +25,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
+from multiphi_exudyn.mechanics.element import links_of
 from multiphi_exudyn.time.level_rows import force_row, patch_row, pressing_row
 
 __all__ = ["BodyHistories", "add_sensors", "body_histories", "rebuilt"]
@@ -271,14 +272,15 @@ def rebuilt(
 def _carried(level: LoadedLevel, element: int, direct: np.ndarray, held: bool) -> np.ndarray:
     """What the links of an element with or without held places carry of L f (k, ..), summed."""
     base, indices = level.level.base, level.level.indices
-    own = [k for k, link in enumerate(indices) if link in base.link_places[element] and base.links[link].held == held]
-    return np.asarray(np.sum(direct[own], axis=0))
+    signs = {k: 1 for k in base.link_places[element] if base.links[k].held} if held else base.pressing(element)
+    carried = [sign * direct[indices.index(link)] for link, sign in signs.items() if link in indices]
+    return np.asarray(sum(carried, np.zeros(direct.shape[1])))
 
 
 def _holding(body: MultiPhiBody, element: int, held: bool) -> np.ndarray:
     """In which of an element's states (n,) a link holds that has a held place, or one that has none."""
     contact = body.model.contacts[element]
-    links = (contact, *contact.further)
+    links = links_of([contact])
     return np.array([any(links[k].held == held for k in state.holds) for state in contact.states])
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Extent, Linearisation
-from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -270,7 +270,7 @@ class LinearLimits:
         return RangeCheck(samples, TOLERANCE * np.max(np.abs(self._rows @ z) / self._limits[:, None], axis=0))
 
 
-def _pushing(trajectory: Trajectory, contact: Contact, t: float) -> float:
+def _pushing(trajectory: Trajectory, contact: Element, t: float) -> float:
     """Force [N] along its direction that a contact, or a friction, exerts on the structure at t [s]."""
     if isinstance(contact, Friction):
         return -float(trajectory.friction_force(contact.name, t))

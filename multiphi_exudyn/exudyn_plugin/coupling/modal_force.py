@@ -246,7 +246,7 @@ class HeldForces:
             squares=numbers[energy + 1 + n :][:r].copy(),
             exits=exits.tolist(),
             elements=[element for element, _ in ways],
-            ends=ints[ints[level + a.ENDS] :][: ints[level + a.END_COUNT]].copy(),
+            ends=ints[ints[level + a.WATCHED] :][: ints[level + a.WATCHED_COUNT]].copy(),
             mobility=mobility,
         )
 
@@ -269,9 +269,9 @@ class HeldForces:
             self.arrays.numbers[plain.mobility : plain.mobility + r * r] = root.ravel()
             held = self._inertia.held
             ends = np.array([k for k in ends.tolist() if plain.elements[k] not in held], dtype=np.int64)
-        start = int(ints[level + a.ENDS])
+        start = int(ints[level + a.WATCHED])
         ints[start : start + len(ends)] = ends
-        ints[level + a.END_COUNT] = len(ends)
+        ints[level + a.WATCHED_COUNT] = len(ends)
 
 
 def _nothing(states: tuple[int, ...]) -> Acting:

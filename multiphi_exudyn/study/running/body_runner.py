@@ -67,7 +67,7 @@ def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
 
 
 def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
-    """The fields of a ModelRun that the body's sensors give, on the common grid, without the springs of force laws."""
+    """The fields of a ModelRun that the body's sensors give, on the common grid, without force laws."""
     contacts = [contact.name for contact in bench.mechanics.contacts]
     points = {
         name: CubicHermiteSpline(recorded.time, values, recorded.velocities[name])(bench.time)

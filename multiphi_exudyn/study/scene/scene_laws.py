@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.force_law import ForceLaw, expanded
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.law_tables import CubicLawSpec, HertzLawSpec, LawSpec, TableLawSpec
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
@@ -32,13 +32,12 @@ def described_laws(scene: Scene) -> tuple[str, ...]:
 
 
 def check_laws(scene: Scene, contacts: Sequence[UnilateralContact], laws: Sequence[ForceLaw]) -> None:
-    """Names of their own, also for the springs of their chains; or the field's error."""
+    """Names of their own, or the field's error."""
     names = [contact.name for contact in contacts]
     for i, law in enumerate(laws):
-        taken = next((name for name in (law.name, *(s.name for s in expanded([law]))) if name in names), None)
-        if taken is not None:
-            refuse(scene, f"force_laws[{i}].name", law.name, f"a name of its own: there is {taken} already")
-        names += [law.name, *(spring.name for spring in expanded([law]))]
+        if law.name in names:
+            refuse(scene, f"force_laws[{i}].name", law.name, f"a name of its own: there is {law.name} already")
+        names.append(law.name)
 
 
 def _shape(spec: LawSpec) -> Any:

@@ -21,7 +21,7 @@ import numpy as np
 
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.mechanics.force_law import Contact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import BaseMotion, Load, StopMotion
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -54,10 +54,11 @@ class Sampling:
 
 @dataclass(frozen=True)
 class SegmentTable:
-    """Of every segment: start, end (s,), closed (s, c), and until when the phase excuses s < 0, -inf for never."""
+    """Of every segment: start, end (s,), states (s, c), closed, and until when the phase excuses s < 0, else -inf."""
 
     start: np.ndarray
     end: np.ndarray
+    states: np.ndarray
     closed: np.ndarray
     excused: np.ndarray
 
@@ -74,7 +75,9 @@ class SegmentTable:
             for (i, _), phase in zip(exits_of(segment.level), segment.phases, strict=True):
                 if phase is not Phase.ARMED:
                     excused[row, i] = until
-        return cls(np.array([s.start for s in segments]), np.array([s.end for s in segments]), closed, excused)
+        starts, ends = np.array([(segment.start, segment.end) for segment in segments]).reshape(-1, 2).T
+        states = np.array([segment.level.states for segment in segments], int).reshape(len(segments), count)
+        return cls(starts, ends, states, closed, excused)
 
     def owners(self, times: np.ndarray) -> np.ndarray:
         """Positions of the segments at times (k,)."""
@@ -126,7 +129,11 @@ def _windows(trajectory: Trajectory, width: float, count: int) -> list[np.ndarra
 
 
 def sample_contact(
-    trajectory: Trajectory, contact: Contact, table: SegmentTable, times: np.ndarray, loads: Sequence[Load] = ()
+    trajectory: Trajectory,
+    contact: UnilateralContact,
+    table: SegmentTable,
+    times: np.ndarray,
+    loads: Sequence[Load] = (),
 ) -> ContactSamples:
     """One contact at times (k,), its stop moved by some of the loads."""
     chunks = np.array_split(times, math.ceil(len(times) / CHUNK))
@@ -150,7 +157,7 @@ def truncated(trajectory: Trajectory) -> bool:
 
 def _way(
     trajectory: Trajectory,
-    contact: Contact,
+    contact: UnilateralContact,
     row: np.ndarray,
     times: np.ndarray,
     loads: Sequence[Load],
@@ -182,9 +189,9 @@ def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable,
 
 
 def untold_switches(trajectory: Trajectory, table: SegmentTable, name: str) -> int:
-    """How often the link of an element begins or ceases to hold between segments without an event."""
+    """How often an element changes its state between segments without an event."""
     i, slack = trajectory.model.index(name), TIME_ROUND_OFF * trajectory.t_end
-    switched = table.start[1:][table.closed[1:, i] != table.closed[:-1, i]]
+    switched = table.start[1:][table.states[1:, i] != table.states[:-1, i]]
     return int(np.sum(_events_in(_times(trajectory, name), switched - slack, switched + slack) == 0))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw, expanded
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import LinearStructure
@@ -64,9 +64,14 @@ class Problem:
         return MultiPhiModel(self.structure, self.contacts, modes=self.modes)
 
     @property
-    def parts(self) -> tuple[Contact, ...]:
-        """The contacts, every law by its chain of springs, without friction."""
-        return expanded([contact for contact in self.contacts if not isinstance(contact, Friction)])
+    def parts(self) -> list[UnilateralContact | ForceLaw]:
+        """The contacts and force laws, without friction."""
+        return [contact for contact in self.contacts if not isinstance(contact, Friction)]
+
+    @property
+    def unilateral(self) -> list[UnilateralContact]:
+        """The contacts alone."""
+        return [contact for contact in self.contacts if isinstance(contact, UnilateralContact)]
 
     @property
     def frictions(self) -> list[Friction]:
@@ -86,7 +91,7 @@ class Problem:
     @property
     def conservative(self) -> bool:
         """Whether nothing but impacts may change the energy."""
-        rubs = self.frictions or any(isinstance(c, UnilateralContact) and c.friction for c in self.contacts)
+        rubs = self.frictions or any(contact.friction for contact in self.unilateral)
         return not (self.damped or self.loads or rubs)
 
     @property
@@ -97,7 +102,7 @@ class Problem:
     @property
     def penalty_contacts(self) -> list[UnilateralContact] | None:
         """The unilateral contacts as penalty elements, None where a rigid one has no stand-in."""
-        penalty, given = self.penalty, [c for c in self.contacts if isinstance(c, UnilateralContact)]
+        penalty, given = self.penalty, self.unilateral
         if penalty is None:
             return None if any(contact.rigid for contact in given) else given
         return [replace(c, stiffness=penalty) if c.rigid else c for c in given]

@@ -4,7 +4,7 @@
     energy      undamped, unforced: max |energy(t) + losses until t - initial| / E; else the residual
     beyond      how far a contact is from its law [m]:
                 open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
-                with a as in brute_force.py; a force law: |sum of its springs' forces + F(q_m) - F(q)| / max |F'|
+                with a as in brute_force.py; a force law: |force on the structure + F(q)| / max |F'|
     pulling     most negative reaction of a rigid or viscous contact over the largest one
     friction    see friction_judgement.py: its ways are among ``beyond``
 
@@ -19,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.force_law import Contact, ForceLaw
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
     SegmentTable,
@@ -27,6 +28,7 @@ from multiphi_exudyn.study.stability.brute_force import (
     sample_contact,
     sampling,
     truncated,
+    untold_switches,
 )
 from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.study.stability.friction_judgement import judge_friction
@@ -87,7 +89,7 @@ class Judgement:
 def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     """Judge a trajectory with about ``budget`` samples of every contact."""
     table, look, tolerance = SegmentTable.of(trajectory), sampling(trajectory, budget), BEYOND * problem.metre
-    parts = problem.parts
+    parts = problem.unilateral
     seen = [sample_contact(trajectory, contact, table, look.times, problem.loads) for contact in parts]
     beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
     rubbed = [judge_friction(trajectory, friction, table, look.times) for friction in problem.frictions]
@@ -99,6 +101,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         residual=residual,
         events=len(trajectory.events),
         missed=sum(found.missed for found in rubbed)
+        + sum(untold_switches(trajectory, table, law.name) for law in problem.laws)
         + sum(
             missed(trajectory, found, table, contact.name, tolerance)
             for contact, found in zip(parts, seen, strict=True)
@@ -123,7 +126,7 @@ def _share(part: float, whole: float) -> float:
     return abs(part) / whole if whole > 0 else abs(part)
 
 
-def _beyond(contact: Contact, seen: ContactSamples) -> np.ndarray:
+def _beyond(contact: UnilateralContact, seen: ContactSamples) -> np.ndarray:
     """Distance from the contact law (k,)."""
     if contact.rigid:
         closed = np.abs(seen.gap)
@@ -133,14 +136,12 @@ def _beyond(contact: Contact, seen: ContactSamples) -> np.ndarray:
 
 
 def _beyond_law(law: ForceLaw, trajectory: Trajectory, times: np.ndarray) -> float:
-    """Largest distance from a force law: what its springs together are off by, over its steepest slope [m]."""
-    q, forces = np.asarray(trajectory.at(law.at, times)), np.full(len(times), law.constant)
-    for spring in law.springs:
-        forces += spring.side * np.asarray(trajectory.contact_force(spring.name, times))
-    return float(np.max(np.abs(forces - law.force(q))) / np.max(np.abs(law.slopes)))
+    """Largest distance from a force law: what its force is off by, over its steepest slope [m]."""
+    q, forces = np.asarray(trajectory.at(law.at, times)), np.asarray(trajectory.contact_force(law.name, times))
+    return float(np.max(np.abs(forces + law.force(q))) / np.max(np.abs(law.slopes)))
 
 
-def _pulling(contacts: Sequence[Contact], seen: Sequence[ContactSamples]) -> float:
+def _pulling(contacts: Sequence[UnilateralContact], seen: Sequence[ContactSamples]) -> float:
     worst = 0.0
     for contact, found in zip(contacts, seen, strict=True):
         if (contact.rigid or contact.damping > 0) and np.any(found.closed):
