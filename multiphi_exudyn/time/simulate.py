@@ -311,7 +311,7 @@ def _start(run: Run, levels: LoadedLevels) -> Start:
     scales: _Scales = levels.starts.get_or_build(run.t_end, lambda: _Scales.of(levels, run.t_end))
     stops, directions = base.gaps - scales.moved, base.magnitudes[0]
     judged = y @ base.directions + stops, scales.near(np.abs(y) @ directions, y, v)
-    if not model.general and (judged[0] > judged[1]).all():
+    if not (model.general or model.force_laws) and (judged[0] > judged[1]).all():
         return Start(y, v, (), (), stops, (OPEN,) * len(model.contacts), np.zeros(0))
     gaps, near = (judge.tolist() for judge in judged)
     rates, terms = v @ base.directions - scales.speeds, np.abs(v) @ directions + np.abs(scales.speeds)
