@@ -40,6 +40,7 @@ import numpy as np
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.levels.build_level import independent
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.static_response import static_response
 from multiphi_exudyn.mathematics.least_distance import Infeasible, least_distance
@@ -318,6 +319,13 @@ def _with_friction(
 
 def _at_rest(base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same without friction, of gaps (l,)."""
+    held = [k for k in index if base.links[k].rigid]
+    if not independent(base, held):
+        names = ", ".join(dict.fromkeys(repr(base.links[k].name) for k in held))
+        raise NumericalFailure(
+            f"static equilibrium: {names} hold one motion together, so which of them bears the load is not unique; "
+            "need a finite stiffness, or a spring beside friction"
+        )
     closed_directions = base.closed_directions(index, gaps[index])
     along, configuration = static_response(base, closed_directions, load)
     return base.contact_forces(closed_directions, along, base.directions.T @ configuration + gaps), configuration

@@ -15,6 +15,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "linear range: ..."       what the model's own validity check says
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               what the base of a large structure does not hold (base_share.py)
+    "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 
@@ -50,6 +51,8 @@ RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator 
 PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
+SLOW = 1e-5  # rad of a period that a run sees: with less, a millionth of what loads make is round-off
+LEFT = 2e-8  # rad of a period: nothing but round-off, whose share falls with the square of what is seen
 STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
 HARDLY = 0.01  # of a period of the fastest kept mode: a run so short is hardly one that was meant
 MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
@@ -72,6 +75,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     found.extend(clusters)
     if model.validity is not None:
         found.extend(model.validity(trajectory))
+    found.extend(_slow_modes(trajectory))
     found.extend(rubbing_warnings(trajectory.segments, model))
     found.extend(_load_pieces(trajectory))
     return tuple(found)
@@ -262,6 +266,22 @@ def _clusters(levels: Sequence[Level]) -> list[str]:
         f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
         f"arbitrary; ask for {most.modes} modes"
     ]
+
+
+def _slow_modes(trajectory: Trajectory) -> Iterator[str]:
+    """Of a mode of which a run sees so little that where loads move it is a small difference of far places.
+
+    p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
+    """
+    levels, span = listed(trajectory.segments).levels, trajectory.t_end - trajectory.t_start
+    omega = np.concatenate([level.level.omega for level in levels])
+    slowest = float(np.min(omega[omega > 0], initial=math.inf))
+    if slowest * span < SLOW and any(np.any(level.excitation.static) or level.excitation.histories for level in levels):
+        share = min(1.0, LEFT / (slowest * span)) ** 2
+        yield (
+            f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
+            f"{per_cent(share)} of what loads move it by is round-off; hold it, or make its stiffness exactly zero"
+        )
 
 
 def _load_pieces(trajectory: Trajectory) -> list[str]:

@@ -258,3 +258,13 @@ class TestContacts:
         assert "reached" in {event.contact for event in run.events}
         size = np.max(np.abs(found.displacement))
         assert_allclose(found.displacement, run.displacement(12100.0), rtol=0, atol=3e-4 * size)
+
+
+@pytest.mark.parametrize("block", ["m1", "m0"])
+def test_what_holds_one_motion_together_is_refused_by_name(block):
+    """A block beside a rigid contact that rubs along its row, or presses on it: the forces of both are not unique."""
+    structure = mp.LinearStructure(np.eye(2), [[300.0, 100.0], [100.0, 200.0]], points={"m0": 0, "m1": 1})
+    rough = mp.UnilateralContact("c", {"m0": -1.0}, 0.0, friction=0.1, tangential="m1")
+    model = mp.MultiPhiModel(structure, [rough, mp.Friction("f", block, 2.0)], modes="all")
+    with pytest.raises(mp.NumericalFailure, match="hold one motion together, so which"):
+        model.static_equilibrium({"m0": 10.0, "m1": -5.0})
