@@ -47,7 +47,8 @@ class Channels:
     def none(cls, level: Level) -> Channels:
         """Of a level under static loads alone."""
         r, m, k = level.modes, level.base.modes.count, len(level.indices)
-        return cls(*(np.zeros((rows, 0)) for rows in (r, r, m, m, m, k, k)))
+        of_modes, of_base, of_forces = (np.zeros((rows, 0)) for rows in (r, m, k))
+        return cls(of_modes, of_modes, of_base, of_base, of_base, of_forces, of_forces)
 
     @classmethod
     def of(cls, level: Level, excitation: Excitation) -> Channels:

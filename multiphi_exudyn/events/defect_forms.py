@@ -8,6 +8,7 @@ kept.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +82,14 @@ def factor(rows: np.ndarray) -> np.ndarray:
     """R with |R z| = |rows z|, upper triangular."""
     if not rows.size:
         return np.zeros((0, rows.shape[1]))
-    return np.triu(scipy.linalg.lapack.dgeqrf(rows)[0][: rows.shape[1]])
+    found = scipy.linalg.lapack.dgeqrf(rows)[0][: rows.shape[1]]
+    return np.asarray(found * _upper(*found.shape))
+
+
+@functools.lru_cache(maxsize=64)
+def _upper(rows: int, columns: int) -> np.ndarray:
+    """One on the diagonal and above it, zero below."""
+    return np.triu(np.ones((rows, columns)))
 
 
 def held_rigidly(level: LoadedLevel) -> set[int]:

@@ -281,7 +281,7 @@ class LevelArrays:
             move = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
             matrix, offset, rate_matrix, terms = move.matrix, move.offset, move.velocity_matrix, move.terms
         at = put("numbers", matrix)
-        rates = at if np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
+        rates = at if rate_matrix is matrix or np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
         known = -1 if terms is None else put("numbers", terms)
         defect = put("numbers", self._defect(source, level)) if self.ints[a.JUDGED] else -1
         return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known, defect])

@@ -46,6 +46,8 @@ class Transition:
     @functools.cached_property
     def matrix(self) -> np.ndarray:
         """T = [[Psi_m^T Psi_l, Psi_m^T (R_l - R_m)], [0, 1]], where no place is set."""
+        if not self.source.excitation.channels:
+            return modal_projection(self.target.modal, self.source.modal)
         whole, (rows, _) = self._map(self.source.channels.shapes, self._shapes), self._set
         whole[: self._modes] -= self.target.modal.vectors.T @ self._shapes @ rows
         whole[self._modes :] += rows
@@ -54,12 +56,17 @@ class Transition:
     @functools.cached_property
     def velocity_matrix(self) -> np.ndarray:
         """T' = [[Psi_m^T Psi_l, Psi_m^T (Y_l - Y_m)], [0, 1]]."""
+        if not self.source.excitation.channels:
+            return self.matrix
         return self._map(self.source.channels.carried, self.target.channels.carried)
 
     @functools.cached_property
     def offset(self) -> np.ndarray:
         """c (r_m + q,)."""
-        jump, (_, constants) = self.source.asymptotic.configuration - self.target.asymptotic.configuration, self._set
+        jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
+        if not self.source.excitation.channels:
+            return np.asarray(self.target.modal.vectors.T @ jump)
+        _, constants = self._set
         return np.concatenate([self.target.modal.vectors.T @ (jump - self._shapes @ constants), constants])
 
     @property

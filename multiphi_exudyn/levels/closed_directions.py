@@ -39,8 +39,9 @@ class ClosedDirections:
         Nearly parallel ones would leave the difference of their small difference to round-off. Q keeps their unit.
         """
         rigid = self.rigid
-        if np.sum(rigid) < 2:
-            return self, np.eye(int(np.sum(rigid)))
+        count = int(np.count_nonzero(rigid))
+        if count < 2:
+            return self, np.eye(count)
         own = self.vectors[:, rigid]
         length = float(np.max(np.linalg.norm(own, axis=0))) or 1.0
         q, r = np.linalg.qr(own / length)

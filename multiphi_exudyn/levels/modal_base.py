@@ -269,6 +269,10 @@ class ModalBase(Shown):
         Springs of one direction have what their gaps say, and a rigid contact among them the rest.
         """
         forces = np.zeros(len(self.links))
+        if all(len(members) == 1 for members in closed_directions.members):
+            index = [i for (i,) in closed_directions.members]
+            forces[index] = self.direction_signs[index] * along
+            return forces
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:

@@ -196,14 +196,23 @@ class MultiPhiModel(Shown):
 
     def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
         """Positions of the links that hold where the elements are in these states: they name the modes."""
-        given = zip(self.contacts, self.link_places, states, strict=True)
-        return tuple(sorted(places[k] for contact, places, state in given for k in contact.states[state].holds))
+        return tuple(sorted(link for held, state in zip(self._holding, states, strict=True) for link in held[state]))
+
+    @functools.cached_property
+    def _holding(self) -> list[list[list[int]]]:
+        """Positions of the links that hold, of every element in each of its states."""
+        given = zip(self.contacts, self.link_places, strict=True)
+        return [[[places[k] for k in state.holds] for state in contact.states] for contact, places in given]
 
     def push(self, states: Sequence[int]) -> np.ndarray:
         """Load (m,) of the constant forces of elements in these states."""
-        given = zip(self.contacts, states, strict=True)
-        pushes = [contact.states[state].push for contact, state in given]
+        pushes = [pushed[state] for pushed, state in zip(self._pushes, states, strict=True)]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
+
+    @functools.cached_property
+    def _pushes(self) -> list[list[float]]:
+        """Constant forces [N] of every element in each of its states."""
+        return [[state.push for state in contact.states] for contact in self.contacts]
 
     @functools.cached_property
     def levels_possible(self) -> int:

@@ -34,7 +34,7 @@ def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | 
     """Closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
     omega, own = np.sqrt(np.maximum(squares, 0.0)), damping.diagonal()
     mixed = (damping + damping.T) / 2
-    if not (own < LIGHT * omega).all() or not (np.abs(damping - mixed) <= SYMMETRIC * own.max()).all():
+    if not (np.abs(own) < LIGHT * omega).all() or not (np.abs(damping - mixed) <= SYMMETRIC * own.max()).all():
         return None
     each = slice(None, None, len(omega) + 1)  # the diagonal of a flat matrix
     apart = (omega[:, None] - omega) * (omega[:, None] + omega)

@@ -32,6 +32,7 @@ are one equation of second order.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -69,10 +70,13 @@ CHAIN = 4  # ints of a chain
 
 def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
     """The modes (p, 2) of every exponential, first and one past the last of those where a map (p, r) is not 0."""
-    part = np.any([given != 0 for given in maps], axis=0)
-    r, index = part.shape[1], np.arange(part.shape[1])
-    first = np.min(np.where(part, index, r), axis=1, initial=r)
-    return np.column_stack([first, np.max(np.where(part, index + 1, 0), axis=1, initial=0)])
+    part = functools.reduce(np.logical_or, maps)
+    r, reached = part.shape[1], np.zeros((len(part), 2), int)
+    if r:
+        some = part.any(axis=1)
+        reached[:, 0] = np.where(some, part.argmax(axis=1), r)
+        reached[:, 1] = np.where(some, r - part[:, ::-1].argmax(axis=1), 0)
+    return reached
 
 
 @compiled
