@@ -25,7 +25,7 @@ def base_warnings(model: MultiPhiModel, **start: np.ndarray | None) -> Iterator[
     if base.complete:
         return
     if base.error > INEXACT:
-        yield f"base: omega^2 of levels may be off by {base.error:.2g}, need more modes, or modes='all'"
+        yield f"base: squares of frequencies of levels may be off by {base.error:.2g}; need more modes, or modes='all'"
     for name, given in start.items():
         if given is not None:
             yield from _told(model, _of_start(model, np.asarray(given, float)), f"the start's {name}")
