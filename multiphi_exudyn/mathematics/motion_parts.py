@@ -62,7 +62,9 @@ def parts_of(system: np.ndarray) -> Parts:
             return found
     if condition < WORST_CONDITION:
         return _single(system, *_refined(system, rates, vectors))
-    raise NumericalFailure("modes: the rates of a level's coupled modes are not told apart by more than round-off")
+    raise NumericalFailure(
+        "modes: two coupled modes of a level are critically damped alike, to round-off; change the damping a little"
+    )
 
 
 def _single(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> Parts:

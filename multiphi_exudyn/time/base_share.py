@@ -23,7 +23,7 @@ def base_warnings(model: MultiPhiModel, loads: np.ndarray, **start: np.ndarray |
     """Of rows (k, n) of loads, of x and x' (n,) of a start by their names, and of the levels."""
     base = model.base
     if base.error > INEXACT:
-        yield f"base: omega^2 of levels may be off by {base.error:.2g}, need more modes, or modes='all'"
+        yield f"base: squares of frequencies of levels may be off by {base.error:.2g}; need more modes, or modes='all'"
     for row in model.lacking(loads):
         yield from _told(model, model.outside(row), "the static flexibility at a load")
     for name, given in start.items():

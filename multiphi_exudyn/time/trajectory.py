@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.display import Shown, kinds
+from multiphi_exudyn.display import Shown, kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
@@ -155,6 +155,9 @@ class Trajectory(Histories):
         yield "status", f"{self.status}{f', {self.message}' if self.message else ''}"
         yield "time", f"{self.start.time:g} to {self.t_end:g} s"
         yield "events", str(len(self.events))
+        struck = {event.contact for event in self.events}
+        if idle := [name for name in self.contacts if name not in struck and not self.contact_intervals(name)]:
+            yield "never closed", names(idle)
         yield "levels built", str(self.stats.levels_built)
         yield "warnings", kinds(self.warnings)
 

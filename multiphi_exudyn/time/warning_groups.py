@@ -14,7 +14,7 @@ from multiphi_exudyn.errors import MultiPhiWarning
 
 __all__ = ["WarningGroup", "grouped", "issue", "kept_back"]
 
-NAMED = 5  # runs of a group that its sentence names
+NAMED = 3  # runs of a group that its sentence names
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class WarningGroup:
         listed = f"{names} and {more} more" if more > 0 else names
         if of == 1:
             return f"{self.kind}: {self.example}"
-        return f"{self.kind}: {len(self.runs)} of {of} runs ({listed}); {self.runs[0]}: {self.example}"
+        return f"{self.kind}: {len(self.runs)} of {of} runs ({listed}); the first: {self.example}"
 
 
 def grouped(runs: Iterable[tuple[str, Sequence[str]]]) -> tuple[WarningGroup, ...]:

@@ -317,14 +317,14 @@ def pushed(system, at, key, by):
 def test_whoever_changes_its_coordinates_on_the_way_is_found_out(refused, key, by, matched, loads):
     system = System(model_of(50.0), matchedStepSize=matched, loads=loads)
     pushed(system, 2.0, key, by)
-    refused(ValueError, "coordinates of 'body': got others at t = 2", system.solve)
+    refused(ValueError, "coordinates of 'body': got values at t = 2", system.solve)
 
 
 def test_so_is_he_where_others_shorten_steps(refused):
     """From the first of its events on every step is looked at."""
     system = System(model_of(50.0), beside_a_ball)
     pushed(system, 2.0, "ODE2Coords", 1e-4)
-    refused(ValueError, "coordinates of 'body': got others at t = 2", system.solve)
+    refused(ValueError, "coordinates of 'body': got values at t = 2", system.solve)
 
 
 def test_a_prestep_function_may_change_its_coordinates():

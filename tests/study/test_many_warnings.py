@@ -72,16 +72,14 @@ def text_of(page):
 def test_warnings_are_grouped_by_what_stands_before_the_first_colon():
     groups = grouped([("a", [SHARE, LINEAR]), ("b", []), ("c", [SHARE.replace("86", "7"), SHARE])])
     assert [(group.kind, group.runs) for group in groups] == [("static share", ("a", "c")), ("linear range", ("a",))]
-    assert groups[0].told(3) == f"static share: 2 of 3 runs (a, c); a: {SHARE.partition(': ')[2]}"
+    assert groups[0].told(3) == f"static share: 2 of 3 runs (a, c); the first: {SHARE.partition(': ')[2]}"
     assert groups[1].told(1) == LINEAR
     assert grouped([("a", ()), ("b", ())]) == ()
 
 
 def test_a_large_group_names_its_first_runs_only():
     (group,) = grouped([(f"r = {r}", [SHARE]) for r in range(8)])
-    assert group.told(20).startswith(
-        "static share: 8 of 20 runs (r = 0, r = 1, r = 2, r = 3, r = 4 and 3 more); r = 0: "
-    )
+    assert group.told(20).startswith("static share: 8 of 20 runs (r = 0, r = 1, r = 2 and 5 more); the first: ")
 
 
 def test_a_model_run_keeps_its_warnings_and_issues_none(warning_runs, scene_file):
@@ -155,7 +153,7 @@ def test_a_studys_page_names_the_rows_of_each_kind():
 def test_the_catalogue_prints_what_its_models_warn_of():
     outcomes = (Outcome("native", warnings=(SHARE,)), Outcome("full model"))
     told = text_table([CaseResult("clamp", "hard", outcomes)])
-    assert f"warning: static share: 1 of 2 runs (clamp, native); clamp, native: {SHARE[14:]}" in told
+    assert f"warning: static share: 1 of 2 runs (clamp, native); the first: {SHARE[14:]}" in told
 
 
 # ---------------------------------------------------------------------- bodies in Exudyn
@@ -249,6 +247,6 @@ def test_a_frequency_response_issues_a_warning_for_each_kind_not_for_each_freque
     with pytest.warns(mp.MultiPhiWarning) as issued:
         response = mp.frequency_response(driven(beyond(0.3)), LOAD, [0.05, 0.1, 0.3, 0.32])
     (sentence,) = response.warnings
-    assert re.match(r"linear range: 2 of 4 runs \(0.3 Hz, 0.32 Hz\); 0.3 Hz: 0\.\d+ m, the limit is 0.3 m", sentence)
+    assert re.match(r"linear range: 2 of 4 runs \(0.3 Hz, 0.32 Hz\); the first: 0\.\d+ m, the limit is 0.3 m", sentence)
     assert [str(each.message) for each in issued] == [sentence]
     assert response.states[0].warnings == ()

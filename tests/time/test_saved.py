@@ -132,6 +132,15 @@ def test_reprs_are_short(run, saved):
         assert "<caption" in thing._repr_html_()
 
 
+def test_a_contact_that_never_closed_is_shown():
+    ball = mp.LinearStructure([[1.0]], [[100.0]], points={"tip": 0})
+    in_mm = mp.MultiPhiModel(
+        ball, [mp.UnilateralContact("stop", "tip", 1.35), mp.UnilateralContact("rest", "tip", 0.0)]
+    )
+    shown = repr(mp.simulate(in_mm, 1.0, displacement=np.array([1e-3])))
+    assert "; never closed stop; " in shown
+
+
 def test_mode_shapes_are_drawn_scaled(run):
     level = run.model.level(())
     panels = level.plot_modes(4, rows=np.eye(run.model.structure.n)[::2]).axes

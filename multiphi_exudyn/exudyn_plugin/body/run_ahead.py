@@ -145,8 +145,8 @@ class RunAhead:
         apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
         if not apart.dot(apart) <= limit * limit:
             raise MultiPhiValueError(
-                f"coordinates of {self._body.name!r}: got others at t = {t:.9g} s than its motion has led to, need a "
-                "PreStep or PostStep function for what changes them, set before the run"
+                f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set, need "
+                "the PreStep or PostStep function that sets them there before the run"
             )
 
     def _steps_of(self, stepped: SteppedLevel) -> UndisturbedSteps:

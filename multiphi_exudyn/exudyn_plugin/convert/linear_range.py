@@ -107,14 +107,14 @@ class RangeCheck:
             return ()
         if self.error <= TOLERANCE:
             return (
-                f"linear range: forces of the Exudyn system that the model lacks are small ({100 * self.error:.2g} %), "
-                f"but change frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
+                f"linear range: what the model lacks of its Exudyn system is small ({100 * self.error:.2g} %), but "
+                f"shifts frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
             )
         found = self.times[np.argmax(self.errors > TOLERANCE)]
         away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
         return (
-            f"linear range: the motion has left it by t = {found:.3g} s: forces of the Exudyn system that the model "
-            f"lacks move it {away} of its largest displacement away; make the motion smaller, or solve the system",
+            f"linear range: left by t = {found:.3g} s; what the model lacks of its Exudyn system moves it {away} of "
+            "the largest displacement away; make the motion smaller, or solve the system",
         )
 
 
