@@ -29,7 +29,15 @@ def zoom_plot(label: str, x: dict[str, Any], lines: Sequence[dict[str, Any]], **
 
     more: log for values, shade (k, 2) along x, below: the value under which it is grey, detail: what a button shows.
     """
-    return {"label": label, "x": x, "lines": list(lines), "log": False, "shade": [], "below": None, "detail": None} | more
+    return {
+        "label": label,
+        "x": x,
+        "lines": list(lines),
+        "log": False,
+        "shade": [],
+        "below": None,
+        "detail": None,
+    } | more
 
 
 def zoom_line(

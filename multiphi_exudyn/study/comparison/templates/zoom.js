@@ -11,7 +11,9 @@
   }
 
   function ticks(low, high, count, log) {
-    if (log && high - low > 0.7) {
+    if (log && high - low <= 0.7)  // less than a factor of five: even steps of the values themselves
+      return ticks(10 ** low, 10 ** high, count, false).map(([value, text]) => [Math.log10(value), text]);
+    if (log) {
       const found = [], factors = high - low > 4 ? [1] : [1, 2, 5];
       for (let k = Math.floor(low); k <= high; k++)
         for (const factor of factors) found.push(k + Math.log10(factor));
@@ -21,7 +23,7 @@
     const step = unit * [1, 2, 5, 10].find((factor) => unit * factor >= raw);
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     for (let k = Math.ceil(low / step); k * step <= high; k++)
-      found.push([k * step, log ? String(Number((10 ** (k * step)).toPrecision(4))) : (k * step).toFixed(digits)]);
+      found.push([k * step, (k * step).toFixed(digits)]);
     return found;
   }
 
