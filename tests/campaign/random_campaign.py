@@ -3,7 +3,7 @@
     python tests/campaign/random_campaign.py --kinds all --count 20000 --processes 2
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
-(run_checks.py). All kinds (campaign_scenes) but "plain" (strategies.py) are judged by brute force
+(study/stability/run_laws.py). All kinds (campaign_scenes) but "plain" (strategies.py) are judged by brute force
 (campaign_judge.py), one in PLAIN_PYTHON of the plain ones by the loop as plain Python. With ``--kernels
 Prescott,Haswell`` the same cases run under each of these kernels of the linear algebra library, each in its own
 process, and their statuses, numbers of events and answers are compared.
@@ -35,10 +35,10 @@ import campaign_judge
 import numpy as np
 import threadpoolctl
 from campaign_scenes import KINDS, numbers, scene_of
-from run_checks import complaints
 from strategies import built, recipe_of
 
 from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
+from multiphi_exudyn.study.stability.run_laws import complaints
 from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
 

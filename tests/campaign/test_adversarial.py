@@ -13,12 +13,13 @@ import random_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_campaign import main, nudged, recipe_of, verdicts
-from run_checks import Signal, complaints, missed
 from strategies import CHOICES, Recipe, built, cases, recipes
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.mathematics import signal_bounds
 from multiphi_exudyn.mathematics.zero_crossing import NONE, first_descent
+from multiphi_exudyn.study.stability.run_laws import complaints, missed
+from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time import loop
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any

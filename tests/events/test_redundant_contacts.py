@@ -5,9 +5,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from run_checks import complaints
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn.study.stability.run_laws import complaints
 
 MASS, GAP, LOAD = 3.0, 0.1, 10.0  # kg, m, N downwards
 PLACES = np.linspace(0.0, 1.0, 5)  # of the stops along the bar

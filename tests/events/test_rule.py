@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from run_checks import complaints
 from small_structures import chain, oscillator, random_model, stop
 from strategies import built, recipe_of
 
@@ -24,6 +23,7 @@ from multiphi_exudyn import (
     planar_beam,
     simulate,
 )
+from multiphi_exudyn.study.stability.run_laws import complaints
 from multiphi_exudyn.time import chatter
 from reference_models.rig import rig_beam, rig_contact
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg
 from numpy.testing import assert_allclose
-from run_checks import complaints
 from small_structures import bed
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
@@ -15,6 +14,7 @@ from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.mathematics.modes import right_singular_vectors
 from multiphi_exudyn.mechanics.beam import Beam, planar_beam
 from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.study.stability.run_laws import complaints
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes
 SUBSPACES = 1e-9  # sine of the angle between them: what 1e-16 of the softest compliance is to the stiffest mode kept

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from run_checks import complaints
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.study.stability.run_laws import complaints
 
 PASSED = 1e-9  # of the largest displacement
 ANGLES = [10.0**-k for k in (3, 5, 7, 8, 9, 10, 11, 12, 14)]

@@ -17,9 +17,9 @@ from multiphi_exudyn.study.comparison.contact_totals import contact_totals
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
+from multiphi_exudyn.study.comparison.pages import embedded
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
-from multiphi_exudyn.study.comparison.zoom import embedded
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -136,12 +136,12 @@ def test_the_page_has_the_samples_of_its_histories_and_names_cannot_end_their_el
     page = render(comparison, (), ())
     text = re.search(r'<script type="application/json" id="zoom-data">(.*?)</script>', page, re.DOTALL)[1]
     data = json.loads(text)
-    assert [plot["label"] for plot in data["plots"]] == ["middle [mm]", "tip [mm]", "force of stop [N]"]
-    line = next(each for each in data["plots"][1]["lines"] if each["name"] == "compliant-r6")
+    assert [plot["label"] for plot in data] == ["middle [mm]", "tip [mm]", "force of stop [N]"]
+    line = next(each for each in data[1]["lines"] if each["name"] == "compliant-r6")
     values = np.frombuffer(base64.b64decode(line["data"]), dtype="<f4")
     assert values == pytest.approx(1e3 * comparison.runs["compliant-r6"].points["tip"], rel=1e-6)
-    assert data["start"] + data["step"] * (data["count"] - 1) == pytest.approx(comparison.bench.t_end)
-    assert data["plots"][2]["shade"] == [[0.03, 0.032], [0.034, 0.04]]
+    assert data[1]["x"]["start"] + data[1]["x"]["step"] * (len(values) - 1) == pytest.approx(comparison.bench.t_end)
+    assert data[2]["shade"] == [[0.03, 0.032], [0.034, 0.04]]
     assert "<" not in embedded({"name": "</script>"})
     assert json.loads(embedded({"name": "</script>"})) == {"name": "</script>"}
 

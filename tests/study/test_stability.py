@@ -86,15 +86,13 @@ class TestTheJudgeSees:
     def test_an_energy_that_nobody_gave(self, honest):
         problem, trajectory = honest
         start = dataclasses.replace(trajectory.start, velocity=trajectory.start.velocity + 1e-4)
-        text = complaints(problem, dataclasses.replace(trajectory, start=start))
-        assert "ledger residual" in text
-        assert "energy off" in text
+        assert "ledger: residual" in complaints(problem, dataclasses.replace(trajectory, start=start))
 
     def test_a_loss_that_is_not_in_the_ledger(self):
         problem = Problem(chain(4), [stop("m2", 0.2)], 20.0, displacement=np.linspace(0.5, 2.0, 4))
         trajectory = simulate(problem.model(), 20.0, problem.displacement)
         free = [dataclasses.replace(e, loss=dataclasses.replace(e.loss, impact=0.0)) for e in trajectory.events]
-        assert "ledger residual" in complaints(problem, dataclasses.replace(trajectory, events=tuple(free)))
+        assert "ledger: residual" in complaints(problem, dataclasses.replace(trajectory, events=tuple(free)))
 
     def test_a_force_that_is_not_the_law(self):
         problem = Problem(chain(4), [stop("m2", 0.2, 40.0)], 20.0, displacement=np.linspace(0.5, 2.0, 4))
@@ -203,7 +201,7 @@ class TestTheJudgeKnowsLaws:
         problem, trajectory = self.run("law-leaves-unstable-rest")
         assert trajectory.ledger.initial < 0
         start = dataclasses.replace(trajectory.start, velocity=trajectory.start.velocity + 1e-4)
-        assert "ledger residual" in complaints(problem, dataclasses.replace(trajectory, start=start))
+        assert "ledger: residual" in complaints(problem, dataclasses.replace(trajectory, start=start))
 
 
 def _with_forces(loaded, factor):

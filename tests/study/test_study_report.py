@@ -1,5 +1,7 @@
 """The study's page and pictures: complete, self-contained, and honest about gaps and what is not known."""
 
+import base64
+import json
 import re
 from dataclasses import replace
 
@@ -172,7 +174,22 @@ def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
     sources = re.findall(r'src="([^"]*)"', page)
     assert len(sources) == 4  # error over time, convergence, indicator, maps
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
-    assert not re.search(r"href=|url\(|<script|http", page)
+    assert not re.search(r"href=\"|url\(|<script src|http", page)
+
+
+def test_the_plot_that_zooms_has_every_setting_and_the_front_of_its_method(page, result):
+    (plot,) = json.loads(re.search(r'id="zoom-data">(.*?)</script>', page, re.DOTALL)[1])
+    every, front = (line for line in plot["lines"] if line["name"] == "Multi-Phi")
+    own = [setting for setting in settings(result) if setting.method == "Multi-Phi"]
+    assert numbers(every["data"]) == pytest.approx([100 * setting.error for setting in own], rel=1e-6)
+    assert numbers(every["x"]) == pytest.approx([1e3 * setting.online_s for setting in own], rel=1e-6)
+    assert every["notes"][0] == "r = 3"
+    assert list(numbers(front["data"])) == sorted(numbers(front["data"]), reverse=True)
+    assert plot["below"] == pytest.approx(0.1)
+
+
+def numbers(text):
+    return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
 def test_the_page_says_the_first_lines(page, result):

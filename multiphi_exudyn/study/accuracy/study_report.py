@@ -36,6 +36,7 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     most_accurate,
     shown_points,
 )
+from multiphi_exudyn.study.accuracy.study_zoom import error_against_time
 from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.plots import data_uri
 from multiphi_exudyn.study.comparison.wording import percent
@@ -72,12 +73,14 @@ def render_study(result: StudyResult) -> str:
     """The page as HTML."""
     environment = environment_of(__package__ or "")
     environment.filters |= {"words": words, "cell": cell_words}
+    shown = [_point(result, at) for at in shown_points(result)]
     failed = [row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"]
     return environment.get_template(TEMPLATE).render(
         result=result,
         study=result.study,
         findings=findings(result),
-        shown=[_point(result, at) for at in shown_points(result)],
+        shown=shown,
+        zoom=[error_against_time(result, point.at, k) for k, point in enumerate(shown) if point.pareto],
         count=len(points(result)),
         choices=choices,
         kinds=[False, True] if any(method.refine for method in result.study.methods) else [False],

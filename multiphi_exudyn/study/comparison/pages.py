@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, share, times
 
-__all__ = ["environment_of", "sentences"]
+__all__ = ["embedded", "environment_of", "sentences"]
 
-FILTERS = (engineering, listed, percent, seconds, sentence, share, times)
+SHARED = "multiphi_exudyn.study.comparison"  # its templates are those of every page
+
+
+def embedded(data: Any) -> Markup:
+    """As JSON inside a script element, which no text in it can end."""
+    return Markup(json.dumps(data).replace("<", "\\u003c"))
+
+
+FILTERS = (embedded, engineering, listed, percent, seconds, sentence, share, times)
 
 
 def environment_of(package: str) -> Environment:
     """The templates of a package; those of HTML escape what is filled in."""
     environment = Environment(
-        loader=PackageLoader(package),
+        loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, SHARED))]),
         autoescape=lambda name: ".html" in (name or ""),
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -14,14 +14,14 @@ from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.comparison.pages import environment_of
-from multiphi_exudyn.study.comparison.zoom import embedded, zoom_data
+from multiphi_exudyn.study.comparison.zoom import histories_to_zoom
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from reference_models.rig import rig
 
 __all__ = ["render"]
 
-TEMPLATE, SCRIPT = "report.html.j2", "zoom.js"
+TEMPLATE = "report.html.j2"
 ON_THE_PAGE = (
     "nrmse",
     "stiff_nrmse",
@@ -56,7 +56,6 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
     """The page as HTML."""
     environment, end = environment_of(__package__ or ""), ROUND_OFF * comparison.bench.t_end
     environment.filters["until"] = lambda given: "whole run" if given >= end else f"{given:.3f} s"
-    zoom = zoom_data(comparison)
     return environment.get_template(TEMPLATE).render(
         comparison=comparison,
         bench=comparison.bench,
@@ -68,9 +67,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequenc
         definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
         pictures=list(_pictures(comparison, levels)),
         totals=_totals(comparison),
-        zoom=zoom,
-        zoom_json=embedded(zoom),
-        zoom_script=environment.get_template(SCRIPT).render(),
+        zoom=histories_to_zoom(comparison),
         contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
     )
 

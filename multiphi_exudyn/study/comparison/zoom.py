@@ -1,10 +1,9 @@
-"""Histories that zoom in the browser: what templates/zoom.js draws, with its samples, for a page without a network."""
+"""Plots that zoom in the browser: what templates/zoom.js draws, with its numbers, for a page without a network."""
 
 from __future__ import annotations
 
 import base64
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,47 +14,60 @@ from multiphi_exudyn.study.comparison.plots import first_contact_span, pictured,
 from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
-__all__ = ["embedded", "zoom_data"]
+__all__ = ["histories_to_zoom", "zoom_line", "zoom_plot"]
 
 DASHES = {"-": [], ":": [2, 3], "--": [6, 4]}  # pixels
 
 
-def zoom_data(comparison: Comparison) -> dict[str, Any]:
+def histories_to_zoom(comparison: Comparison) -> list[dict[str, Any]]:
     """Displacements of all points, forces of a few contacts: of the reference and of the models drawn over it."""
-    time = comparison.bench.time
+    return list(_plots(comparison)) if comparison.reference.ok else []
+
+
+def zoom_plot(label: str, x: dict[str, Any], lines: Sequence[dict[str, Any]], **more: Any) -> dict[str, Any]:
+    """A plot. x: label, group of plots that share it, log, and start and step of an even grid if the lines have none.
+
+    more: log for values, shade (k, 2) along x, below: the value under which it is grey, detail: what a button shows.
+    """
     return {
-        "start": float(time[0]),
-        "step": float(time[1] - time[0]),
-        "count": len(time),
-        "detail": list(first_contact_span(comparison)),
-        "plots": list(_plots(comparison)) if comparison.reference.ok else [],
-    }
+        "label": label,
+        "x": x,
+        "lines": list(lines),
+        "log": False,
+        "shade": [],
+        "below": None,
+        "detail": None,
+    } | more
 
 
-def embedded(data: Mapping[str, Any]) -> str:
-    """As JSON inside a script element, which no text in it can end."""
-    return json.dumps(data).replace("<", "\\u003c")
+def zoom_line(
+    name: str, colour: str, values: Sequence[float] | np.ndarray, x: Sequence[float] | None = None, **more: Any
+) -> dict[str, Any]:
+    """A line, on an x of its own or on the plot's grid.
+
+    more: width (0: none), dash, mark [pixels], faint, and notes: what each point is, told where the mouse is.
+    """
+    given = {"name": name, "colour": colour, "data": _encoded(values), "x": None if x is None else _encoded(x)}
+    return given | {"width": 0, "dash": [], "mark": 0, "faint": False, "notes": None} | more
+
+
+def _encoded(values: Sequence[float] | np.ndarray) -> str:
+    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def _plots(comparison: Comparison) -> Iterator[dict[str, Any]]:
-    runs = [comparison.reference, *pictured(comparison)]
-    shade = union(comparison.reference.contact_intervals.values()).tolist()
+    runs, time = [comparison.reference, *pictured(comparison)], comparison.bench.time
+    x = {"label": "time [s]", "group": "time", "log": False, "start": time[0], "step": time[1] - time[0]}
+    shade, detail = union(comparison.reference.contact_intervals.values()).tolist(), first_contact_span(comparison)
     for point in comparison.bench.points:
         lines = [_line(comparison, run, 1e3 * run.points[point]) for run in runs]
-        yield {"label": f"{point} [mm]", "shade": shade, "lines": lines}
+        yield zoom_plot(f"{point} [mm]", x, lines, shade=shade, detail=list(detail))
     contacts = comparison.reference.contact_intervals
     for contact in contacts if len(contacts) <= LISTED else ():
         lines = [_line(comparison, run, run.contact_force[contact]) for run in runs]
-        yield {"label": f"force of {contact} [N]", "shade": contacts[contact].tolist(), "lines": lines}
+        yield zoom_plot(f"force of {contact} [N]", x, lines, shade=contacts[contact].tolist(), detail=list(detail))
 
 
 def _line(comparison: Comparison, run: ModelRun, values: np.ndarray) -> dict[str, Any]:
     style = styles(comparison)[run.name]
-    data = base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
-    return {
-        "name": run.name,
-        "colour": style.colour,
-        "width": style.width,
-        "dash": DASHES.get(str(style.line), []),
-        "data": data,
-    }
+    return zoom_line(run.name, style.colour, values, width=style.width, dash=DASHES.get(str(style.line), []))

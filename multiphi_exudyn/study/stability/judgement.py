@@ -1,7 +1,8 @@
 """Judgement of a native trajectory: energy, contact law, events; and when it is wrong.
 
+    laws        what must hold of every run, along its analytic segments (run_laws.py): ledger, energy, missed contacts
     residual    |initial + work - losses - final| / E     E the largest energy of the run
-    energy      undamped, unforced: max |energy(t) + losses until t - initial| / E; else the residual
+    energy      by how much energy less the work of constant loads rises, over E; under other loads the residual
     beyond      how far a contact is from its law [m]:
                 open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
                 with a as in brute_force.py; a force law: |force on the structure + F(q)| / max |F'|
@@ -21,6 +22,7 @@ import numpy as np
 
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.study.stability import run_laws
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
     SegmentTable,
@@ -34,14 +36,13 @@ from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.study.stability.friction_judgement import judge_friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["BEYOND", "RESIDUAL", "Judgement", "judge"]
+__all__ = ["BEYOND", "Judgement", "judge"]
 
-RESIDUAL = 1e-9  # of the largest energy: what a ledger may leave over
 BEYOND = 1e-9  # m beyond the contact law
 FRICTION = 1e-9  # of its limit: what a friction force may be off
 PULLING = 1e-9  # of the largest reaction: round-off of a release
 REPORTED = 0.5  # of a depth that sampling finds: less must not be reported; both are sampled, on different grids
-LOOKS = 1000  # segments at whose ends the energy is looked at
+SMALL = 1e-6  # of a newton metre and of a metre: cases may be as small
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,10 @@ class Judgement:
 
     truncated: whether a level has fewer modes than the structure has motions. unexcused: the part of ``beyond`` that no
     phase excuses. open_depth: deepest negative gap of an open contact. reported: the same, as the trajectory tells it.
-    covered, samples: of the brute force.
+    laws: complaints. covered, samples: of the brute force.
     """
 
+    laws: tuple[str, ...]
     energy: float
     residual: float
     events: int
@@ -71,15 +73,13 @@ class Judgement:
         """What makes the answer wrong, one sentence each."""
         law = self.unexcused if self.truncated else self.beyond
         found = [
-            (not self.residual <= RESIDUAL, f"ledger residual {self.residual:.1e} of the largest energy"),
-            (not self.energy <= RESIDUAL, f"energy off by {self.energy:.1e}"),
             (not law <= BEYOND * metre, f"{law / metre:.1e} m beyond the contact law"),
             (not self.pulling <= PULLING, f"a contact pulls with {self.pulling:.1e} of its largest reaction"),
             (not self.friction <= FRICTION, f"friction off its law by {self.friction:.1e} of its limit"),
             (self.missed > 0, f"{self.missed} closings or openings without an event"),
             (self._hidden(metre), f"open {self.open_depth / metre:.1e} m deep, {self.reported / metre:.1e} m reported"),
         ]
-        return [sentence for is_so, sentence in found if is_so]
+        return [*self.laws, *(sentence for is_so, sentence in found if is_so)]
 
     def _hidden(self, metre: float) -> bool:
         """Whether an open contact of a truncated model lies deeper than the trajectory tells."""
@@ -94,10 +94,13 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
     rubbed = [judge_friction(trajectory, friction, table, look.times) for friction in problem.frictions]
     laws = [*(found.way for found in rubbed)] + [_beyond_law(law, trajectory, look.times) for law in problem.laws]
-    largest, drift = _energies(trajectory, table)
+    small, ends = SMALL * problem.metre, run_laws.ends_of(trajectory)
+    largest = run_laws.largest_energy(trajectory, ends, small)
     residual = _share(trajectory.ledger.residual, largest)
+    rise = residual if problem.driven else _share(run_laws.energy_rise(trajectory, ends), largest)
     return Judgement(
-        energy=drift if problem.conservative else residual,
+        laws=tuple(run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven)),
+        energy=rise,
         residual=residual,
         events=len(trajectory.events),
         missed=sum(found.missed for found in rubbed)
@@ -147,31 +150,3 @@ def _pulling(contacts: Sequence[UnilateralContact], seen: Sequence[ContactSample
         if (contact.rigid or contact.damping > 0) and np.any(found.closed):
             worst = max(worst, _share(min(0.0, float(np.min(found.force))), float(np.max(np.abs(found.force)))))
     return worst
-
-
-def _largest_kinetic(trajectory: Trajectory, times: np.ndarray) -> float:
-    """The size of the energy where strain may be negative: kinetic energy [J] of a motion that swaps much of it."""
-    v = trajectory.velocity(times)
-    return float(np.max(np.sum(v * (trajectory.model.structure.mass @ v), axis=0))) / 2
-
-
-def _energies(trajectory: Trajectory, table: SegmentTable) -> tuple[float, float]:
-    """The largest energy, and the largest deviation of energy and losses from the initial one as a share of it."""
-    ledger = trajectory.ledger
-    chosen = np.unique(np.linspace(0, len(table.start) - 1, LOOKS).astype(int))
-    times = np.concatenate([table.start[chosen], table.end[chosen][table.end[chosen] > table.start[chosen]]])
-    sides = ["right"] * len(chosen) + ["left"] * (len(times) - len(chosen))
-    right = np.array(sides) == "right"
-    energy = np.empty(len(times))
-    for side, part in (("right", right), ("left", ~right)):
-        if np.any(part):
-            energy[part] = trajectory.energy(times[part], side=side)
-    at = np.array([event.time for event in trajectory.events])
-    lost = np.cumsum([0.0, *(event.energy_loss for event in trajectory.events)]) + trajectory.start_loss.total
-    before = lost[np.searchsorted(at, times, side="left")]
-    after = lost[np.searchsorted(at, times, side="right")]
-    largest = max(float(np.max(np.abs(energy))), abs(ledger.initial), abs(ledger.work_of_loads))
-    if trajectory.model.force_laws:
-        largest = max(largest, _largest_kinetic(trajectory, times))
-    drift = np.abs(energy + np.where(right, after, before) - ledger.initial)
-    return largest, _share(float(np.max(drift)), largest)

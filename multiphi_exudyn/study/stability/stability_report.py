@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from multiphi_exudyn.study.comparison.pages import environment_of
-from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement
+from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement, run_laws
 from multiphi_exudyn.study.stability.outcome import CaseResult
 from multiphi_exudyn.study.stability.summary import failures, headline, summaries, warned
 from multiphi_exudyn.study.stability.text_table import figure
@@ -29,6 +29,7 @@ def render_stability(results: Sequence[CaseResult], environment: dict[str, Any],
         quick=quick,
         environment=environment,
         limits=judgement,
+        laws=run_laws,
         brute=brute_force,
         exudyn=exudyn_runs,
     )

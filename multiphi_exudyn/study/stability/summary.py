@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from multiphi_exudyn.study.stability.judgement import BEYOND, RESIDUAL
+from multiphi_exudyn.study.stability.judgement import BEYOND
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
+from multiphi_exudyn.study.stability.run_laws import CLOSES
 from multiphi_exudyn.time.warning_groups import grouped
 
 __all__ = ["ModelSummary", "contents", "failures", "headline", "summaries", "warned"]
@@ -98,7 +99,7 @@ def contents(results: Sequence[CaseResult], environment: dict[str, Any], quick: 
     return {
         "environment": environment,
         "quick": quick,
-        "limits": {"residual": RESIDUAL, "beyond_m": BEYOND},
+        "limits": {"residual": CLOSES, "beyond_m": BEYOND},
         "models": [asdict(summary) for summary in summaries(results)],
         "cases": {
             result.name: {
