@@ -169,8 +169,8 @@ def _square(level: LoadedLevel, eta: np.ndarray) -> float:
     if "place" not in level.entries:
         level.entries["place"] = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
     rows: np.ndarray = level.entries["place"]
-    y = eta @ rows[:, :-1].T + rows[:, -1]
-    return float(np.vdot(y, y))
+    y = (eta @ rows[:, :-1].T + rows[:, -1]).ravel()
+    return float(y @ y)
 
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:
