@@ -18,8 +18,8 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -30,8 +30,6 @@ from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
-
-Sample: TypeAlias = tuple[LoadedLevel, np.ndarray, np.ndarray]
 
 SAMPLES = 100  # of the motion, for its mean square
 FRACTIONS = np.linspace(0.0, 1.0, SAMPLES)
@@ -102,7 +100,7 @@ class Samples:
     @property
     def amplitude(self) -> float:
         """Root of the mean of |y|^2 [m sqrt(kg)]."""
-        return math.sqrt(self._sum(self._all) / SAMPLES)
+        return math.sqrt(self._sum(*self._all) / SAMPLES)
 
     def amplitude_exceeds(self, limit: float, first: float = 0.0) -> bool:
         """Whether the amplitude is larger, which a few samples may tell already: none of |y|^2 is negative.
@@ -114,18 +112,21 @@ class Samples:
             return True
         few = self._times[::FEWER]
         likely = "_all" not in vars(self) and not 0 < len(few) * first**2 <= least
-        if likely and self._sum(self._states(few)) > least:
+        if likely and self._sum(*self._states(few)) > least:
             return True
         return self.amplitude > limit
 
     @property
     def largest_energy(self) -> float:
         """The largest kinetic + strain energy [J], without its sign."""
-        energies = (level.kinetic(eta_t) + level.strain(eta) for level, eta, eta_t in self._all)
-        return max(float(np.max(np.abs(energy), initial=0.0)) for energy in energies)
+        largest = 0.0
+        for level, own in self._by_level(self._all[0]):
+            eta, eta_t = self._all[1][:, own, : level.width]
+            largest = max(largest, float(np.max(np.abs(level.kinetic(eta_t.T) + level.strain(eta.T)))))
+        return largest
 
     @functools.cached_property
-    def _all(self) -> list[Sample]:
+    def _all(self) -> tuple[np.ndarray, np.ndarray]:
         return self._states(self._times)
 
     @functools.cached_property
@@ -133,14 +134,20 @@ class Samples:
         first = self._segments.starts[0]
         return np.asarray(first + (self._end - first) * FRACTIONS)
 
-    def _states(self, times: np.ndarray) -> list[Sample]:
+    def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers (k,) of the levels at times (k,), and the states there (2, k, n)."""
         owners = self._segments.owners(times)
-        return _by_level(self._segments, owners, self._segments.states(owners, times - self._segments.starts[owners]))
+        states = self._segments.states(owners, times - self._segments.starts[owners])
+        return self._segments.numbers[owners], states
 
-    @staticmethod
-    def _sum(samples: list[Sample]) -> float:
+    def _by_level(self, numbers: np.ndarray) -> Iterator[tuple[LoadedLevel, np.ndarray]]:
+        """The levels among numbers (k,), and which of these are theirs (k,)."""
+        for number in dict.fromkeys(numbers.tolist()):
+            yield self._segments.levels[number], numbers == number
+
+    def _sum(self, numbers: np.ndarray, states: np.ndarray) -> float:
         """Of |y|^2."""
-        return sum(_square(level, eta) for level, eta, _ in samples)
+        return sum(_square(level, states[0, own, : level.width]) for level, own in self._by_level(numbers))
 
 
 def indicator(lost: float, samples: Samples) -> float:
@@ -158,21 +165,12 @@ def total_defect(trajectory: Trajectory) -> float:
 
 
 def _square(level: LoadedLevel, eta: np.ndarray) -> float:
-    """Sum of |y|^2 over the columns of eta (r, k), by a factor that the level keeps."""
+    """Sum of |y|^2 over the rows of eta (k, r), by a factor that the level keeps."""
     if "place" not in level.entries:
         level.entries["place"] = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
     rows: np.ndarray = level.entries["place"]
-    return float(np.sum((rows[:, :-1] @ eta + rows[:, -1:]) ** 2))
-
-
-def _by_level(segments: Segments, owners: np.ndarray, states: np.ndarray) -> list[Sample]:
-    """States (2, k, n) of the segments ``owners`` (k,), level by level."""
-    numbers, samples = segments.numbers[owners], list[Sample]()
-    for number in dict.fromkeys(numbers.tolist()):
-        level = segments.levels[number]
-        eta, eta_t = states[:, numbers == number, : level.level.modes]
-        samples.append((level, eta.T, eta_t.T))
-    return samples
+    y = (eta @ rows[:, :-1].T + rows[:, -1]).ravel()
+    return float(y @ y)
 
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:

@@ -27,6 +27,8 @@ from multiphi_exudyn.events.arrays import (
     FLOW_FORCED,
     FLOW_FREE,
     FLOW_WAVES,
+    FREQUENCIES,
+    HORIZON,
     LEVEL,
     MODES,
     NEED,
@@ -39,6 +41,7 @@ from multiphi_exudyn.events.arrays import (
     RUBBINGS,
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
+    SPEED,
     SWINGS,
     WORK_WAVES,
 )
@@ -49,7 +52,8 @@ from multiphi_exudyn.time.sampling import resume
 
 __all__ = ["integrate_works", "work_waves"]
 
-WIDEST = 1024.0  # times a segment's horizon: three digits of what the channels do in it for a tenth of the terms
+WIDEST = 1024.0  # times a segment's horizon, for a tenth of the terms
+INFLATED = 100.0  # times the largest energy of the motion, that of a free response: so much their difference loses
 UPWARDS_ABOVE = 0.5  # |s t| - d from which I_d follows from I_d-1: below, that loses d! / |s t|^d
 SERIES_ROUND_OFF = 1e-18  # of the first term of a power series: terms below it are left out
 
@@ -73,11 +77,17 @@ def integrate_works(
     works: Numbers,
 ) -> int:
     """Work (segments, 3) [J] of damping, what varies and friction; OK or NEED. scratch: ``work_waves`` of them."""
+    largest = 0.0
     for i in range(segments):
         level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
         if level == 0:
             continue
-        if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, WIDEST) == NEED:
+        status = resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, WIDEST)
+        if status != NEED and ints[PRESCRIBED] > 0 and numbers[HORIZON] > spans[given + 3]:
+            largest = max(largest, swinging(ints, numbers))
+            if swinging_alone(ints, waves) > INFLATED * largest:
+                status = resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0)
+        if status == NEED:
             return NEED
         q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
@@ -112,6 +122,30 @@ def integrate_works(
                 other += further
             place += length
     return OK
+
+
+@compiled
+def swinging(ints: Ints, numbers: Numbers) -> float:
+    """|eta'|^2 + |omega eta|^2 at the start of the flow."""
+    level, total = ints[AFTER + LEVEL], 0.0
+    for i in range(ints[level + MODES]):
+        speed = numbers[ints[AFTER + SPEED] + i]
+        swing = numbers[ints[level + FREQUENCIES] + i] * numbers[ints[AFTER + PLACE] + i]
+        total += speed * speed + swing * swing
+    return total
+
+
+@compiled
+def swinging_alone(ints: Ints, waves: Waves) -> float:
+    """The same of the free response alone: the sum of |V c lambda|^2."""
+    level, rates, total = ints[AFTER + LEVEL], ints[ints[FLOW_BASIS] + RATES], 0.0
+    r = ints[level + MODES]
+    for j in range(ints[FLOW_FREE]):
+        rate, shape = waves[ints[FLOW_WAVES] + j] * waves[rates + j], ints[ints[level + RESPONSE] + SHAPES] + j * r
+        for i in range(r):
+            speed = rate * waves[shape + i]
+            total += speed.real * speed.real + speed.imag * speed.imag
+    return total
 
 
 @compiled

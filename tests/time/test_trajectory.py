@@ -1,5 +1,6 @@
 """A trajectory answers at any time, on either side of an event, with what the full matrices would give."""
 
+import dataclasses
 import math
 from itertools import pairwise
 
@@ -10,6 +11,9 @@ from scipy.integrate import quad
 from small_structures import chain, oscillator, random_model, stop
 
 from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
+from multiphi_exudyn.events.state import total_impulse
+from multiphi_exudyn.time.record import Record
+from multiphi_exudyn.time.segment import Listed
 
 SOFT = 40.0
 LOAD = -0.7
@@ -159,6 +163,15 @@ class TestContacts:
         )
         struck = sum(e.impulse for e in run.events if e.contact == contact and t0 <= e.time <= t1)
         assert_allclose(run.contact_impulse(contact, t0, t1), pushed + struck, rtol=1e-9, atol=1e-10)
+
+    @pytest.mark.parametrize("contact", ["stop", "soft"])
+    def test_impulse_of_a_run_is_that_of_its_segments_and_makes_none_of_them(self, run, contact, monkeypatch):
+        row, segments = run._row("contact_impulse", contact), tuple(run.segments)
+        expected = Listed(segments).integral(row, 1.3, 14.4) + total_impulse(tuple(run.events), contact, 1.3, 14.4)
+        monkeypatch.setattr(Record, "segment", None)
+        monkeypatch.setattr(Record, "event", None)
+        again = dataclasses.replace(run, segments=run.segments._record.segments())
+        assert_allclose(again.contact_impulse(contact, 1.3, 14.4), expected, rtol=1e-13)
 
     def test_impulses_balance_the_momentum_of_a_free_chain(self):
         """d(sum m v) = contact impulses + weight t, whatever the impacts in between."""

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, oscillator
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events import arrays
 from multiphi_exudyn.time import record
 from multiphi_exudyn.time.segment import Listed, listed
 
@@ -57,6 +58,23 @@ def test_works_are_those_of_each_segment(loads, elements, damping):
 @pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
 def test_works_of_moving_stops_are_those_of_each_segment(elements, damping):
     assert_works_of_segments(run_of(damping, elements, [MOTION, *LOADS["harmonic"]], start=None))
+
+
+def test_works_of_samples_take_no_more_terms_than_a_straight_line_has():
+    """Two, and those of the free response: not the series in powers of time by which the loop goes."""
+    run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["samples"], t_end=3.97)
+    series = run.segments.arrays.ints[arrays.FLOW_COUNT]
+    assert_works_of_segments(run)
+    listed(run.segments)._record.works()
+    assert run.segments.arrays.ints[arrays.FLOW_COUNT] == 3 + 2 < series
+
+
+@pytest.mark.parametrize("step", [0.1, 1e-2, 1e-3])
+def test_works_of_noise_are_those_of_each_segment(step):
+    """Of samples that follow each other faster than modes can, the few terms would be large."""
+    force = np.random.default_rng(1).normal(size=201)
+    noise = mp.SampledLoad("m1", step * np.arange(201), force)
+    assert_works_of_segments(run_of(DAMPINGS["coupled"], COMPLIANT, [noise], t_end=200 * step))
 
 
 @pytest.mark.parametrize("t_end", [20.0, 400.0])
