@@ -68,6 +68,9 @@ class ChannelArrays:
 
     def at(self, buffers: Buffers, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Set the channels to a time [s]: w, w' (q,) there of those that are functions of time."""
+        if not self._excitation.prescribed:
+            self.set(buffers, 0, time - float(self._pieces.starts[0]), time)
+            return np.zeros(0), np.zeros(0)
         piece = max(int(np.searchsorted(self._pieces.starts, time, side="right")) - 1, 0)
         self.set(buffers, piece, time - float(self._pieces.starts[piece]), time)
         q, place = int(buffers.ints[a.PRESCRIBED]), int(buffers.ints[a.DRIVE])

@@ -44,7 +44,7 @@ class State(Shown):
         """The number of every element's state."""
         return self.level.states
 
-    @property
+    @functools.cached_property
     def held(self) -> np.ndarray:
         """The places (h,) that links hold [m]."""
         return self.displacement[self.level.modal.modes + self.level.excitation.prescribed :]

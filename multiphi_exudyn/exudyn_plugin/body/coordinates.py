@@ -135,7 +135,7 @@ class Coordinates:
 
     def enter_with(self, mbs: Any, stepped: SteppedLevel, held: np.ndarray, force: np.ndarray) -> None:
         """``enter`` a level with places that links hold (h,), where either is another than now."""
-        if stepped.states != self.stepped.states or not np.array_equal(held, self.held):
+        if stepped.states != self.stepped.states or np.any(held != self.held):
             self.held = held
             self.enter(mbs, stepped, force)
 

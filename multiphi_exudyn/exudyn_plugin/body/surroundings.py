@@ -71,6 +71,8 @@ class Surroundings:
 
     def told(self, force: np.ndarray, given: SteppedLevel, states: tuple[int, ...]) -> np.ndarray:
         """(p, f) of one level in another, with the forces that follow from those of other elements."""
+        if states == given.states:
+            return force
         here, wanted = self.body.coordinates, self.body.stepped_level(states)
         carried = here.carried(force, given, wanted)
         if self.reactions is None or here.interface is None:

@@ -118,10 +118,10 @@ class Switching(dict[str, SwitchingBody]):
         self.clock.time, self.clock.next_time = t, -math.inf
         for body in self.values():
             body.after_step(mbs, t)
-        if self.disturbed:
-            self.disturbed = False
+        if self.disturbed and len(self) > 1:  # whose event it was has looked
             for body in self.values():
                 body.look_again()
+        self.disturbed = False
         if t >= self.end:
             self.end = math.inf
             self._warn()

@@ -49,7 +49,8 @@ class ExactMotion:
         self._forces = motion.levels.held = motion.levels.held or _forces_in(motion.levels)
         self._arrays = motion.arrays = self._forces.arrays
         self._record = Record(motion.model.contacts, self._arrays)
-        self._ring = np.zeros(2 * (window(motion.model) + 1))
+        self._window, self._allowed = window(motion.model), allowed(motion.model)
+        self._ring = np.zeros(2 * (self._window + 1))
         self._decisions, self._last_decision = 0, math.nan
 
     def begin(self, time: float) -> None:
@@ -88,11 +89,11 @@ class ExactMotion:
 
     def _put_ring(self) -> None:
         """The ring of the chatter check into the arrays, which other bodies use too."""
-        arrays, model, count = self._arrays, self._motion.model, len(self._ring)
+        arrays, count = self._arrays, len(self._ring)
         start = arrays.ring(count)
         arrays.numbers[start : start + count] = self._ring
-        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = window(model), self._decisions
-        arrays.numbers[a.ALLOWED], arrays.numbers[a.LAST_DECISION] = allowed(model), self._last_decision
+        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = self._window, self._decisions
+        arrays.numbers[a.ALLOWED], arrays.numbers[a.LAST_DECISION] = self._allowed, self._last_decision
 
     def _take_ring(self) -> None:
         """The same from the arrays."""
@@ -106,9 +107,11 @@ class ExactMotion:
         """A state at a time [s] into the arrays."""
         arrays, centre = self._arrays, self._forces.centre(level)
         r, arrays.numbers[a.TIME] = len(centre), time
-        (eta, held), (eta_t, still) = (np.split(xi, [r]) for xi in (state.displacement, state.velocity))
+        place, speed = state.displacement.copy(), state.velocity
+        place[:r] -= centre
         w, w_t = arrays.channels.at(arrays.buffers, time)
-        place, speed = np.concatenate([eta - centre, w, held]), np.concatenate([eta_t, w_t, still])
+        if len(w):
+            place, speed = (np.concatenate([x[:r], at, x[r:]]) for x, at in ((place, w), (speed, w_t)))
         arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
 
     def _run(self, until: float, trial: bool) -> tuple[bool, tuple[Event, ...]]:
@@ -141,9 +144,10 @@ class ExactMotion:
         record = int(ints[place + a.LEVEL])
         level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].states)
         r, phases = level.modal.modes, ints[ints[place + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-        given = slice(r, r + int(ints[a.PRESCRIBED]))
-        n = r + int(ints[a.CHANNELS])
-        xi, xi_t = (np.delete(numbers[ints[place + part] :][:n], given) for part in (a.PLACE, a.SPEED))
+        n, q = r + int(ints[a.CHANNELS]), int(ints[a.PRESCRIBED])
+        xi, xi_t = (numbers[ints[place + part] :][:n].copy() for part in (a.PLACE, a.SPEED))
+        if q:
+            xi, xi_t = (np.delete(x, slice(r, r + q)) for x in (xi, xi_t))
         xi[:r] += self._forces.centre(record)
         return State(level, xi, xi_t, tuple(PHASES[k] for k in phases.tolist()))
 

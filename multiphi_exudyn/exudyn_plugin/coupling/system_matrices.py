@@ -74,8 +74,7 @@ class SystemMatrices:
 
     def on_body(self, inertia: np.ndarray) -> bool:
         """Whether a mass or a constraint beside the ties acts on the body's own coordinates; inertia: its M (s, s)."""
-        mass, jacobian = self._matrices()
-        return self._on_body(inertia, mass, jacobian[self._free])
+        return self._on_body(inertia, self._mass(), self._constraints())
 
     def _on_body(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> bool:
         first, last = int(self._own[0]), int(self._own[-1]) + 1  # a node's coordinates stand together
@@ -96,11 +95,11 @@ class SystemMatrices:
     def hanging(self, unmoved: np.ndarray, inertia: np.ndarray, ago: float = 0.0) -> Hanging:
         """What hangs on the points some time [s] before the others are at q, v (2, n); inertia: the body's M (s, s)."""
         if ago == 0:
-            return self._hanging(inertia, *self._matrices())
+            return self._hanging(inertia, self._mass(), self._constraints())
         q, v = unmoved
         here = self.coordinates[0].copy()
         self.coordinates[0][self._others] = (q - ago * v)[self._others]
-        found = self._hanging(inertia, *self._matrices())
+        found = self._hanging(inertia, self._mass(), self._constraints())
         self.coordinates[0][:] = here
         return found
 
@@ -126,7 +125,7 @@ class SystemMatrices:
 
     def accelerations(self, step: float) -> np.ndarray:
         """a (n,) at the current state, which gets mu and, beside the body, a; step [s]: that of the solver."""
-        mass, jacobian = self._matrices()
+        mass, jacobian = self._mass(), self._jacobian()
         forces, turning = self.forces(), np.zeros(len(jacobian))
         if len(jacobian) > len(self._ties):
             turning = self._along_the_motion(APART * step)
@@ -136,8 +135,7 @@ class SystemMatrices:
         return found[: len(mass)]
 
     def _hanging(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> Hanging:
-        """What hangs on the points at the current state."""
-        jacobian = jacobian[self._free]
+        """What hangs on the points at the current state; jacobian: C but for the ties."""
         given = mass, jacobian
         if not (np.any(mass[self._points]) or np.any(jacobian[:, self._points])):
             return Hanging(*self._nothing, not self._on_body(inertia, mass, jacobian), *given)
@@ -163,18 +161,25 @@ class SystemMatrices:
         attached = AttachedInertia(carried.T @ mass @ carried, free)
         return Hanging(attached, follow, False, *given)
 
-    def _matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """M (n, n) and C (k, n) at the current state."""
+    def _mass(self) -> np.ndarray:
+        """M (n, n) at the current state."""
+        solver, count = self._mbs.sys["dynamicSolver"], len(self.coordinates[0])
+        solver.ComputeMassMatrix(self._mbs)
+        return np.array(solver.GetSystemMassMatrix())[:count, :count]
+
+    def _constraints(self) -> np.ndarray:
+        """C (k, n) at the current state but for the ties; mostly there are none."""
+        return self._jacobian()[self._free] if len(self._free) else np.zeros((0, len(self.coordinates[0])))
+
+    def _jacobian(self) -> np.ndarray:
+        """C (k, n) at the current state."""
         solver, mbs = self._mbs.sys["dynamicSolver"], self._mbs
         count, first = solver.GetODE2size(), solver.GetODE2size() + solver.GetODE1size()
         size = first + solver.GetAEsize()
-        solver.ComputeMassMatrix(mbs)
-        mass = np.array(solver.GetSystemMassMatrix())[:count, :count]
         solver.SetSystemJacobian(np.zeros((size, size)))
         solver.ComputeJacobianAE(mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=1.0)
-        jacobian = np.array(solver.GetSystemJacobian())[first:, :count]
-        mbs.solverSignalJacobianUpdate = True  # the solver's own has been overwritten
-        return mass, jacobian
+        mbs.solverSignalJacobianUpdate = True  # the solver's own is overwritten
+        return np.array(solver.GetSystemJacobian())[first:, :count]
 
     def _along_the_motion(self, apart: float) -> np.ndarray:
         """-d(C v + c_t)/dt (k,) at constant v; apart [s]: half the distance of the states compared."""
