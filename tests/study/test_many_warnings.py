@@ -133,7 +133,7 @@ def test_a_study_keeps_the_warnings_of_every_run(warning_runs, tmp_path, capsys)
     file = write(tmp_path / "study.toml", study | {"methods": [method], "timing": False})
     assert cli.main(["study", file, "--on", "serial", "--out", str(tmp_path / "out")]) == 0
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning: ")]
-    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference (start.displacement = 0.01), ")
+    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference (start.displacement = 0.01) and 5 more); ")
     assert told[2].startswith("warning: sensitivity: 2 of 2 settings that were nudged")  # at the first point alone
     heads, *lines = (tmp_path / "out" / "runs.csv").read_text().splitlines()
     assert {"warnings", "horizon_s.0.01"} <= set(heads.split(","))
