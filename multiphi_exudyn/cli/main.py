@@ -106,11 +106,11 @@ def parser() -> argparse.ArgumentParser:
         "Writes report.html, summary.json and histories.npz.",
         "compare paper-rig --t-end 0.5 --modes 12 --out rig",
     )
-    _scene_options(compare, "of the reduced models that take the scene's number")
+    _scene_options(compare, "for the models to which the scene gives none of their own")
     animate = add(
         "animate",
         _animate,
-        "show a reduced model and the reference moving over each other, as a GIF",
+        "animate a reduced model over the reference, as a GIF",
         "",
         "animate paper-rig --t-end 0.3 --slow 40",
     )
@@ -154,7 +154,7 @@ def parser() -> argparse.ArgumentParser:
         "A study comes with the scene it names.",
         "new study my-study.toml",
     )
-    new.add_argument("kind", choices=KINDS)
+    new.add_argument("kind", choices=KINDS, help="what to write")
     new.add_argument("file", metavar="FILE", type=Path, nargs="?", help="its name (default: scene.toml, study.toml)")
     validate = add(
         "validate",
@@ -171,7 +171,7 @@ def parser() -> argparse.ArgumentParser:
         "",
         "schema scene",
     )
-    schema.add_argument("kind", choices=KINDS)
+    schema.add_argument("kind", choices=KINDS, help="of which file")
     schema.add_argument("--markdown", action="store_true", help="all fields as a page to read instead (default: JSON)")
     add(
         "compile",

@@ -168,7 +168,7 @@ class UnilateralContact:
         if not 0 <= self.restitution <= 1:
             raise self._refused("restitution", "need a value from 0 to 1")
         if self.restitution and not self.rigid:
-            needed = "need an infinite one: a spring loses nothing, its damper does"
+            needed = "need stiffness=inf (what a compliant contact loses is its damping)"
             raise self._refused("restitution", needed, " beside a finite stiffness")
         self._check_friction()
 

@@ -135,7 +135,7 @@ class LinearStructure(Shown):
             if not at:
                 raise MultiPhiValueError("direction: got an empty mapping, need {point: coefficient, ...}")
             return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
-        if isinstance(at, tuple) and any(isinstance(part, str) for part in at):
+        if is_real(at) or (isinstance(at, tuple) and any(isinstance(part, str) for part in at)):
             raise MultiPhiTypeError(f"point: got {at!r}, need the name of a point: points={{'name': {at!r}}}")
         return _vector("row", at, self.n)
 
@@ -167,7 +167,8 @@ def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
     matrix = real_array(name, given, "an (n, n) array of real numbers")
     values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
-        raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need (n, n)")
+        ratio = f"; a ratio is ModalDamping({given!r})" if name == "damping" and matrix.ndim == 0 else ""
+        raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need (n, n){ratio}")
     if n is not None and matrix.shape[0] != n:
         raise MultiPhiValueError(f"{name}: got shape {matrix.shape}, need {(n, n)} as the mass has")
     if not np.all(np.isfinite(values)):

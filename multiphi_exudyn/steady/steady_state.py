@@ -374,6 +374,8 @@ def frequency(load: PeriodicLoad) -> float:
 
 
 def _course(load: PeriodicLoad) -> Harmonic:
+    if not isinstance(load, (HarmonicLoad, BaseMotion)):
+        raise MultiPhiTypeError(f"load: got {type(load).__name__}, need HarmonicLoad or BaseMotion")
     course = load.course
     if not isinstance(course, Harmonic):
         raise MultiPhiTypeError(f"load course: got {type(course).__name__}, need Harmonic")
@@ -387,8 +389,6 @@ def _check(
         raise MultiPhiValueError(
             "model modes: got a Tolerance that has not decided yet, need a run of simulate first, a number or 'all'"
         )
-    if not isinstance(load, (HarmonicLoad, BaseMotion)):
-        raise MultiPhiTypeError(f"load: got {type(load).__name__}, need HarmonicLoad or BaseMotion")
     if frequency(load) == 0:
         raise MultiPhiValueError("load frequency_hz: got 0, need a frequency > 0 Hz")
     for other in other_loads:

@@ -152,7 +152,10 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
 
 
 def _slow(trajectory: Trajectory) -> Iterator[str]:
-    fastest, lasts = trajectory.model.level_at(()).highest_frequency, trajectory.t_end - trajectory.t_start
+    """Not of runs that go on with one another, and not of a system that was reduced."""
+    if trajectory.t_start > 0 or trajectory.model.validity is not None:
+        return
+    fastest, lasts = trajectory.model.level_at(()).highest_frequency, trajectory.t_end
     if 0 < fastest * lasts < HARDLY:
         yield (
             f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts {lasts:.3g} "

@@ -14,7 +14,8 @@ from multiphi_exudyn.errors import MultiPhiWarning
 
 __all__ = ["WarningGroup", "grouped", "issue", "kept_back"]
 
-NAMED = 3  # runs of a group that its sentence names
+NAMED = 3  # runs of a group that its sentence names, one if their names are long
+LONG = 60  # characters of these names
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class WarningGroup:
 
     def told(self, of: int) -> str:
         """The group as one sentence that begins with its kind; of: how many runs there are."""
-        names, more = ", ".join(self.runs[:NAMED]), len(self.runs) - NAMED
+        count = NAMED if len(", ".join(self.runs[:NAMED])) <= LONG else 1
+        names, more = ", ".join(self.runs[:count]), len(self.runs) - count
         listed = f"{names} and {more} more" if more > 0 else names
         if of == 1:
             return f"{self.kind}: {self.example}"

@@ -131,7 +131,9 @@ def _with_old_names(exu: Any) -> None:
 
     Parameters that items no longer have are left out, from both runs.
     """
-    elsewhere: dict[str, Any] = {"exudyn": exu, "NormL2": np.linalg.norm}
+    elsewhere: dict[str, Any] = {"exudyn": exu, "np": np, "NormL2": np.linalg.norm}
+    elsewhere["VAdd"], elsewhere["VSub"] = (lambda a, b: np.add(a, b)), (lambda a, b: np.subtract(a, b))
+    elsewhere["ScalarMult"] = lambda factor, vector: factor * np.asarray(vector)
     elsewhere["graphics"] = importlib.import_module("exudyn.graphics")
     beams, utilities = (importlib.import_module(f"exudyn.{name}") for name in ("beams", "basicUtilities"))
     utilities.NormL2 = np.linalg.norm

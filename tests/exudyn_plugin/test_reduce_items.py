@@ -236,7 +236,7 @@ def test_a_spring_by_a_user_function_has_its_tangent_where_the_system_stands_and
     assert reduction.structure.stiffness == pytest.approx(np.array([[100 * (1 + 150 * 0.2**2)]]), rel=1e-5)
     (load,) = reduction.loads
     assert load.force * load.at == pytest.approx([-100 * (0.2 + 50 * 0.2**3)])
-    assert left_out(reduction) == {"cubic": "what its user function does away from the current state"}
+    assert left_out(reduction) == {"cubic": "how its user function differs from its tangent at the current state"}
 
 
 def test_what_works_in_one_direction_only_and_functions_of_the_system_are_told():

@@ -76,6 +76,14 @@ class TestMatrices:
     def test_refuses_a_sparse_mass_without_inertia(self, refused):
         refused(ValueError, "mass: ", structure, mass=scipy.sparse.diags_array([1.0, 0.0]))
 
+    def test_a_damping_ratio_is_told_where_it_goes(self, refused):
+        refused(
+            ValueError, "damping: got shape (), need (n, n); a ratio is ModalDamping(0.01)", structure, damping=0.01
+        )
+
+    def test_a_number_in_place_of_a_point_is_told_what_it_could_be(self, refused):
+        refused(TypeError, "point: got 1, need the name of a point: points={'name': 1}", structure().row, 1)
+
     def test_refuses_no_mass_and_no_stiffness(self, refused):
         refused(ValueError, "mass: ", structure, mass=None)
         refused(ValueError, "stiffness: ", structure, stiffness=None)
@@ -179,7 +187,7 @@ class TestRow:
             (TypeError, {"tip": 1j}, "direction['tip']: got 1j"),
             (TypeError, {1: 1.0}, "direction: got the name 1"),
             (ValueError, [1.0], "row: got shape (1,), need (2,)"),
-            (ValueError, 1, "row: got shape ()"),
+            (TypeError, 1, "point: got 1"),
             (ValueError, [1.0, math.inf], "row: got a value that is NaN or infinite"),
             (TypeError, [1j, 0], "row: got list"),
             (TypeError, object(), "row: got object"),

@@ -189,3 +189,8 @@ def test_what_a_steady_state_cannot_be_of_is_refused(refused, begins, kind, chan
 def test_frequencies_that_are_none_are_refused(refused, given):
     kind = TypeError if given == "fast" else ValueError
     refused(kind, "frequencies: got", mp.frequency_response, bilinear(), mp.HarmonicLoad("m0", 1.0, 1.0), given)
+
+
+def test_a_frequency_response_under_a_load_without_a_frequency_is_refused(refused):
+    begins = "load: got ConstantLoad, need HarmonicLoad or BaseMotion"
+    refused(TypeError, begins, mp.frequency_response, bilinear(), mp.ConstantLoad("m0", 1.0), [1.0])

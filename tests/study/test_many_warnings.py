@@ -103,7 +103,7 @@ def test_a_comparison_shows_what_its_models_warn_of_first(warning_runs, scene_fi
     assert told[0] == "linear range, all and r6: " + LINEAR.partition(": ")[2]
     assert told[1].startswith("static share, all and r6: ")
     assert told[2].startswith(
-        "sensitivity: nudged by 1e-12 at its start, a run stays within 1.00 % of itself until: all"
+        "sensitivity: with a start changed by 1e-12 a run stays within 1.00 % of this one until: all"
     )
     assert len(told) == 3
     page = text_of(render(comparison, (), ()))
@@ -134,7 +134,7 @@ def test_a_study_keeps_the_warnings_of_every_run(warning_runs, tmp_path, capsys)
     assert cli.main(["study", file, "--on", "serial", "--out", str(tmp_path / "out")]) == 0
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning: ")]
     assert told[0].startswith("warning: linear range: 6 of 6 runs (reference; levels, r = 2 and r = 4); ")
-    assert told[2].startswith("warning: sensitivity: 2 of 2 settings that were nudged")  # at the first point alone
+    assert told[2].startswith("warning: sensitivity: 2 of 2 settings are not determined")  # at the first point alone
     heads, *lines = (tmp_path / "out" / "runs.csv").read_text().splitlines()
     assert {"warnings", "horizon_s.0.01"} <= set(heads.split(","))
     assert all(json.dumps(LINEAR).replace('"', '""') in line for line in lines)

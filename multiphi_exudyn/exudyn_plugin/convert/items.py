@@ -39,7 +39,9 @@ HELD_GAP = "constraints hold its gap"
 HELD_GAPS = "constraints hold the gaps of its limit stops"
 HELD_FRICTION = "constraints hold the coordinate of its friction"
 IDLE = (INACTIVE, HELD_GAP, HELD_GAPS, HELD_FRICTION)  # reasons for which leaving an item out changes no motion
-USER_FUNCTION = "what its user function does away from the current state"  # which a run's check asks the system for
+USER_FUNCTION = (
+    "how its user function differs from its tangent at the current state"  # which a run's check asks the system for
+)
 NAMED = 3  # items of a group that are told by name: enough to find the others
 
 _EXT = "ConnectorCoordinateSpringDamperExt"

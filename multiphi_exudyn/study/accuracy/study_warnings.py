@@ -49,8 +49,8 @@ def _nudged(result: StudyResult) -> Iterable[str]:
     if early:
         end, tolerance, shortest = early[0]
         yield (
-            f"sensitivity: {len(early)} of {len(ends)} settings that were nudged by 1e-12 at their start leave "
-            f"{percent(float(tolerance))} of themselves before the end, the first at {end:.3g} s: {named(shortest)}"
+            f"sensitivity: {len(early)} of {len(ends)} settings are not determined to the end: with a start changed by "
+            f"1e-12 they differ by {percent(float(tolerance))}, the first one from {end:.3g} s on: {named(shortest)}"
         )
 
 

@@ -25,6 +25,6 @@ def _nudged(comparison: Comparison) -> Iterable[str]:
         early = [f"{name} {end:.3g} s" for name, end in ends.items() if end < ROUND_OFF * comparison.bench.t_end]
         if early:
             yield (
-                f"sensitivity: nudged by 1e-12 at its start, a run stays within {percent(float(tolerance))} of itself "
-                f"until: {listed(early)}; after that trust contact times and energies on the whole, not single values"
+                f"sensitivity: with a start changed by 1e-12 a run stays within {percent(float(tolerance))} of this "
+                f"one until: {listed(early)}; after that trust contact times and energies on the whole, not single values"
             )
