@@ -58,6 +58,15 @@ def complaints(problem, trajectory):
     return " ".join(judge(problem, trajectory, BUDGET).complaints(1.0))
 
 
+def right(name):
+    """A case of the catalogue and its trajectory, in which nothing is wrong."""
+    problem = BY_NAME[name].build(True)
+    trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
+    assert complaints(problem, trajectory) == ""
+    assert len(trajectory.events) > 2
+    return problem, trajectory
+
+
 class TestTheJudgeSees:
     def test_a_gap_that_is_not_the_models(self, honest):
         problem, trajectory = honest
@@ -111,14 +120,6 @@ class TestTheJudgeSees:
 class TestTheJudgeKnowsFriction:
     """Each case is right, and wrong as soon as the problem's friction is another than the trajectory's."""
 
-    @staticmethod
-    def run(name):
-        problem = BY_NAME[name].build(True)
-        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
-        assert complaints(problem, trajectory) == ""
-        assert len(trajectory.events) > 2
-        return problem, trajectory
-
     @pytest.mark.parametrize(
         ("name", "changed", "said"),
         [
@@ -129,12 +130,12 @@ class TestTheJudgeKnowsFriction:
         ],
     )
     def test_that_is_another(self, name, changed, said):
-        problem, trajectory = self.run(name)
+        problem, trajectory = right(name)
         other = dataclasses.replace(problem.contacts[0], **changed)
         assert said in complaints(dataclasses.replace(problem, contacts=[other]), trajectory)
 
     def test_whose_events_are_not_told(self):
-        problem, trajectory = self.run("friction-lets-go")
+        problem, trajectory = right("friction-lets-go")
         for lost in range(2, 6):
             others = tuple(event for k, event in enumerate(trajectory.events) if k != lost)
             found = judge(problem, dataclasses.replace(trajectory, events=others), BUDGET)
@@ -142,7 +143,7 @@ class TestTheJudgeKnowsFriction:
 
     @pytest.mark.parametrize("name", ["friction-decays", "friction-lets-go-rigid", "friction-belt"])
     def test_in_exudyn_too(self, name):
-        problem, trajectory = self.run(name)
+        problem, trajectory = right(name)
         outcome = run_user_object(problem, trajectory, 8000, 20.0)
         assert outcome.status == "ok", outcome.message
         assert outcome.difference < 1e-3
@@ -152,16 +153,8 @@ class TestTheJudgeKnowsFriction:
 class TestTheJudgeKnowsLaws:
     """Each case is right, and wrong as soon as the problem's law is another than the trajectory's."""
 
-    @staticmethod
-    def run(name):
-        problem = BY_NAME[name].build(True)
-        trajectory = simulate(problem.model(), problem.t_end, problem.displacement, None, problem.loads)
-        assert complaints(problem, trajectory) == ""
-        assert len(trajectory.events) > 2
-        return problem, trajectory
-
     def told_of(self, name, **changed):
-        problem, trajectory = self.run(name)
+        problem, trajectory = right(name)
         contacts = [dataclasses.replace(problem.contacts[0], **changed), *problem.contacts[1:]]
         return complaints(dataclasses.replace(problem, contacts=contacts), trajectory)
 
@@ -172,7 +165,7 @@ class TestTheJudgeKnowsLaws:
         assert "without an event" in told
 
     def test_of_a_viscous_contact_that_pulls(self):
-        problem, trajectory = self.run("viscous-closes-again-inside")
+        problem, trajectory = right("viscous-closes-again-inside")
         i = next(i for i, s in enumerate(trajectory.segments) if s.level.level.indices and s.end < trajectory.t_end)
         held = dataclasses.replace(trajectory.segments[i], end=trajectory.segments[i + 1].end)
         segments = (*trajectory.segments[:i], held, *trajectory.segments[i + 2 :])
@@ -180,7 +173,7 @@ class TestTheJudgeKnowsLaws:
         assert "a contact pulls" in told
 
     def test_of_a_force_law_whose_springs_are_not_its_own(self):
-        problem, trajectory = self.run("law-clearance-both-sides")
+        problem, trajectory = right("law-clearance-both-sides")
         knots, forces = problem.contacts[0].law
         harder = dataclasses.replace(problem.contacts[0], law=(knots, 1.001 * forces))
         assert "m beyond the contact law" in complaints(dataclasses.replace(problem, contacts=[harder]), trajectory)
@@ -194,11 +187,11 @@ class TestTheJudgeKnowsLaws:
 
     @pytest.mark.parametrize("name", ["moving-stop-compliant", "moving-stop-viscous", "moving-base-fixed-rigid-stop"])
     def test_of_a_stop_that_moves_otherwise(self, name):
-        problem, trajectory = self.run(name)
+        problem, trajectory = right(name)
         assert "m beyond the contact law" in complaints(dataclasses.replace(problem, loads=[]), trajectory)
 
     def test_of_an_energy_below_zero(self):
-        problem, trajectory = self.run("law-leaves-unstable-rest")
+        problem, trajectory = right("law-leaves-unstable-rest")
         assert trajectory.ledger.initial < 0
         start = dataclasses.replace(trajectory.start, velocity=trajectory.start.velocity + 1e-4)
         assert "ledger: residual" in complaints(problem, dataclasses.replace(trajectory, start=start))

@@ -17,15 +17,8 @@ from typing import Any
 
 import pandas as pd
 
-from multiphi_exudyn.study.accuracy.analysis import (
-    REFERENCE,
-    Setting,
-    StudyResult,
-    is_number,
-    names_of,
-    references,
-    settings,
-)
+from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, names_of, references, settings
+from multiphi_exudyn.study.accuracy.study_file import REFERENCE, is_number
 from multiphi_exudyn.study.sweep.store import key_of
 
 __all__ = ["FINEST", "Series", "Table", "numeric_axes", "series", "tables_along"]

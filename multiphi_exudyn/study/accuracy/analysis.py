@@ -14,14 +14,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from multiphi_exudyn.study.accuracy.study_file import StudyFile
+import pandas as pd
+
+from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, StudyFile, is_number
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.measures.spectra import Map
 from multiphi_exudyn.study.sweep.store import Row, key_of
 
 __all__ = [
-    "COARSER",
-    "REFERENCE",
     "MapPair",
     "Setting",
     "StudyResult",
@@ -29,7 +29,6 @@ __all__ = [
     "error_of",
     "front",
     "full_methods",
-    "is_number",
     "longest",
     "named",
     "names_of",
@@ -42,8 +41,6 @@ __all__ = [
     "uncertainty",
     "words",
 ]
-
-REFERENCE, COARSER = "reference", "coarser"
 
 Intervals = Sequence[Sequence[float]]
 
@@ -89,8 +86,8 @@ class StudyResult:
         for row in self.rows:
             groups.setdefault(_setting_key(row), []).append(row)
         alone = [_setting(self, group, timings.get(key)) for key, group in groups.items()]
-        finer = {method.name: method.refine for method in self.study.methods}
-        return tuple(replace(each, lasting_error=_lasting(each, alone, finer.get(each.method))) for each in alone)
+        lasting = _lasting(alone, {method.name: method.refine for method in self.study.methods})
+        return tuple(replace(each, lasting_error=worst) for each, worst in zip(alone, lasting, strict=True))
 
 
 @dataclass(frozen=True)
@@ -236,11 +233,6 @@ def names_of(settings: Sequence[Setting]) -> list[str]:
     return list(dict.fromkeys(setting.method for setting in settings))
 
 
-def is_number(value: Any) -> bool:
-    """Whether a field's value is a number, and not True or False."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def _setting(result: StudyResult, nearby: Sequence[Row], timing: Row | None) -> Setting:
     errors = [error_of(result, row) for row in nearby]
     known = [error for error in errors if error is not None]
@@ -282,22 +274,19 @@ def _holds(error: float | None, tolerance: float) -> bool:
     return error is not None and error <= tolerance
 
 
-def _lasting(own: Setting, others: Sequence[Setting], refine: str | None) -> float | None:
-    """The worst error of ``own`` and of those that differ from it by a smaller value of ``refine`` only."""
-    if refine is None or refine not in own.setting:
-        return own.error
-    finer = [s.error for s in others if _coarseness(s, refine) == _coarseness(own, refine) and _finer(s, own, refine)]
-    known = [error for error in finer if error is not None]
-    return max(known) if len(known) == len(finer) else None
+def _lasting(settings: Sequence[Setting], refine: Mapping[str, str | None]) -> list[float | None]:
+    """Of each setting the worst error of it and of those that are finer in their method's field ``refine`` alone."""
+    rows = [_refined(setting, refine.get(setting.method) or "") for setting in settings]
+    frame = pd.DataFrame(rows, columns=["alike", "value", "error"])
+    worst = frame.sort_values("value").groupby("alike").error.cummax().sort_index()
+    return [None if math.isinf(error) else float(error) for error in worst]
 
 
-def _coarseness(setting: Setting, refine: str) -> str:
-    """Equal for settings that differ in ``refine`` at most."""
-    return key_of({"method": setting.method, "at": setting.at, "setting": {**setting.setting, refine: None}})
-
-
-def _finer(setting: Setting, own: Setting, refine: str) -> bool:
-    return refine in setting.setting and setting.setting[refine] <= own.setting[refine]
+def _refined(setting: Setting, field: str) -> tuple[str, float, float]:
+    """What settings share that differ in one field at most, its value, and the error, infinite where there is none."""
+    rest = {name: value for name, value in setting.setting.items() if name != field}
+    alike = key_of({"method": setting.method, "at": setting.at, "setting": rest})
+    return alike, setting.setting.get(field, 0.0), math.inf if setting.error is None else setting.error
 
 
 def _word(field: str, value: Any) -> str:

@@ -16,7 +16,6 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
-    REFERENCE,
     Setting,
     StudyResult,
     front,
@@ -44,6 +43,7 @@ from multiphi_exudyn.study.accuracy.figure_style import (
     value_axis,
 )
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
+from multiphi_exudyn.study.accuracy.study_file import REFERENCE
 from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_figure"]

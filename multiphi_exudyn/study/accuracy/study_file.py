@@ -15,7 +15,9 @@ from pydantic import Field
 
 from multiphi_exudyn.study.scene.scene_file import Finite, Positive, Table
 
-__all__ = ["BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile"]
+__all__ = ["COARSER", "REFERENCE", "BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile", "is_number"]
+
+REFERENCE, COARSER = "reference", "coarser"  # methods of their own in every study
 
 Value = Annotated[int, Field(strict=True)] | Finite | str | bool | dict[str, Any] | list[Any]
 Values = Annotated[tuple[Value, ...], Field(min_length=1)]
@@ -73,3 +75,8 @@ class StudyFile(Table):
     histories: bool = False
     maps: tuple[str, ...] = ()
     quick: QuickSpec = QuickSpec()
+
+
+def is_number(value: Any) -> bool:
+    """Whether a field's value is a number, and not True or False."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -8,7 +8,6 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.analysis import (
-    REFERENCE,
     Setting,
     StudyResult,
     cheapest,
@@ -26,6 +25,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
 )
 from multiphi_exudyn.study.accuracy.overview import over_all_points
 from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
+from multiphi_exudyn.study.accuracy.study_file import REFERENCE
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.comparison.wording import percent

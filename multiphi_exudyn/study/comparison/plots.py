@@ -23,20 +23,20 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
 from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.comparison.placement import coefficient, meeting
 from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = [
+    "COLOURS",
     "CONTACT",
+    "canvas",
     "data_uri",
     "energy_figure",
     "error_time_figure",
     "first_contact_span",
     "greyed",
     "history_figure",
-    "mode_figure",
     "panels",
     "pictured",
     "png",
@@ -57,7 +57,6 @@ MARKERS = {
 }
 WIDTH = 9.2  # inches
 RESOLUTION = 120  # dots per inch
-APART = 2.3  # between beams drawn over each other, of the largest value of a mode
 SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture, unless there are no larger ones
 SPAN = 0.01  # of the largest difference: smaller ones may lie below the picture
 LOSSES = {
@@ -135,32 +134,6 @@ def error_time_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def mode_figure(levels: Sequence[LevelModes]) -> Figure:
-    """The lowest mode shapes of every level: its beams, from top to bottom, along x."""
-    figure = _canvas((1.2 + 0.9 * len(levels[0].beams)) * len(levels) + 0.3)
-    for part, level in zip(figure.subfigures(len(levels), 1, squeeze=False)[:, 0], levels, strict=True):
-        held = "" if level.share is None else f": {100 * level.share:.3g} % of the reference's run"
-        part.suptitle(level.name + held, x=0.01, ha="left", fontsize=10)
-        row = part.subplots(1, len(level.frequencies), sharex=True, sharey=True, squeeze=False)[0]
-        for i, axes in enumerate(row):
-            _mode(axes, level, i)
-        names = [beam.name for beam in level.beams] if len(level.beams) > 1 else []
-        row[0].set_yticks(-APART * np.arange(len(names)), names, fontsize=9)
-    return figure
-
-
-def _mode(axes: Axes, level: LevelModes, mode: int) -> None:
-    for number, beam in enumerate(level.beams):
-        zero, shape = -APART * number, beam.shapes[mode]
-        axes.plot(beam.x[[0, -1]], [zero, zero], color="#BBBBBB", linewidth=0.8)
-        axes.plot(beam.x, zero + shape, color=COLOURS[0], linewidth=1.6)
-        for places, marker, colour in ((beam.masses, "s", "#000000"), (beam.contacts, "^", "#D55E00")):
-            axes.plot(places, zero + np.interp(places, beam.x, shape), marker, color=colour, ms=6)
-    axes.set_title(f"mode {mode + 1}, {level.frequencies[mode]:.2f} Hz", fontsize=9)
-    axes.tick_params(axis="y", length=0)
-    axes.set_xlabel("x [m]", fontsize=9)
-
-
 def energy_figure(comparison: Comparison) -> Figure:
     """Energy over time, and where it is at the end."""
     figure, (curves, bars) = panels(7.6, 2, heights=(1.0, 1.1))
@@ -223,7 +196,8 @@ def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = 
     return max(0.0, start - margin), min(comparison.bench.t_end, end + margin)
 
 
-def _canvas(height: float) -> Figure:
+def canvas(height: float) -> Figure:
+    """An empty figure of a report, of this height [inches]."""
     figure = Figure(figsize=(WIDTH, height), dpi=RESOLUTION, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -231,7 +205,7 @@ def _canvas(height: float) -> Figure:
 
 def panels(height: float, rows: int, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
     """Panels under each other in a figure of a given height [inches]; heights: their ratios."""
-    figure = _canvas(height)
+    figure = canvas(height)
     axes = list(figure.subplots(rows, 1, squeeze=False, height_ratios=heights)[:, 0])
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)

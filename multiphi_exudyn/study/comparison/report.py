@@ -12,6 +12,7 @@ from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotals, contact_totals
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
+from multiphi_exudyn.study.comparison.mode_plots import mode_figure
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
 from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.zoom import histories_to_zoom
@@ -101,7 +102,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
         )
     if levels:
         rigid = comparison.bench.mechanics.parameter_set is not None
-        yield _picture("modes", plots.mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))
+        yield _picture("modes", mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))
 
 
 def _contact_pictures(comparison: Comparison) -> Iterable[Picture]:

@@ -2,7 +2,7 @@
 
     laws        what must hold of every run, along its analytic segments (run_laws.py): ledger, energy, missed contacts
     residual    |initial + work - losses - final| / E     E the largest energy of the run
-    energy      by how much energy less the work of constant loads rises, over E; under other loads the residual
+    energy      by how much energy less the work of constant loads rises, over E; where others do any, the residual
     beyond      how far a contact is from its law [m]:
                 open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
                 with a as in brute_force.py; a force law: |force on the structure + F(q)| / max |F'|
@@ -97,7 +97,8 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     small, ends = SMALL * problem.metre, run_laws.ends_of(trajectory)
     largest = run_laws.largest_energy(trajectory, ends, small)
     residual = _share(trajectory.ledger.residual, largest)
-    rise = residual if problem.driven else _share(run_laws.energy_rise(trajectory, ends), largest)
+    judged = run_laws.still(trajectory) and not problem.driven
+    rise = _share(run_laws.energy_rise(trajectory, ends), largest) if judged else residual
     return Judgement(
         laws=tuple(run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven)),
         energy=rise,

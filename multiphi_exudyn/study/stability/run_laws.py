@@ -17,7 +17,7 @@ from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time.segment import Segment
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed"]
+__all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed", "still"]
 
 CLOSES = 1e-9  # of the largest energy: what the ledger may leave open, and what a row may be below zero
 RUBBED = 1e-10  # the same where there is friction
@@ -46,16 +46,21 @@ def complaints(
     """Everything that is wrong with a run.
 
     samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time,
-    whose work only the ledger knows, as it does that of a counter-surface which moves.
+    whose work only the ledger knows.
     """
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
     looked_at = ends_of(run, most)
     scale = largest_energy(run, looked_at, joule)
     checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre)]
-    if not varying and not any(link.velocity for link in run.model.links):
+    if not varying and still(run):
         checks.append(energy(run, looked_at, scale))
     return [complaint for complaint in checks if complaint]
+
+
+def still(run: Trajectory) -> bool:
+    """Whether no counter-surface moves, whose work only the ledger knows."""
+    return not any(link.velocity for link in run.model.links)
 
 
 def ends_of(run: Trajectory, most: int = 60) -> list[Segment]:
