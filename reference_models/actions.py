@@ -18,7 +18,9 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, Load, StopMotion, VaryingLoad
+from multiphi_exudyn.mechanics.loads import Load, VaryingLoad
+from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.point_contact import PointContact
 

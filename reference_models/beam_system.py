@@ -22,7 +22,8 @@ import exudyn.itemInterface as eii
 import numpy as np
 
 from multiphi_exudyn.mechanics.assembly import Tie
-from multiphi_exudyn.mechanics.beam import Beam, beam_nodes
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.planar_beam import beam_nodes
 from multiphi_exudyn.mechanics.section import Section
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ import numpy as np
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
+from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
 from multiphi_exudyn.levels.static_response import static_response
@@ -34,53 +35,7 @@ from multiphi_exudyn.mechanics.arguments import real_array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Asymptotic", "Level", "LevelOverride"]
-
-
-@dataclass(frozen=True)
-class LevelOverride:
-    """Frequencies and damping ratios that replace the computed ones of a level's lowest modes.
-
-    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical (M, C, K):
-    such a level does not interlace, and a transition into it need not lower the energy. Mode shapes and static
-    deflections stay the computed ones, also those that a slowly varying load goes through.
-
-    Parameters
-    ----------
-    frequencies : sequence of float, default None
-        Of the lowest modes [Hz], lowest first, as many as are known; None keeps the computed ones.
-    ratios : sequence of float, default None
-        Damping ratios of the lowest modes, 0.01 is 1 %; None keeps the computed ones.
-
-    Raises
-    ------
-    MultiPhiTypeError
-        For what are no real numbers.
-    MultiPhiValueError
-        For an array of numbers that is no list.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> measured = mp.LevelOverride(frequencies=[14.5])
-    >>> model = mp.MultiPhiModel(chain, overrides={(): measured})
-    >>> print(model.level(()).frequencies.round(1))
-    [14.5 39.7 57.4]
-    """
-
-    frequencies: Sequence[float] | None = None
-    ratios: Sequence[float] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("frequencies", "ratios"):
-            if (given := getattr(self, name)) is not None:
-                values = real_array(f"level override {name}", given, "a list of numbers")
-                if values.ndim != 1:
-                    raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
-                object.__setattr__(self, name, tuple(values.tolist()))
+__all__ = ["Asymptotic", "Level"]
 
 
 @dataclass(frozen=True)

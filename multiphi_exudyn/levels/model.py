@@ -14,7 +14,8 @@ from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.build_base import build_base
 from multiphi_exudyn.levels.build_level import build_level
-from multiphi_exudyn.levels.level import Level, LevelOverride
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, TRIED, Tolerance, UpTo, chosen_modes, is_count
 from multiphi_exudyn.levels.sliding import sliding

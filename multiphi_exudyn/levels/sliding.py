@@ -27,7 +27,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.levels.level import Asymptotic, Level, LevelOverride
+from multiphi_exudyn.levels.level import Asymptotic, Level
+from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["SlidingLevel", "sliding"]

@@ -13,32 +13,26 @@ those below. Each has two exits, where q reaches one end of the segment or the o
 slope does not change are left out. F(q_m) is a constant force of every level. Strain energy is the integral of the
 segmented law from q_m. Beyond the span its last segments go on.
 
-Where the knots stand is in piecewise_linear_fit.py.
+Where the knots stand is in law_lines.py.
 """
 
 from __future__ import annotations
 
 import functools
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
-from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.element import TAKEN_ONCE, ElementState, Exit, Link, Share
+from multiphi_exudyn.mechanics.law_lines import Function, LawLines
 from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["ForceLaw"]
 
-Function = Callable[[Any], Any]
-
-SAMPLES = 2**14  # of a law on either side of its central knot; knots stand on samples
 STRAIGHT = 1e-12  # of the largest slope: a smaller change of slope is round-off
-ZERO_FORCE = 1e-14  # of the largest force: the law vanishes there
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +109,13 @@ class ForceLaw:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"force law name: got {self.name!r}, need a non-empty string")
-        knots, forces, centre, error = self._followed() if callable(self.law) else self._tabulated()
+        given = LawLines(f"force law {self.name!r}", self.law, self.tolerance, self.span, self.segments)
+        knots, forces, centre, error = given.found()
         slopes = np.diff(forces) / np.diff(knots)
         if not np.any(slopes):
-            raise MultiPhiValueError(f"{self._named} law: got a constant force, need one that changes (or a load)")
+            raise MultiPhiValueError(
+                f"force law {self.name!r} law: got a constant force, need one that changes (or a load)"
+            )
         for name, value in (("knots", knots), ("forces", forces), ("centre", centre), ("error", error)):
             object.__setattr__(self, name, value)
 
@@ -233,109 +230,6 @@ class ForceLaw:
         q = self.centre + gap
         return _called(sum(q > link.gap for link in self._above) - sum(-q > link.gap for link in self._below))
 
-    # ------------------------------------------------------------------ segments
-
-    @property
-    def _named(self) -> str:
-        return f"force law {self.name!r}"
-
-    def _tabulated(self) -> tuple[np.ndarray, np.ndarray, float, float]:
-        given = {"tolerance": self.tolerance, "segments": self.segments, "span": self.span}
-        for name, value in given.items():
-            if value is not None:
-                raise MultiPhiValueError(f"{self._named} {name}: got {value!r} for a table, need none")
-        try:
-            knots, forces = (np.array(column, dtype=float) for column in self.law)  # type: ignore[union-attr]
-        except (TypeError, ValueError) as error:
-            needed = "need a function, or two arrays: q ascending, and F"
-            raise MultiPhiTypeError(f"{self._named} law: got {type(self.law).__name__}, {needed}") from error
-        if knots.ndim != 1 or knots.shape != forces.shape or len(knots) < 2:
-            raise MultiPhiValueError(f"{self._named} law: got shapes {knots.shape} and {forces.shape}, need (k,) twice")
-        if not (np.all(np.isfinite(knots)) and np.all(np.isfinite(forces)) and np.all(np.diff(knots) > 0)):
-            raise MultiPhiValueError(f"{self._named} law: got a table of q and F, need finite numbers and q ascending")
-        centre = _centre(knots, forces)
-        if centre not in knots:
-            place = int(np.searchsorted(knots, centre))
-            value = float(np.interp(centre, knots, forces))
-            knots, forces = np.insert(knots, place, centre), np.insert(forces, place, value)
-        return knots, forces, centre, 0.0
-
-    def _followed(self) -> tuple[np.ndarray, np.ndarray, float, float]:
-        low, high = self._checked_span()
-        wanted = self._checked_accuracy()
-        q = np.linspace(low, high, SAMPLES + 1)
-        centre = _centre(q, self._sampled(q))
-        sides = [
-            q for q in (np.linspace(low, centre, SAMPLES + 1), np.linspace(centre, high, SAMPLES + 1)) if q[-1] > q[0]
-        ]
-        values = [self._sampled(side) for side in sides]
-        largest = max(float(np.max(np.abs(value))) for value in values)
-        if isinstance(wanted, int):
-            chosen = with_segments(sides, values, max(wanted, len(sides)), 2 * largest)
-        else:
-            chosen = self._within(sides, values, wanted * largest)
-        knots = np.concatenate([side[index[first:]] for first, (side, index) in _numbered(sides, chosen)])
-        forces = np.concatenate([value[index[first:]] for first, (value, index) in _numbered(values, chosen)])
-        between = np.concatenate([(side[1:] + side[:-1]) / 2 for side in sides])
-        off = np.max(np.abs(self._sampled(between) - np.interp(between, knots, forces)))
-        return knots, forces, centre, float(off / largest) if largest else 0.0
-
-    def _within(self, sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
-        count = sum(len(index) - 1 for index in spread(sides, values, error))
-        if count > MOST_SEGMENTS:
-            raise MultiPhiValueError(
-                f"{self._named} tolerance: got {self.tolerance!r}, which needs more than {MOST_SEGMENTS} segments, "
-                "need a larger one"
-            )
-        return with_segments(sides, values, count, error)
-
-    def _checked_span(self) -> tuple[float, float]:
-        span = self.span
-        if not (isinstance(span, (tuple, list, np.ndarray)) and len(span) == 2 and all(map(is_real, span))):
-            raise MultiPhiTypeError(f"{self._named} span: got {span!r}, need (q_lo, q_hi) for a function")
-        low, high = float(span[0]), float(span[1])
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise MultiPhiValueError(f"{self._named} span: got {span!r}, need finite q_lo < q_hi")
-        return low, high
-
-    def _checked_accuracy(self) -> int | float:
-        """Number of segments (int), or the tolerance."""
-        if (self.tolerance is None) == (self.segments is None):
-            received = f"got tolerance {self.tolerance!r} and segments {self.segments!r}"
-            raise MultiPhiValueError(f"{self._named}: {received}, need exactly one of them for a function")
-        if self.segments is None:
-            if not is_real(self.tolerance):
-                raise MultiPhiTypeError(f"{self._named} tolerance: got {self.tolerance!r}, need a number")
-            if not (self.tolerance is not None and 0 < self.tolerance < 1):
-                raise MultiPhiValueError(f"{self._named} tolerance: got {self.tolerance!r}, need 0 < tolerance < 1")
-            return float(self.tolerance)
-        if not isinstance(self.segments, (int, np.integer)) or isinstance(self.segments, bool):
-            raise MultiPhiTypeError(f"{self._named} segments: got {self.segments!r}, need an integer")
-        if not 2 <= self.segments <= MOST_SEGMENTS:
-            raise MultiPhiValueError(f"{self._named} segments: got {self.segments!r}, need 2 to {MOST_SEGMENTS}")
-        return int(self.segments)
-
-    def _sampled(self, q: np.ndarray) -> np.ndarray:
-        """F at (k,) places, from a function of arrays or of numbers."""
-        assert callable(self.law), "a table has no samples"
-        try:
-            values = np.asarray(self.law(q), dtype=float)
-        except (TypeError, ValueError):
-            values = np.array([], dtype=float)
-        if values.shape != q.shape:
-            values = self._one_by_one(q)
-        if not np.all(np.isfinite(values)):
-            worst = float(q[np.argmin(np.isfinite(values))])
-            raise MultiPhiValueError(f"{self._named} law: gives no finite force at q = {worst:g}, need one on the span")
-        return values
-
-    def _one_by_one(self, q: np.ndarray) -> np.ndarray:
-        assert callable(self.law), "a table has no samples"
-        try:
-            return np.array([float(self.law(place)) for place in q.tolist()])
-        except (TypeError, ValueError, ArithmeticError) as error:
-            raise MultiPhiTypeError(f"{self._named} law: fails ({error}), need a function of q [m] in N") from error
-
 
 def _called(segment: int) -> str:
     """The name of the state."""
@@ -354,20 +248,3 @@ def _times(at: At, factor: float) -> At:
     if isinstance(at, Mapping):
         return {name: factor * coefficient for name, coefficient in at.items()}
     return factor * np.asarray(at)
-
-
-def _centre(q: np.ndarray, forces: np.ndarray) -> float:
-    """The zero of the lines through (q, F) nearest to q = 0; without any, the place nearest to q = 0."""
-    nearest = float(np.clip(0.0, q[0], q[-1]))
-    small = np.abs(forces) <= ZERO_FORCE * np.max(np.abs(forces))
-    if abs(np.interp(nearest, q, forces)) <= ZERO_FORCE * np.max(np.abs(forces)):
-        return nearest
-    crossing = np.flatnonzero(np.sign(forces[:-1]) * np.sign(forces[1:]) < 0)
-    rise = forces[crossing + 1] - forces[crossing]
-    zeros = np.concatenate([q[small], q[crossing] - forces[crossing] * (q[crossing + 1] - q[crossing]) / rise])
-    return float(zeros[np.argmin(np.abs(zeros))]) if len(zeros) else nearest
-
-
-def _numbered(columns: list[np.ndarray], chosen: list[np.ndarray]) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
-    """(1 where a column begins with the sample that ends the one before, else 0; column and its knots)."""
-    return [(min(i, 1), pair) for i, pair in enumerate(zip(columns, chosen, strict=True))]

@@ -1,15 +1,8 @@
-"""Loads and moving supports: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and the boundary values x_k(t) of (38.4).
+"""Loads that vary: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and what is known of loads of all kinds.
 
 A load is a place and a course (time_functions.py),
 
     f(t) = p u(t)
-
-a moving stop adds its way to a gap, g = h.x + gap - z(t), and a moving base moves the whole structure, x being what
-remains relative to it:
-
-    M x'' + C x' + K x = f - M e z''(t)
-
-A constant load belongs to the asymptotic configuration of every level, so that it is exact for any number of modes.
 """
 
 from __future__ import annotations
@@ -22,7 +15,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.mechanics.time_functions import (
     Harmonic,
@@ -30,114 +24,18 @@ from multiphi_exudyn.mechanics.time_functions import (
     Smooth,
     Sweep,
     TimeFunction,
-    check_numbers,
-    check_time_function,
 )
 
 __all__ = [
-    "BaseMotion",
-    "ConstantLoad",
     "FunctionLoad",
-    "Gravity",
     "HarmonicLoad",
     "Load",
     "SampledLoad",
-    "StaticLoad",
-    "StopMotion",
     "SweepLoad",
     "VaryingLoad",
     "patterns",
     "unchanging",
 ]
-
-
-@dataclass(frozen=True)
-class ConstantLoad:
-    """A constant force at a point, f(t) = p force.
-
-    It belongs to the asymptotic configuration of every level, so it is exact for any number of modes.
-
-    Parameters
-    ----------
-    at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
-    force : float
-        [N], [N m] on a rotation.
-
-    Raises
-    ------
-    MultiPhiTypeError
-        For a force that is no number.
-    MultiPhiValueError
-        For a force that is not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> tr = mp.simulate(model, 0.5, loads=[mp.ConstantLoad("tip", -50.0)])
-    >>> tr.events[0].kind
-    'close'
-    """
-
-    at: At
-    force: float
-
-    def __post_init__(self) -> None:
-        check_numbers("load", force=self.force)
-
-    def row(self, structure: LinearStructure) -> np.ndarray:
-        """The static force (n,)."""
-        return self.force * structure.row(self.at)
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """The weight of the whole structure, f = M e acceleration.
-
-    Parameters
-    ----------
-    direction : str, mapping or array (n,)
-        e (n,): 1 at every translation along gravity, -1 at those against it, 0 at the others; or {point: coefficient}.
-        A point's name alone is e = 1 at that point: its weight, without that of the rest of the structure.
-    acceleration : float, default 9.81
-        [m/s2].
-
-    Raises
-    ------
-    MultiPhiTypeError
-        For an acceleration that is no number.
-    MultiPhiValueError
-        For an acceleration that is not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> mp.Gravity(-np.ones(3)).row(chain).tolist()
-    [-9.81, -9.81, -9.81]
-    """
-
-    direction: At
-    acceleration: float = 9.81
-
-    def __post_init__(self) -> None:
-        if np.isscalar(self.direction) and not isinstance(self.direction, str):
-            raise MultiPhiTypeError(
-                f"gravity direction: got {self.direction!r}, need a row (n,): 1 at every degree of freedom that is a "
-                "translation along gravity, 0 at the others, as in Gravity(e, 9.81)"
-            )
-        check_numbers("gravity", acceleration=self.acceleration)
-
-    def row(self, structure: LinearStructure) -> np.ndarray:
-        """The static force (n,)."""
-        return np.asarray(self.acceleration * (structure.mass @ structure.row(self.direction)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,94 +255,6 @@ class SweepLoad(VaryingLoad):
         return Sweep(self.amplitude, self.start_hz, self.end_hz, self.duration, self.law, self.tolerance)
 
 
-@dataclass(frozen=True, eq=False)
-class StopMotion:
-    """A contact whose stop moves, g = h.x + gap - z(t).
-
-    The stop of a rigid contact may not jump in velocity: its course is Harmonic, Smooth or Sweep.
-
-    Parameters
-    ----------
-    contact : str
-        Name of the contact.
-    course : Harmonic, Sampled, Smooth or Sweep
-        z(t) [m] along +h, which closes the gap.
-
-    Raises
-    ------
-    MultiPhiTypeError
-        For a name that is no text, and a course of another kind.
-    MultiPhiValueError
-        For an empty name.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> tr = mp.simulate(model, 0.5, loads=[mp.StopMotion("stop", mp.Harmonic(2e-3, 8.0))])
-    >>> tr.events[0].contact
-    'stop'
-    """
-
-    contact: str
-    course: TimeFunction
-
-    def __post_init__(self) -> None:
-        check_time_function("stop motion", self.course)
-        _check_contacts("stop motion contact", [self.contact], "the name of a contact")
-
-
-@dataclass(frozen=True, eq=False)
-class BaseMotion:
-    """A base that moves by e z(t) under the whole structure; x is then relative to it, x_absolute = x + e z.
-
-        M x'' + C x' + K x = f - M e z''(t)
-
-    Parameters
-    ----------
-    direction : str, mapping or array (n,)
-        e, what a unit of rigid-body motion along the base's moves every degree of freedom by: a row, {point:
-        coefficient} or a point name.
-    course : Harmonic, Smooth or Sweep
-        z(t) [m], twice differentiable.
-    fixed_stops : sequence of str, default ()
-        Names of the contacts whose stops stay where they are; all others move with the base.
-
-    Raises
-    ------
-    MultiPhiTypeError
-        For a course of another kind, and names that are no sequence of texts.
-    MultiPhiValueError
-        For an empty name.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> shaken = mp.BaseMotion(np.ones(3), mp.Harmonic(1e-3, 12.0))
-    >>> mp.simulate(model, 0.5, loads=[shaken]).status
-    'ok'
-    """
-
-    direction: At
-    course: Harmonic | Smooth | Sweep
-    fixed_stops: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        check_time_function("base motion", self.course)
-        if isinstance(self.course, Sampled):
-            raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
-        _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
-
-
 def patterns(structure: LinearStructure, loads: Any) -> np.ndarray:
     """Rows (k, n) of loads that act elsewhere than at points of the structure: given as a row, or on all its mass."""
     found = [np.zeros((0, structure.n))]
@@ -471,12 +281,4 @@ def _unchanging(load: Any) -> bool:
     return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(place, str)
 
 
-StaticLoad: TypeAlias = "ConstantLoad | Gravity"
 Load: TypeAlias = "StaticLoad | VaryingLoad | StopMotion | BaseMotion"
-
-
-def _check_contacts(what: str, given: Any, needed: str) -> None:
-    if isinstance(given, str) or not isinstance(given, Sequence) or not all(isinstance(name, str) for name in given):
-        raise MultiPhiTypeError(f"{what}: got {given!r}, need {needed}")
-    if not all(given):
-        raise MultiPhiValueError(f"{what}: got an empty name, need {needed}")

@@ -22,7 +22,8 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import complete_modes
 from multiphi_exudyn.mechanics.arguments import Matrix, is_real, one_of, real_array
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.dofs import DofTable, Place, dof_table, fixed_dofs, known
+from multiphi_exudyn.mechanics.dofs import DofTable, Place, dof_table, fixed_dofs
+from multiphi_exudyn.mechanics.point_rows import checked_vector, point_rows
 
 __all__ = ["At", "LinearStructure", "damping_matrix"]
 
@@ -99,7 +100,7 @@ class LinearStructure(Shown):
         damping = self.damping
         if not (damping is None or isinstance(damping, (ModalDamping, RayleighDamping))):
             damping = _semidefinite_diagonal("damping", damping, held, moving)
-        rows = _point_rows(self.points, total, dofs)
+        rows = point_rows(self.points, total, dofs)
         checked = {
             "mass": mass,
             "stiffness": stiffness,
@@ -137,7 +138,7 @@ class LinearStructure(Shown):
             return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
         if is_real(at) or (isinstance(at, tuple) and any(isinstance(part, str) for part in at)):
             raise MultiPhiTypeError(f"point: got {at!r}, need the name of a point: points={{'name': {at!r}}}")
-        return _vector("row", at, self.n)
+        return checked_vector("row", at, self.n)
 
     @property
     def point_rows(self) -> np.ndarray:
@@ -146,7 +147,7 @@ class LinearStructure(Shown):
 
     def vector(self, name: str, given: Any) -> np.ndarray:
         """A copy of ``given`` as finite (n,) numbers; ``name`` is what an error calls it."""
-        return _vector(name, given, self.n)
+        return checked_vector(name, given, self.n)
 
 
 def damping_matrix(structure: LinearStructure) -> Matrix | None:
@@ -228,77 +229,6 @@ def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | 
     except scipy.linalg.LinAlgError as error:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
     return mass
-
-
-class _PointRows(Mapping[str, np.ndarray]):
-    """Rows (n,) by name, made when asked for: kept are the entries that are not zero, (places, values) each."""
-
-    def __init__(self, n: int, entries: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
-        self.n = n
-        self._entries = entries
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        row = np.zeros(self.n)
-        places, values = self._entries[name]
-        row[places] = values
-        row.flags.writeable = False
-        return row
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._entries
-
-    def __repr__(self) -> str:
-        return f"<rows of {self.n} degrees of freedom, by point: {names(list(self))}>"
-
-    def taken(self, moving: np.ndarray) -> _PointRows:
-        """The rows of these degrees of freedom alone; refused of a point that cannot move without the others."""
-        entries = {}
-        for name in self:
-            row = self[name]
-            if np.any(row) and not np.any(row[moving]):
-                raise MultiPhiValueError(f"points[{name!r}]: got a place that is fixed, need one that can move")
-            places = np.flatnonzero(row[moving])
-            entries[name] = places, row[moving][places]
-        return _PointRows(len(moving), entries)
-
-
-def _point_rows(given: Any, n: int, dofs: DofTable | None) -> _PointRows:
-    if isinstance(given, _PointRows) and given.n == n:
-        return given
-    if not isinstance(given, Mapping):
-        needed = f"{{name: DoF index, (node, component) or ({n},) row}}"
-        raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {needed}")
-    return _PointRows(n, {name: _point_entries(name, place, n, dofs) for name, place in given.items()})
-
-
-def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(name, str) or not name:
-        raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
-    if isinstance(given, tuple) and len(given) == 2 and (n != 2 or dofs is not None or isinstance(given[1], str)):
-        called = f"points[{name!r}]"
-        return np.array([known(called, dofs).place(called, *given)]), np.ones(1)
-    if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
-        if not 0 <= given < n:
-            raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")
-        return np.array([given]), np.ones(1)
-    row = _vector(f"points[{name!r}]", given, n)
-    places = np.flatnonzero(row)
-    return places, row[places]
-
-
-def _vector(name: str, given: Any, n: int) -> np.ndarray:
-    vector = real_array(name, given, f"an ({n},) array of real numbers")
-    if vector.shape != (n,):
-        raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
-    if not np.isfinite(vector).all():
-        raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
-    return vector
 
 
 def _coefficient(name: str, value: Any) -> float:

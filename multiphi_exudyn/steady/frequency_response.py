@@ -16,7 +16,7 @@ from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.loads import StaticLoad
+from multiphi_exudyn.mechanics.static_loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
 from multiphi_exudyn.time.trajectory import Trajectory

@@ -28,7 +28,9 @@ from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import BaseMotion, ConstantLoad, Gravity, HarmonicLoad, StaticLoad
+from multiphi_exudyn.mechanics.loads import HarmonicLoad
+from multiphi_exudyn.mechanics.moving_supports import BaseMotion
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.steady.shooting import PeriodMap, Shooting

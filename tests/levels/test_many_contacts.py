@@ -12,7 +12,8 @@ from small_structures import bed
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.mathematics.modes import right_singular_vectors
-from multiphi_exudyn.mechanics.beam import Beam, planar_beam
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.study.stability.run_laws import complaints
 

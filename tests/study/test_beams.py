@@ -7,7 +7,8 @@ import pytest
 from small_scene import BEAM, write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.beam import Beam, planar_beam
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.study.running.full_runner import run_full
 from multiphi_exudyn.study.running.reduced_runner import run_reduced

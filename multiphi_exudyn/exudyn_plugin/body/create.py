@@ -24,7 +24,8 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
 from multiphi_exudyn.time.trajectory import Trajectory

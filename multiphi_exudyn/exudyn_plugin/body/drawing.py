@@ -26,7 +26,8 @@ from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.sensors import rebuilt
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
-from multiphi_exudyn.mechanics.beam import Beam, beam_deflections
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.planar_beam import beam_deflections
 
 __all__ = ["Drawing", "check_drawing", "graphics_of"]
 

@@ -48,7 +48,8 @@ from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import ConstantLoad, Load
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Item", "Reduction", "reduce"]

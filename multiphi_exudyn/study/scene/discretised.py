@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.mechanics.assembly import Assembly, assemble
-from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, planar_beam
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.beams import Beams

@@ -17,7 +17,9 @@ from pydantic_core import PydanticCustomError
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import BaseMotion, Gravity, Load, StopMotion
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.static_loads import Gravity
 from multiphi_exudyn.study.scene.fields import Modes, Name, Positive, RelativeTolerance, Table
 
 if TYPE_CHECKING:

@@ -15,15 +15,15 @@ import numpy as np
 import scipy.optimize
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.levels.level import LevelOverride
+from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.beam import beam_nodes
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.planar_beam import beam_nodes
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec

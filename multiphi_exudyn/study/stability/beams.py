@@ -10,7 +10,8 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.mechanics.beam import Beam, PointMass, planar_beam
+from multiphi_exudyn.mechanics.beam import Beam, PointMass
+from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem

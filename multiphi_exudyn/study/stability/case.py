@@ -12,7 +12,8 @@ from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.time.trajectory import Trajectory
 

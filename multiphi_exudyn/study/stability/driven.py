@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads import BaseMotion, HarmonicLoad, SampledLoad, StopMotion
+from multiphi_exudyn.mechanics.loads import HarmonicLoad, SampledLoad
+from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR

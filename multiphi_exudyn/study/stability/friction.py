@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mechanics.assembly import assemble
-from multiphi_exudyn.mechanics.beam import planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import ConstantLoad, HarmonicLoad, Load, SampledLoad
+from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad
+from multiphi_exudyn.mechanics.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import chain, oscillator, stop

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.loads import ConstantLoad
+from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR

@@ -1,0 +1,57 @@
+"""Level override: measured frequencies and damping ratios in place of a level's computed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import real_array
+
+__all__ = ["LevelOverride"]
+
+
+@dataclass(frozen=True)
+class LevelOverride:
+    """Frequencies and damping ratios that replace the computed ones of a level's lowest modes.
+
+    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical (M, C, K):
+    such a level does not interlace, and a transition into it need not lower the energy. Mode shapes and static
+    deflections stay the computed ones, also those that a slowly varying load goes through.
+
+    Parameters
+    ----------
+    frequencies : sequence of float, default None
+        Of the lowest modes [Hz], lowest first, as many as are known; None keeps the computed ones.
+    ratios : sequence of float, default None
+        Damping ratios of the lowest modes, 0.01 is 1 %; None keeps the computed ones.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what are no real numbers.
+    MultiPhiValueError
+        For an array of numbers that is no list.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> measured = mp.LevelOverride(frequencies=[14.5])
+    >>> model = mp.MultiPhiModel(chain, overrides={(): measured})
+    >>> print(model.level(()).frequencies.round(1))
+    [14.5 39.7 57.4]
+    """
+
+    frequencies: Sequence[float] | None = None
+    ratios: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "ratios"):
+            if (given := getattr(self, name)) is not None:
+                values = real_array(f"level override {name}", given, "a list of numbers")
+                if values.ndim != 1:
+                    raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
+                object.__setattr__(self, name, tuple(values.tolist()))

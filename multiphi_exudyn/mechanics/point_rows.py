@@ -1,0 +1,88 @@
+"""Points of a structure: rows p of n numbers by name; the value of a point is p.x, a force F at it acts as p F."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.display import names
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.dofs import DofTable, known
+
+__all__ = ["PointRows", "checked_vector", "point_rows"]
+
+
+class PointRows(Mapping[str, np.ndarray]):
+    """Rows (n,) by name, made when asked for: kept are the entries that are not zero, (places, values) each."""
+
+    def __init__(self, n: int, entries: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
+        self.n = n
+        self._entries = entries
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        row = np.zeros(self.n)
+        places, values = self._entries[name]
+        row[places] = values
+        row.flags.writeable = False
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __repr__(self) -> str:
+        return f"<rows of {self.n} degrees of freedom, by point: {names(list(self))}>"
+
+    def taken(self, moving: np.ndarray) -> PointRows:
+        """The rows of these degrees of freedom alone; refused of a point that cannot move without the others."""
+        entries = {}
+        for name in self:
+            row = self[name]
+            if np.any(row) and not np.any(row[moving]):
+                raise MultiPhiValueError(f"points[{name!r}]: got a place that is fixed, need one that can move")
+            places = np.flatnonzero(row[moving])
+            entries[name] = places, row[moving][places]
+        return PointRows(len(moving), entries)
+
+
+def point_rows(given: Any, n: int, dofs: DofTable | None) -> PointRows:
+    """The rows of points given by degrees of freedom, places at nodes, or rows (n,)."""
+    if isinstance(given, PointRows) and given.n == n:
+        return given
+    if not isinstance(given, Mapping):
+        needed = f"{{name: DoF index, (node, component) or ({n},) row}}"
+        raise MultiPhiTypeError(f"points: got {type(given).__name__}, need {needed}")
+    return PointRows(n, {name: _point_entries(name, place, n, dofs) for name, place in given.items()})
+
+
+def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tuple[np.ndarray, np.ndarray]:
+    if not isinstance(name, str) or not name:
+        raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
+    if isinstance(given, tuple) and len(given) == 2 and (n != 2 or dofs is not None or isinstance(given[1], str)):
+        called = f"points[{name!r}]"
+        return np.array([known(called, dofs).place(called, *given)]), np.ones(1)
+    if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
+        if not 0 <= given < n:
+            raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")
+        return np.array([given]), np.ones(1)
+    row = checked_vector(f"points[{name!r}]", given, n)
+    places = np.flatnonzero(row)
+    return places, row[places]
+
+
+def checked_vector(name: str, given: Any, n: int) -> np.ndarray:
+    """(n,) finite numbers; an error calls them by the name."""
+    vector = real_array(name, given, f"an ({n},) array of real numbers")
+    if vector.shape != (n,):
+        raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
+    if not np.isfinite(vector).all():
+        raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
+    return vector
