@@ -32,6 +32,7 @@ NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 
 RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
+NOTHING = Loss()
 SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
 NOT_FINITE = "the motion is not finite"
 
@@ -76,7 +77,7 @@ class Motion:
         self._loop: Callable[..., Any] = loop or (advance if compiled is False else carry)
         self._measured: Measure = measure if compiled is False else measured
         self.model, self.levels = arrays.levels.model, arrays.levels
-        self.time, self.message, self.start_loss = start.time, "", Loss()
+        self.time, self.message, self.start_loss = start.time, "", NOTHING
         self.record = Record(self.model.contacts, self.arrays)
         self._state: State | None = start.state
         self._starting = True
@@ -98,7 +99,7 @@ class Motion:
 
     def go_on_from(self, state: State, time: float) -> None:
         """Forget what has been collected, and go on from a state and a time [s]."""
-        self._state, self.time, self.message, self.start_loss = state, time, "", Loss()
+        self._state, self.time, self.message, self.start_loss = state, time, "", NOTHING
         self._starting = False
         self.record = Record(self.model.contacts, self.arrays)
         self._kept = replace(self._kept, last_decision=time, decisions=0, ring=[], defects=math.nan)
@@ -259,7 +260,7 @@ class Motion:
         if not ints[a.STARTING]:
             if self._starting:
                 lost = given[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES]
-                self.start_loss = Loss(*lost) if any(lost) else Loss()
+                self.start_loss = Loss(*lost) if any(lost) else NOTHING
             self._state, self._starting = self._state_reached(), False
         samples = int(ints[a.FOUND]) + 1
         self._evaluations += int(numbers[samples])

@@ -48,6 +48,8 @@ TAKEN = (  # where in the loop's arrays they begin, and how many rows there are
 )
 COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
 
+FEW = 2  # levels: of more it is looked for those that hold at the times asked for
+
 STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 T = TypeVar("T")
@@ -204,7 +206,7 @@ class Record:
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         self._parts: dict[str, Growing] = {}
-        self._last: dict[str, np.ndarray] | None = None  # taken, and not among the parts yet
+        self._last: dict[str, np.ndarray] = {}  # taken, and not among the parts yet
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
     phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
@@ -218,7 +220,9 @@ class Record:
         self._keep(_taken(self.arrays, TAKEN[-2:]))
 
     def _keep(self, taken: dict[str, np.ndarray]) -> None:
-        if self._last is not None:
+        if not taken:
+            return
+        if self._last:
             self._add(self._last)
         self._last, rows = taken, taken.get("rows", EMPTY["rows"])
         packed = rows[:, 0].tolist()
@@ -230,21 +234,21 @@ class Record:
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        last = 0 if self._last is None else sum(part.nbytes for part in self._last.values())
+        last = sum(part.nbytes for part in self._last.values())
         return last + sum(part.bytes for part in self._parts.values())
 
     @property
     def parts(self) -> dict[str, Growing]:
         """The arrays, each in the parts in which they were taken."""
-        if self._last is not None or not self._parts:
-            taken, self._last = self._last or {}, None
+        if self._last or not self._parts:
+            taken, self._last = self._last, {}
             self._add(taken)
         return self._parts
 
     @property
     def eventless(self) -> bool:
         """Whether nothing has happened, as far as one sees without looking into it."""
-        return not self._parts and (self._last is None or "kinds" not in self._last)
+        return not self._parts and "kinds" not in self._last
 
     def _add(self, taken: dict[str, np.ndarray]) -> None:
         parts, rows = self._parts, taken.get("rows", EMPTY["rows"])
@@ -309,8 +313,10 @@ class Record:
 
     def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
         """row.(xi, xi', 1) (k,) at times (k,) [s]; row: (2 n + 1,) of a level with n coordinates."""
-        first, last = owners(self.spans[:, 0], np.array([times.min(), times.max()]), side).tolist()
-        visited = sorted(set(self.rows[first : last + 1, 0].tolist()))
+        visited = list(range(len(self.levels)))
+        if len(visited) > FEW:
+            first, last = owners(self.spans[:, 0], np.array([times.min(), times.max()]), side).tolist()
+            visited = sorted(set(self.rows[first : last + 1, 0].tolist()))
         width = max(self.levels[number].level.modes for number in visited)
         functions, result = np.zeros((len(self.levels), 2 * width + 1)), np.empty(len(times))
         for number in visited:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.mathematics import signal_bounds
+from multiphi_exudyn.time.simulate import Run
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
 TIP = 0.020
@@ -274,3 +275,24 @@ def test_whatever_the_scene_energy_falls_the_ledger_closes_and_nothing_penetrate
         if contact.rigid:
             assert np.min(run.gap(contact.name, t)) > -1e-9 * size
         assert np.min(run.contact_force(contact.name, t)) > -1e-7 * np.max(np.abs(run.acceleration(t)))
+
+
+class TestWorkOfAStart:
+    """What a short run does beside its loop."""
+
+    def test_a_start_with_all_contacts_open_is_what_each_of_them_says(self):
+        contacts = [mp.UnilateralContact("stop", "m3", 0.1), mp.UnilateralContact("soft", "m1", 0.2, 500.0)]
+        quick, thorough = chain(contacts), chain(contacts)
+        thorough.__dict__["general"] = True  # as where elements have more states than two
+        x = np.array([0.01, -0.02, 0.03, -0.04])
+        found, expected = (Run(model, 1.0, x, -x).begun().start for model in (quick, thorough))
+        for one, other in zip(dataclasses.astuple(found), dataclasses.astuple(expected), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+    def test_nothing_of_a_record_is_sorted_before_somebody_asks(self):
+        model = chain([mp.UnilateralContact("stop", "m3", 0.1)])
+        run = mp.simulate(model, 1e-3, displacement=np.array([0.01, 0.02, 0.03, 0.04]))
+        record = run.segments._record
+        assert (len(run.segments), record.bytes, record._parts) == (1, run.stats.record_bytes, {})
+        assert run.segments[0].end == 1e-3
+        assert set(record._parts) == {"rows", "spans", "coordinates", "phases", "kinds", "amounts"}
