@@ -294,26 +294,38 @@ def test_of_two_feet_of_a_rigid_body_one_sticks_for_both(amplitude):
     assert_allclose(*found, rtol=0, atol=1e-12)
 
 
+def sled(arms, height, stiffness, friction=0.37):
+    """A body that only its feet hold along x; weak springs hold how deep it sinks, and how it tips."""
+    along = np.array([1.0, 0.0, height])
+    feet = [
+        mp.UnilateralContact(name, np.array([0.0, 1.0, x]), 0.0, stiffness, friction=friction, tangential=along)
+        for name, x in zip(("rear", "front"), arms, strict=True)
+    ]
+    structure = mp.LinearStructure(np.diag([1.0, 1.0, 0.5]), np.diag([0.0, 0.1, 0.1]))
+    return mp.MultiPhiModel(structure, feet, modes="all"), [mp.ConstantLoad(np.array([0.0, -1.0, 0.0]), G)]
+
+
 @pytest.mark.parametrize("stiffness", [math.inf, 1e3])
 @pytest.mark.parametrize("height", [0.0, 0.3, 0.7])
 def test_a_sled_on_two_feet_stops_where_its_speed_is_spent(stiffness, height):
-    """Nothing but its feet holds it, along one line; they share its weight, m g, as its friction tips it."""
-    mu, weight, speed = 0.37, 9.81, 1.3
-    along = np.array([1.0, 0.0, height])
-    feet = [
-        mp.UnilateralContact(name, np.array([0.0, 1.0, x]), 0.0, stiffness, friction=mu, tangential=along)
-        for name, x in (("rear", -1.0), ("front", 1.0))
-    ]
-    model = mp.MultiPhiModel(mp.LinearStructure(np.diag([1.0, 1.0, 0.5]), np.zeros((3, 3))), feet, modes="all")
-    sunk, gravity = weight / (2 * stiffness), mp.ConstantLoad(np.array([0.0, -1.0, 0.0]), weight)
-    run = mp.simulate(model, 1.0, [0.0, -sunk, 0.0], [speed, 0.0, 0.0], [gravity])
-    t = np.linspace(0, 1, 41)
-    end = speed / (mu * weight)
+    """They share its weight, m g, as its friction tips it: no round-off of that couples its free motion."""
+    speed, sunk, t = 1.3, G / (2 * stiffness + 0.1), np.linspace(0, 1, 41)
+    model, weight = sled((-1.0, 1.0), height, stiffness)
+    run = mp.simulate(model, 1.0, [0.0, -sunk, 0.0], [speed, 0.0, 0.0], weight)
+    pressure, end = G - 0.1 * sunk, speed / (0.37 * (G - 0.1 * sunk))
     assert run.status == "ok"
     if math.isinf(stiffness) or height == 0.0:
         s = np.minimum(t, end)
-        assert_allclose(run.displacement(t)[0], speed * s - mu * weight * s**2 / 2, atol=1e-11)
+        assert_allclose(run.displacement(t)[0], speed * s - 0.37 * pressure * s**2 / 2, atol=1e-11)
         assert min(e.time for e in run.events if e.kind == "stick" and e.time > 0) == pytest.approx(end, rel=1e-12)
     both = run.contact_force("rear", t) + run.contact_force("front", t)
-    assert_allclose(both, weight, rtol=1e-9)
+    assert_allclose(both, pressure, rtol=1e-9)
     assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_sled_on_elastic_feet_begins_at_rest():
+    """Their frictions hold one motion: one of them sticks from the start."""
+    model, weight = sled((-0.8, 1.3), 0.3, 1e3)
+    run = mp.simulate(model, 1.0, [0.0, -G / 2e3, 0.0], np.zeros(3), weight)
+    assert run.status == "ok"
+    assert_allclose(run.displacement(1.0)[0] + 0.3 * run.displacement(1.0)[2], 0.0, atol=1e-15)
