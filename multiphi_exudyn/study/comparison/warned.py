@@ -26,6 +26,5 @@ def _nudged(comparison: Comparison) -> Iterable[str]:
         if early:
             yield (
                 f"sensitivity: with a start changed by 1e-12 a run stays within {percent(float(tolerance))} of this "
-                f"one until: {listed(early)}; after that trust contact times and energies on the whole, not single "
-                "values"
+                f"one until: {listed(early)}; after that trust contact times and energies, not single values"
             )
