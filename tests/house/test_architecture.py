@@ -205,6 +205,6 @@ def test_the_package_shows_its_public_names_and_its_rooms_and_no_others():
     assert set(public.__all__) <= set(dir(mp))
     assert mp.__all__ == public.__all__
     assert all(getattr(mp, name) is getattr(public, name) for name in public.__all__)
-    assert mp.mechanics.beam.planar_beam is mp.planar_beam
+    assert mp.mechanics.planar_beam.planar_beam is mp.planar_beam
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = mp.simulat
