@@ -29,7 +29,7 @@ def in_units(scene, time, length, mass):
     points = dict(old.points)
     structure = mp.LinearStructure(old.mass * mass, old.stiffness * stiff, damping, points)
     contacts = []
-    for item in _items(model):
+    for item in model.contacts:
         if isinstance(item, mp.ForceLaw):
             contacts.append(mp.ForceLaw(item.at, (item.knots * length, item.forces * force), name=item.name))
         elif isinstance(item, mp.Friction):
@@ -49,12 +49,6 @@ def in_units(scene, time, length, mass):
         scene.velocity * (length / time),
         loads,
     )
-
-
-def _items(model):
-    """Contacts, laws and frictions as they were given."""
-    laws = dict.fromkeys(contact.law for contact in model.contacts if hasattr(contact, "law"))
-    return [*(contact for contact in model.contacts if not hasattr(contact, "law")), *laws]
 
 
 def _load_in_units(load, time, length, mass, force):
