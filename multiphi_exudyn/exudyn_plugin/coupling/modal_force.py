@@ -81,7 +81,7 @@ class _Level:
     """Constants of a level, and how forces change them: numbers[places] = constants + gains . (p, reactions).
 
     inverse: S^-1 (r, r). linear, squares: of its energy without forces, whose constant stands at
-    ``energy``. exits: their records; elements: theirs. ends: what is looked at; mobility: where F has its place.
+    ``energy``. exits: their records; elements: theirs. watched: exits that are looked at; mobility: where F stands.
     """
 
     states: tuple[int, ...]
@@ -95,7 +95,7 @@ class _Level:
     squares: np.ndarray
     exits: list[int]
     elements: list[int]
-    ends: np.ndarray
+    watched: np.ndarray
     mobility: int
 
 
@@ -246,7 +246,7 @@ class HeldForces:
             squares=numbers[energy + 1 + n :][:r].copy(),
             exits=exits.tolist(),
             elements=[element for element, _ in ways],
-            ends=ints[ints[level + a.WATCHED] :][: ints[level + a.WATCHED_COUNT]].copy(),
+            watched=ints[ints[level + a.WATCHED] :][: ints[level + a.WATCHED_COUNT]].copy(),
             mobility=mobility,
         )
 
@@ -262,16 +262,16 @@ class HeldForces:
     def _limit(self, level: int, plain: _Level) -> None:
         """What hangs on the structure: the mobility that it leaves, and the contacts that still are looked at."""
         ints, r = self.arrays.ints, len(plain.inverse)
-        ints[level + a.MOBILITY], ends = -1, plain.ends
+        ints[level + a.MOBILITY], watched = -1, plain.watched
         if self._inertia is not None:
             ints[level + a.MOBILITY] = plain.mobility
             root = self._inertia.mobility(plain.states)
             self.arrays.numbers[plain.mobility : plain.mobility + r * r] = root.ravel()
             held = self._inertia.held
-            ends = np.array([k for k in ends.tolist() if plain.elements[k] not in held], dtype=np.int64)
+            watched = np.array([k for k in watched.tolist() if plain.elements[k] not in held], dtype=np.int64)
         start = int(ints[level + a.WATCHED])
-        ints[start : start + len(ends)] = ends
-        ints[level + a.WATCHED_COUNT] = len(ends)
+        ints[start : start + len(watched)] = watched
+        ints[level + a.WATCHED_COUNT] = len(watched)
 
 
 def _nothing(states: tuple[int, ...]) -> Acting:
