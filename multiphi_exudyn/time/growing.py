@@ -6,11 +6,13 @@ import numpy as np
 
 __all__ = ["Growing"]
 
-BLOCK = 2**15  # rows of a block: some megabytes, that go back to the system when blocks are joined
+BLOCK = 2**15  # rows of a block at most: some megabytes, that go back to the system when blocks are joined
 
 
 class Growing:
     """An array to which parts are added, in blocks that are joined when somebody looks at it.
+
+    A block has room for as many rows as there are already, up to ``BLOCK``.
 
     count: rows so far. bytes: what the blocks take.
     """
@@ -29,7 +31,7 @@ class Growing:
         last = self._blocks[-1]
         if self._used + len(part) > len(last):
             self._blocks[-1] = last[: self._used]
-            last = np.empty((max(BLOCK, len(part)), *part.shape[1:]), part.dtype)
+            last = np.empty((max(min(BLOCK, self.count), len(part)), *part.shape[1:]), part.dtype)
             self._blocks.append(last)
             self._used = 0
             self.bytes += last.nbytes

@@ -21,6 +21,7 @@ from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
 from multiphi_exudyn.time.sampling import sample_rows, sample_states
 from multiphi_exudyn.time.segment import Segment, Segments, owners
+from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
 
 __all__ = ["PHASES", "Record"]
@@ -28,25 +29,6 @@ __all__ = ["PHASES", "Record"]
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
 states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
-
-EMPTY = {
-    "rows": np.empty((0, a.SEGMENT_WIDTH), np.int64),
-    "spans": np.empty((0, a.SEGMENT_WIDTH_NUMBERS)),
-    "coordinates": np.empty(0),
-    "phases": np.empty(0, np.int64),
-    "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
-    "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
-}
-
-TAKEN = (  # where in the loop's arrays they begin, and how many rows there are
-    ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT),
-    ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT),
-    ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT),
-    ("phases", a.PHASE_INTS, a.PHASE_COUNT),
-    ("kinds", a.EVENT_INTS, a.EVENT_COUNT),
-    ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT),
-)
-COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
 
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
 
@@ -174,21 +156,6 @@ def _joined(name: str) -> property:
     return property(lambda record: record.parts[name].whole)
 
 
-def _taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int]]) -> dict[str, np.ndarray]:
-    """Copies of those of the ``wanted`` of ``TAKEN`` that have rows; all of them are then empty in the arrays."""
-    ints, numbers, _ = arrays.buffers.all
-    slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
-    for name, slot, counted in wanted:
-        if slots[counted]:
-            empty, start = EMPTY[name], slots[slot]
-            width = empty.shape[-1] or 1
-            part = (numbers if empty.dtype == float else ints)[start : start + slots[counted] * width].copy()
-            parts[name] = part if empty.ndim == 1 else part.reshape(-1, width)
-    for counted in COUNTS:
-        ints[counted] = 0
-    return parts
-
-
 class Record:
     """Segments and events of a run, in arrays that grow by parts.
 
@@ -213,18 +180,18 @@ class Record:
 
     def take(self) -> None:
         """Take over what the loop has written."""
-        self._keep(_taken(self.arrays, TAKEN))
+        self._keep(taken(self.arrays, PARTS))
 
     def take_events(self) -> None:
         """Take over the events of what the loop has written, and forget the rest."""
-        self._keep(_taken(self.arrays, TAKEN[-2:]))
+        self._keep(taken(self.arrays, EVENTS))
 
-    def _keep(self, taken: dict[str, np.ndarray]) -> None:
-        if not taken:
+    def _keep(self, part: dict[str, np.ndarray]) -> None:
+        if not part:
             return
         if self._last:
             self._add(self._last)
-        self._last, rows = taken, taken.get("rows", EMPTY["rows"])
+        self._last, rows = part, part.get("rows", EMPTY["rows"])
         packed = rows[:, 0].tolist()
         known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
         rows[:, 0] = [known[number] for number in packed]
@@ -241,8 +208,8 @@ class Record:
     def parts(self) -> dict[str, Growing]:
         """The arrays, each in the parts in which they were taken."""
         if self._last or not self._parts:
-            taken, self._last = self._last, {}
-            self._add(taken)
+            part, self._last = self._last, {}
+            self._add(part)
         return self._parts
 
     @property
@@ -250,16 +217,16 @@ class Record:
         """Whether nothing has happened, as far as one sees without looking into it."""
         return not self._parts and "kinds" not in self._last
 
-    def _add(self, taken: dict[str, np.ndarray]) -> None:
-        parts, rows = self._parts, taken.get("rows", EMPTY["rows"])
+    def _add(self, part: dict[str, np.ndarray]) -> None:
+        parts, rows = self._parts, part.get("rows", EMPTY["rows"])
         if parts:
             rows[:, 2] += parts["kinds"].count
             rows[:, 3] += parts["coordinates"].count
             rows[rows[:, 4] >= 0, 4] += parts["phases"].count
         else:
             self._parts = parts = {name: Growing(empty) for name, empty in EMPTY.items()}
-        for name, part in taken.items():
-            parts[name].add(part)
+        for name, given in part.items():
+            parts[name].add(given)
 
     def _number(self, level: LoadedLevel) -> int:
         """The number of a level in this record; the arrays may have packed it twice."""

@@ -1,0 +1,47 @@
+"""Taken: what the loop has recorded (loop_record.py), copied out of its arrays as it stands there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays
+
+__all__ = ["EMPTY", "EVENTS", "PARTS", "taken"]
+
+EMPTY = {
+    "rows": np.empty((0, a.SEGMENT_WIDTH), np.int64),
+    "spans": np.empty((0, a.SEGMENT_WIDTH_NUMBERS)),
+    "coordinates": np.empty(0),
+    "phases": np.empty(0, np.int64),
+    "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
+    "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
+}
+
+PARTS = (  # where in the loop's arrays they begin, and how many rows there are
+    ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT),
+    ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT),
+    ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT),
+    ("phases", a.PHASE_INTS, a.PHASE_COUNT),
+    ("kinds", a.EVENT_INTS, a.EVENT_COUNT),
+    ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT),
+)
+COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
+EVENTS = PARTS[-2:]
+
+
+def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int]]) -> dict[str, np.ndarray]:
+    """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
+    ints, numbers, _ = arrays.buffers.all
+    slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
+    for name, slot, counted in wanted:
+        if slots[counted]:
+            empty, start = EMPTY[name], slots[slot]
+            width = empty.shape[-1] or 1
+            part = (numbers if empty.dtype == float else ints)[start : start + slots[counted] * width].copy()
+            parts[name] = part if empty.ndim == 1 else part.reshape(-1, width)
+    for counted in COUNTS:
+        ints[counted] = 0
+    return parts
