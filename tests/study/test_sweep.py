@@ -17,7 +17,7 @@ from sweep_functions import Unloadable, logged, many, odd_fails, square, sweep_l
 from multiphi_exudyn.study.sweep import Outcome, Row, Store, grid, open_executor, sweep
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-FEW, MANY = [0, 0, 0, 1, 2], [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
+FEW, MANY = [0, 0, 1, 4, 6], [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
 
 
 @pytest.fixture

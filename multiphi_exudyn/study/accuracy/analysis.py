@@ -277,7 +277,7 @@ def _holds(error: float | None, tolerance: float) -> bool:
 def _lasting(settings: Sequence[Setting], refine: Mapping[str, str | None]) -> list[float | None]:
     """Of each setting the worst error of it and of those that are finer in their method's field ``refine`` alone."""
     rows = [_refined(setting, refine.get(setting.method) or "") for setting in settings]
-    frame = pd.DataFrame(rows, columns=["alike", "value", "error"])
+    frame = pd.DataFrame(rows, columns=["alike", "value", "error"]).astype({"value": float, "error": float})
     worst = frame.sort_values("value").groupby("alike").error.cummax().sort_index()
     return [None if math.isinf(error) else float(error) for error in worst]
 

@@ -100,7 +100,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     judged = run_laws.still(trajectory) and not problem.driven
     rise = _share(run_laws.energy_rise(trajectory, ends), largest) if judged else residual
     return Judgement(
-        laws=tuple(run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven)),
+        laws=tuple(run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven, budget=budget)),
         energy=rise,
         residual=residual,
         events=len(trajectory.events),

@@ -42,17 +42,19 @@ def complaints(
     joule: float = 1.0,
     metre: float = 1.0,
     varying: bool = False,
+    budget: float = np.inf,
 ) -> list[str]:
     """Everything that is wrong with a run.
 
     samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time,
-    whose work only the ledger knows.
+    whose work only the ledger knows. budget: samples of a contact on a segment, beyond which it is not looked for what
+    is missed there.
     """
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
     looked_at = ends_of(run, most)
     scale = largest_energy(run, looked_at, joule)
-    checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre)]
+    checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre, budget)]
     if not varying and still(run):
         checks.append(energy(run, looked_at, scale))
     return [complaint for complaint in checks if complaint]
@@ -133,7 +135,9 @@ def energy_rise(run: Trajectory, segments: Sequence[Segment], samples: int = 5) 
     return float(np.max(rises, initial=0.0)) - max(returned, 0.0)
 
 
-def missed(run: Trajectory, segments: Sequence[Segment], samples: float, metre: float = 1.0) -> str | None:
+def missed(
+    run: Trajectory, segments: Sequence[Segment], samples: float, metre: float = 1.0, budget: float = np.inf
+) -> str | None:
     """No contact leaves its state's admissible range unheard: s >= 0 (events/decision.py) on every segment.
 
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
@@ -147,6 +151,8 @@ def missed(run: Trajectory, segments: Sequence[Segment], samples: float, metre: 
         most = np.max(np.abs(_load(run, segment))) if signal.of == "reaction" else reach * signal.per_metre()
         largest[key] = max(largest.get(key, 0.0), own, signal.arm * most)
     for segment, contact, heard, signal in looked_at:
+        if signal.samples(segment.end - segment.start, samples) > budget:
+            continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
         unresolved = np.finfo(float).eps * segment.end * signal.steepness(at)

@@ -77,13 +77,17 @@ class Signal:
         phi = np.exp(wide * self.basis.rates.astype(np.clongdouble)) * (wide / self.basis.unit) ** self.basis.powers
         return (phi @ self.coefficients.astype(np.clongdouble)).real + np.longdouble(self.constant)
 
+    def samples(self, duration: float, per_period: float) -> int:
+        """How many it takes on [0, duration], so many in the shortest period."""
+        fastest = np.max(np.abs(self.basis.rates), initial=0.0)
+        return int(np.ceil(per_period * duration * fastest / (2 * np.pi))) + 8
+
     def lowest(self, duration: float, samples: float) -> tuple[float, float]:
         """(lowest value on [0, duration], where); only the values below zero need be right."""
-        fastest = np.max(np.abs(self.basis.rates), initial=0.0)
         curvature = self._bound(self.basis.derivative(self.basis.derivative(self.coefficients)), duration)
         if self.constant > self._bound(self.coefficients, duration):
             return self.constant - self._bound(self.coefficients, duration), 0.0
-        count = int(np.ceil(samples * duration * fastest / (2 * np.pi))) + 8
+        count = self.samples(duration, samples)
         step, best = duration / count, (np.inf, 0.0)
         for first in range(0, count + 1, BLOCK):
             t = step * np.arange(first, min(first + BLOCK, count) + 1)
