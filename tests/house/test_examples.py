@@ -115,7 +115,7 @@ def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
     time = np.arange(0.0, 2.0005, 1e-3)
     slower = np.sin(2 * np.pi * 6.0 * time) + 0.1 * np.sin(2 * np.pi * 37.0 * time)
     assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
-    monkeypatch.setattr(example, "STUDIES", ("clamp",))
+    monkeypatch.setattr(example, "STUDIES", {"clamp": "rotation [N m/rad]"})
     found = example.main(["--quick", str(picture)])["clamp"]
     for free, limit, rise in found.values():
         assert free < 4.01
