@@ -173,7 +173,7 @@ class Level(Shown):
         rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
-        closed_directions = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)])
+        closed_directions, _ = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)]).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
         names = [self.base.label(closed_directions.members[s][0]) for s in springs.tolist()]
         rows, elastic = closed_directions.vectors[:, springs].T, self.base.modes.omega > 0

@@ -87,7 +87,7 @@ def _known(model: MultiPhiModel, segments: Segments) -> tuple[tuple[str, ...], .
 
     def made() -> tuple[tuple[str, ...], ...]:
         levels = [level.modal for level in segments.levels]
-        static = static_warnings([level.level for level in segments.levels])
+        static = () if model.whole else static_warnings([level.level for level in segments.levels])
         return (*damping_warnings(model), *_missing_modes(model)), tuple(static), tuple(_clusters(levels))
 
     found: tuple[tuple[str, ...], ...] = model.entries.get_or_build(("warnings", visited), made)

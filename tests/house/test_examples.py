@@ -118,7 +118,7 @@ def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
     assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
     shipped = Path(cases.__file__).parent / "shipped" / "clamp.toml"
     (tmp_path / "clamp.toml").write_text(shipped.read_text().replace("step = 2e-5", "step = 1e-4"))  # of the full beam
-    monkeypatch.setattr(example, "STUDIES", (str(tmp_path / "clamp.toml"),))
+    monkeypatch.setattr(example, "STUDIES", {str(tmp_path / "clamp.toml"): "rotation [N m/rad]"})
     (found,) = example.main(["--quick", str(picture)]).values()
     for free, limit, rise in found.values():
         assert free < 4.01

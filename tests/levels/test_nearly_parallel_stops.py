@@ -54,6 +54,21 @@ def test_two_stops_of_nearly_one_direction_hold_both_directions_and_their_reacti
     assert_allclose(model.base.modes.shapes @ found.configuration, [0.0, 0.0, 4 / 7], atol=1e-15)
 
 
+@pytest.mark.parametrize("angle", [1e-3, 1e-6, 1e-9])
+def test_the_flexibility_that_two_stops_leave_a_third_is_known(angle):
+    """They hold the first two of four masses; a spring of 2 N/m at the third is left with the third and fourth."""
+    pair = np.array([[4.0, -1.0], [-1.0, 4.0]])
+    stiffness = np.block([[np.diag([3.0, 5.0]), np.zeros((2, 2))], [np.zeros((2, 2)), pair]])
+    contacts = [UnilateralContact("one", np.eye(4)[0], 0.0), UnilateralContact("two", [1.0, angle, 0.0, 0.0], 0.0)]
+    soft = UnilateralContact("soft", [1.0, 0.0, 1.0, 0.0], 0.0, 2.0)
+    model = MultiPhiModel(LinearStructure(np.eye(4), stiffness), [*contacts, soft], modes="all")
+    level = model.level(("one", "two", "soft"))
+    squares, shapes = np.linalg.eigh(pair + np.diag([2.0, 0.0]))
+    left = shapes[0, 1] ** 2 / squares[1] / np.sum(shapes[0] ** 2 / squares)
+    assert level.static_shares["soft"] == pytest.approx(0.0, abs=1e-12)
+    assert level.truncated(1).static_shares["soft"] == pytest.approx(left, rel=1e-9)
+
+
 @pytest.mark.parametrize("angle", [1e-11, 1e-13])
 def test_below_the_threshold_the_second_follows_from_the_first(angle):
     contacts = [UnilateralContact("one", [1.0, 0.0], 0.0), UnilateralContact("two", [1.0, angle], 0.0)]

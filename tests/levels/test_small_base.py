@@ -82,7 +82,7 @@ def test_its_error_is_that_of_its_levels(monkeypatch, k):
     error = np.max((found - exact) / exact)
     assert error > ACCURATE
     assert error / 3 < model.base.error < 3 * error
-    with pytest.warns(mp.MultiPhiWarning, match="base: omega.2 of levels may be off by"):
+    with pytest.warns(mp.MultiPhiWarning, match="base: squares of frequencies of levels may be off by"):
         mp.simulate(model, 0.01, displacement=model.level(()).shapes[:, 0])
 
 
