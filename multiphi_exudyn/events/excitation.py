@@ -150,6 +150,11 @@ class Excitation:
         carriers = max((len(np.unique(history.rates)) for history in self.histories), default=0)
         return self.pieces(end) * (CARRIER_EFFORT if carriers > 1 else 1)
 
+    @functools.cached_property
+    def highest_frequency(self) -> float:
+        """Of what varies [Hz], zero where nothing does."""
+        return max((history.highest_frequency for history in self.histories), default=0.0)
+
     def drive(self, time: float) -> Drive:
         """The channels from a time on, until the first of their pieces ends."""
         pieces = [history.local(time) for history in self.histories]

@@ -52,7 +52,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.WATCHED: put("ints", range(firsts[-1])),
         a.WATCHED_COUNT: firsts[-1],
         **_frequencies(buffers, modal.omega),
-        a.HIGHEST_FREQUENCY: put("numbers", [own.highest_frequency]),
+        a.HIGHEST_FREQUENCY: put("numbers", [max(own.highest_frequency, level.excitation.highest_frequency)]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
         **{slot: put("numbers", values) for slot, values in parts.items()},
     }

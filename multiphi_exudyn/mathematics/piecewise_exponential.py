@@ -113,6 +113,12 @@ class PiecewiseExponential:
         """Number of pieces n."""
         return len(self.rates)
 
+    @property
+    def highest_frequency(self) -> float:
+        """Of its carriers [Hz], and of straight pieces, two of which are a swing."""
+        straight = 0.5 / float(np.min(np.diff(self.breaks))) if self.coefficients.shape[1] == 2 else 0.0
+        return max(straight, float(np.max(np.abs(self.rates.imag))) / (2 * math.pi))
+
     @functools.cached_property
     def derivative(self) -> PiecewiseExponential:
         """u', piece by piece."""

@@ -1,4 +1,4 @@
-"""Chatter: more events in a short time than the modes can follow."""
+"""Chatter: more events in a short time than modes and loads can follow."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["allowed", "window"]
 
-EVENTS_PER_PERIOD = 20  # of the highest kept mode, for every contact: more, over CHATTER_WINDOW events, is chatter
+EVENTS_PER_PERIOD = 20  # of the fastest mode or load, for every contact: more, over CHATTER_WINDOW, is chatter
 CHATTER_WINDOW = 200  # events, for every contact
 
 
@@ -19,7 +19,10 @@ def window(model: MultiPhiModel) -> int:
 
 
 def allowed(model: MultiPhiModel) -> float:
-    """How many of them a period of the highest kept mode may hold; a swing passes every knot of a law twice."""
+    """How many of them a period of the highest kept mode or load may hold.
+
+    A swing passes every knot of a law twice.
+    """
     return EVENTS_PER_PERIOD * _plain(model) + 2 * sum(law.levels for law in model.force_laws)
 
 

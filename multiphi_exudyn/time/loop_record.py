@@ -109,7 +109,7 @@ def keep_events(ints: Ints, numbers: Numbers) -> None:
 
 @compiled
 def is_chatter(ints: Ints, numbers: Numbers) -> int:
-    """1 where the last window of decisions holds more than ALLOWED in a period of the highest mode, or no time."""
+    """1 where the last window of decisions holds more than ALLOWED in a period of the fastest, or no time."""
     window, decisions, ring = ints[WINDOW], ints[DECISIONS], ints[RING]
     if decisions <= window:
         return 0

@@ -293,7 +293,7 @@ class Motion:
             f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
             "need fewer modes or a shorter run",
             a.CHATTER: f"chatter: {self._window} events in {told[0]:g} s, more than {self._allowed} in a period of the "
-            f"highest kept mode ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
+            f"highest kept mode or load ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
             a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
             a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
             + ("" if complete else " in the kept modes, need more of them"),
