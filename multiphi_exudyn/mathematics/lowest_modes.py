@@ -167,17 +167,36 @@ class _Lowest:
         further = count - len(self.values)
         while further > 0:
             self._add(further)
+            while self._add_missed():
+                pass
             most = self.mass.shape[0] - 2 - len(self.values)
             further = min(2 * further, most) if len(self.values) < self._least and further < most else 0
 
     def _add(self, further: int) -> None:
         """So many more, by the compliance without those that are there."""
-        known, own = self.vectors, self.values + self.shift
+        values, vectors = _lanczos(self.mass, self.stiffness, further, self.shift, self._beyond)
+        self._take(values, vectors)
 
-        def answer(x: np.ndarray) -> np.ndarray:
-            return self.solve(x) - known @ ((known.T @ x) / own)
+    def _add_missed(self) -> bool:
+        """Whether there was one more below the last: of modes of one frequency an iteration may see a part alone."""
+        if not len(self.values) or len(self.values) >= self.mass.shape[0] - 1:
+            return False
+        value, vector = _iterated(self.mass, self.stiffness, 1, self.shift, self._beyond)
+        missed = bool(value[0] + self.shift <= (1 + NEAR) * (self.values[-1] + self.shift))
+        if missed:
+            self._take(value, vector)
+            order = np.argsort(self.values, kind="stable")
+            self.values, self.vectors = self.values[order], self.vectors[:, order]
+        return missed
 
-        values, vectors = _lanczos(self.mass, self.stiffness, further, self.shift, answer)
+    def _beyond(self, x: np.ndarray) -> np.ndarray:
+        """A^-1 of a vector (n,) without the modes that are there."""
+        known = self.vectors
+        return np.asarray(self.solve(x) - known @ ((known.T @ x) / (self.values + self.shift)))
+
+    def _take(self, values: np.ndarray, vectors: np.ndarray) -> None:
+        """Modes beside those that are there."""
+        known = self.vectors
         vectors = vectors - known @ (known.T @ (self.mass @ vectors))
         self.values, self.vectors = np.concatenate([self.values, values]), np.hstack([known, vectors])
 
@@ -310,15 +329,21 @@ def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -
 
     answer: to a force, A^-1, or what other modes leave of it.
     """
+    values, vectors = _iterated(mass, stiffness, count + 1, shift, answer)
+    apart = np.flatnonzero(np.diff(values) > NEAR * np.abs(values[1:]))
+    whole = count >= stiffness.shape[0] - 2  # there is no more to part them from
+    kept = count if whole and not apart.size else (apart[-1] + 1 if apart.size else 0)
+    return values[:kept], vectors[:, :kept]
+
+
+def _iterated(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The ``count`` lowest omega^2 that a Lanczos iteration sees, ascending, and their shapes."""
     n = stiffness.shape[0]
     start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
     operator = scipy.sparse.linalg.LinearOperator((n, n), answer, dtype=float)
     try:
-        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count + 1, mass, sigma=-shift, OPinv=operator, v0=start)
+        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=-shift, OPinv=operator, v0=start)
     except scipy.sparse.linalg.ArpackError as error:
         raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
     order = np.argsort(values)
-    apart = np.flatnonzero(np.diff(values[order]) > NEAR * np.abs(values[order][1:]))
-    whole = count >= n - 2  # there is no more to part them from
-    kept = order[:count] if whole and not apart.size else order[: apart[-1] + 1 if apart.size else 0]
-    return values[kept], vectors[:, kept]
+    return values[order], vectors[:, order]
