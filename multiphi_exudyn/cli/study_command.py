@@ -6,11 +6,12 @@ import sys
 from pathlib import Path
 
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.accuracy.analysis import StudyResult, cheapest, points, settings, times_faster, words
+from multiphi_exudyn.study.accuracy.analysis import cheapest, points, settings, times_faster, words
 from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times

@@ -11,7 +11,6 @@ from small_study import result_of, row, small_study, timing
 
 from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
-    Setting,
     cheapest,
     front,
     full_methods,
@@ -24,6 +23,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     words,
 )
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
+from multiphi_exudyn.study.accuracy.study_result import Setting
 from multiphi_exudyn.study.accuracy.study_table import csv_text
 
 STEP = {"step": 1e-4}

@@ -364,8 +364,8 @@ class TestTables:
         far = CaseResult("far", "Far.", (Outcome("native", energy=1e-3), Outcome("user object", difference=0.5)))
         near = CaseResult("near", "Near.", (Outcome("native", energy=1e-9), Outcome("user object", difference=0.1)))
         loop, body = summaries([near, far])
-        assert (loop.energy_case, loop.difference_case) == ("far", "")
-        assert (body.energy_case, body.difference_case) == ("", "far")
+        assert (loop["energy_case"], loop["difference_case"]) == ("far", "")
+        assert (body["energy_case"], body["difference_case"]) == ("", "far")
         assert [(case, o.model, o.message) for case, o in failures(RESULTS)] == [("sound", "user object", "a cause")]
         page = render_stability([near, far, *RESULTS], {}, quick=True)
         for name in ("far", "sound"):

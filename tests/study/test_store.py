@@ -13,7 +13,7 @@ import pytest
 
 from multiphi_exudyn.errors import MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.study.sweep import Row, Store
-from multiphi_exudyn.study.sweep.store import pack
+from multiphi_exudyn.study.sweep.row import pack
 
 
 def row(parameters, **fields):

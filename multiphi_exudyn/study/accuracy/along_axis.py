@@ -17,9 +17,10 @@ from typing import Any
 
 import pandas as pd
 
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, names_of, references, settings
+from multiphi_exudyn.study.accuracy.analysis import names_of, references, settings
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, is_number
-from multiphi_exudyn.study.sweep.store import key_of
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
+from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = ["FINEST", "Series", "Table", "numeric_axes", "series", "tables_along"]
 

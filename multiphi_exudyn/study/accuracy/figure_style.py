@@ -19,8 +19,9 @@ from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Transform
 
 from multiphi_exudyn.study.accuracy.along_axis import FINEST
-from multiphi_exudyn.study.accuracy.analysis import StudyResult, full_methods, names_of, settings
+from multiphi_exudyn.study.accuracy.analysis import full_methods, names_of, settings
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE
+from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.comparison.plots import CONTACT, RESOLUTION, WIDTH
 from multiphi_exudyn.study.comparison.wording import seconds
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from multiphi_exudyn.study.accuracy.analysis import StudyResult, error_of
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE
+from multiphi_exudyn.study.accuracy.study_result import StudyResult, error_of
 
 __all__ = ["indicators", "rank_correlation"]
 

@@ -18,7 +18,7 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from multiphi_exudyn.study.accuracy.analysis import Intervals, MapPair
+from multiphi_exudyn.study.accuracy.study_result import Intervals, MapPair
 from multiphi_exudyn.study.comparison.plots import RESOLUTION, WIDTH
 from multiphi_exudyn.study.measures.spectra import Map
 

@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.accuracy.along_axis import numeric_axes
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, references, settings, words
+from multiphi_exudyn.study.accuracy.analysis import references, settings, words
 from multiphi_exudyn.study.accuracy.figure_style import GRID, value_axis
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.plots import RESOLUTION, WIDTH
 
 __all__ = ["over_all_points", "response_figure"]

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, settings_at
+from multiphi_exudyn.study.accuracy.analysis import settings_at
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 
 __all__ = ["StiffError", "stiff_errors"]
 

@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.study.accuracy.analysis import MapPair, Setting, StudyResult, settings
+from multiphi_exudyn.study.accuracy.analysis import settings
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
+from multiphi_exudyn.study.accuracy.study_result import MapPair, Setting, StudyResult
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
@@ -30,8 +31,9 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Workbench, prepare
+from multiphi_exudyn.study.sweep.row import Row
 from multiphi_exudyn.study.sweep.run import Function, Outcome
-from multiphi_exudyn.study.sweep.store import Row, Store
+from multiphi_exudyn.study.sweep.store import Store
 from multiphi_exudyn.study.sweep.sweep import sweep
 
 __all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "run_study"]

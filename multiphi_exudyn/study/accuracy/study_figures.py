@@ -15,16 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
-from multiphi_exudyn.study.accuracy.analysis import (
-    Setting,
-    StudyResult,
-    front,
-    names_of,
-    references,
-    settings_at,
-    uncertainty,
-    words,
-)
+from multiphi_exudyn.study.accuracy.analysis import front, names_of, references, settings_at, uncertainty, words
 from multiphi_exudyn.study.accuracy.direct_labels import Label, place_labels
 from multiphi_exudyn.study.accuracy.figure_style import (
     GRID,
@@ -44,6 +35,7 @@ from multiphi_exudyn.study.accuracy.figure_style import (
 )
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_figure"]

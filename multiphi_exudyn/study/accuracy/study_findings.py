@@ -8,8 +8,6 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from multiphi_exudyn.study.accuracy.analysis import (
-    Setting,
-    StudyResult,
     cheapest,
     full_methods,
     longest,
@@ -26,10 +24,11 @@ from multiphi_exudyn.study.accuracy.analysis import (
 from multiphi_exudyn.study.accuracy.overview import over_all_points
 from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.comparison.wording import percent
-from multiphi_exudyn.study.sweep.store import Row
+from multiphi_exudyn.study.sweep.row import Row
 
 __all__ = ["Choice", "Findings", "choices", "error_words", "findings", "most_accurate", "shown_points"]
 

@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 from multiphi_exudyn.study.accuracy import study_figures
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
-    Setting,
-    StudyResult,
     full_methods,
     names_of,
     points,
@@ -36,6 +34,7 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     most_accurate,
     shown_points,
 )
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.accuracy.study_zoom import error_against_time
 from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.plots import data_uri

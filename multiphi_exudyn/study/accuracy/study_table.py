@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from multiphi_exudyn.study.accuracy.analysis import StudyResult, error_of
-from multiphi_exudyn.study.sweep.store import Row, key_of
+from multiphi_exudyn.study.accuracy.study_result import StudyResult, error_of
+from multiphi_exudyn.study.sweep.row import Row, key_of
 
 __all__ = ["csv_text", "table"]
 

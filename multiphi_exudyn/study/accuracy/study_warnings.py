@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, longest, named, settings, words
+from multiphi_exudyn.study.accuracy.analysis import longest, named, settings, words
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
-from multiphi_exudyn.study.sweep.store import Row
+from multiphi_exudyn.study.sweep.row import Row
 from multiphi_exudyn.time.warning_groups import WarningGroup, grouped
 
 __all__ = ["warned"]

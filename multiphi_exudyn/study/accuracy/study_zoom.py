@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from multiphi_exudyn.study.accuracy.analysis import Setting, StudyResult, front, settings_at, uncertainty, words
+from multiphi_exudyn.study.accuracy.analysis import front, settings_at, uncertainty, words
 from multiphi_exudyn.study.accuracy.figure_style import styles
+from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.zoom import zoom_line, zoom_plot
 
 __all__ = ["error_against_time"]

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from multiphi_exudyn.study.comparison import contact_plots, plots
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotals, contact_totals
+from multiphi_exudyn.study.comparison.energy_plot import energy_figure
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import LossTable
 from multiphi_exudyn.study.comparison.mode_plots import mode_figure
@@ -97,7 +98,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
         yield from _friction_pictures(comparison)
         yield _picture(
             "energy",
-            plots.energy_figure(comparison),
+            energy_figure(comparison),
             "Where a bar ends short of 100 %, time integration has lost energy; beyond, it has gained some.",
         )
     if levels:

@@ -10,43 +10,33 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.beam import Beam, Clamp
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
-from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.scene.fields import numbered, one_of
+from multiphi_exudyn.study.scene.demands import Demands
+from multiphi_exudyn.study.scene.described import beam_of, damping_of, matrices_of
+from multiphi_exudyn.study.scene.fields import one_of
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
-from multiphi_exudyn.study.scene.model_kinds import Demands
 from multiphi_exudyn.study.scene.scene_file import (
-    DampingSpec,
     DisplacedStart,
-    ModalDampingSpec,
 )
 from multiphi_exudyn.study.scene.scene_friction import check_friction, described_friction, friction_of
 from multiphi_exudyn.study.scene.scene_laws import check_laws, described_laws, law_of
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 from multiphi_exudyn.study.scene.structure_tables import (
-    BeamSpec,
     BeamsStructure,
-    MatrixFiles,
     MatrixStructure,
-    PointRow,
-    RectangleSection,
     RigStructure,
-    SectionSpec,
     StructureSpec,
 )
 from reference_models.beams import Beams, as_beams
@@ -115,7 +105,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
     rubbing = tuple(_at(scene, f"friction[{i}]", partial(friction_of, s)) for i, s in enumerate(scene.file.friction))
     mechanics = replace(mechanics, contacts=mechanics.contacts + own, force_laws=laws, frictions=rubbing)
     if scene.file.damping is not None:
-        mechanics = replace(mechanics, damping=_damping(scene.file.damping))
+        mechanics = replace(mechanics, damping=damping_of(scene.file.damping))
     _check_points(scene, mechanics)
     _check_contacts(scene, mechanics)
     check_laws(scene, mechanics.contacts, mechanics.force_laws)
@@ -137,12 +127,12 @@ def _structure(scene: Scene, spec: StructureSpec) -> Mechanics:
             assumptions=(*assumptions(spec.rig, clamp), *_scene_assumptions(scene, spec)),
         )
     if isinstance(spec, MatrixStructure):
-        matrices = _at(scene, "structure", lambda: _matrices(scene.path.parent, spec))
+        matrices = _at(scene, "structure", lambda: matrices_of(scene.path.parent, spec))
         return Mechanics((), matrices.damping, matrices=matrices)
     if isinstance(spec, BeamsStructure):
-        parts = {n: _at(scene, f"structure.beams.{n}", partial(_beam, part)) for n, part in spec.beams.items()}
+        parts = {n: _at(scene, f"structure.beams.{n}", partial(beam_of, part)) for n, part in spec.beams.items()}
         return Mechanics((), None, beams=_at(scene, "structure", lambda: Beams(parts, spec.ties)))
-    return Mechanics((), None, beams=as_beams(_at(scene, "structure.beam", lambda: _beam(spec.beam))))
+    return Mechanics((), None, beams=as_beams(_at(scene, "structure.beam", lambda: beam_of(spec.beam))))
 
 
 def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
@@ -167,64 +157,6 @@ def _scene_assumptions(scene: Scene, spec: RigStructure) -> Iterator[str]:
 
 def _assumed_start(size: str, load_at: str) -> str:
     return f"start of this scene: {size} by a static force at {load_at} (assumed: no number is printed)"
-
-
-def _beam(spec: BeamSpec) -> Beam:
-    return Beam(
-        [_section(section) for section in spec.sections],
-        dict(_points(spec)),
-        [PointMass(mass.at, mass.mass, mass.inertia) for mass in spec.masses],
-        Clamp(spec.clamp.translation, spec.clamp.rotation),
-    )
-
-
-def _points(spec: BeamSpec) -> Iterator[tuple[str, float]]:
-    for name, at in spec.points.items():
-        if not isinstance(at, PointRow):
-            yield name, at
-        elif "{i}" not in name:
-            raise MultiPhiValueError(f"points: got the name {name!r} for {at.count} points, need one with {{i}}")
-        else:
-            places = np.linspace(at.first, at.last, at.count).tolist()
-            yield from ((numbered(name, i), x) for i, x in enumerate(places, start=1))
-
-
-def _section(spec: SectionSpec) -> Section:
-    if isinstance(spec, RectangleSection):
-        return Section.rectangle(**spec.model_dump())
-    return Section(**spec.model_dump())
-
-
-def _matrices(folder: Path, spec: MatrixStructure) -> LinearStructure:
-    files = spec.matrices
-    if isinstance(files, MatrixFiles):
-        rows = {name: _own_row(folder, name, at) if isinstance(at, str) else at for name, at in spec.points.items()}
-        damping = None if files.damping is None else folder / files.damping
-        return read_structure(folder / files.mass, folder / files.stiffness, damping, rows)
-    arrays = read_arrays("matrices", folder / files)
-    return LinearStructure(
-        _array(arrays, "mass"),
-        _array(arrays, "stiffness"),
-        arrays.get("damping"),
-        {name: _array(arrays, at) if isinstance(at, str) else at for name, at in spec.points.items()},
-    )
-
-
-def _own_row(folder: Path, name: str, path: str) -> np.ndarray:
-    row = read_array(f"points[{name!r}]", folder / path)
-    return np.squeeze(row.toarray() if scipy.sparse.issparse(row) else row)
-
-
-def _array(arrays: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    if name not in arrays:
-        raise MultiPhiValueError(f"matrices: got the arrays {', '.join(arrays) or 'none'}, need {name!r}")
-    return arrays[name]
-
-
-def _damping(spec: DampingSpec) -> ModalDamping | RayleighDamping:
-    if isinstance(spec, ModalDampingSpec):
-        return ModalDamping(spec.modal_ratios, spec.beyond)
-    return RayleighDamping(spec.alpha, spec.beta)
 
 
 def _check_points(scene: Scene, mechanics: Mechanics) -> None:

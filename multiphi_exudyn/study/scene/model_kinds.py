@@ -7,19 +7,28 @@ its runner (multiphi_exudyn.study.running). A new kind is a class here, its plac
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.static_loads import Gravity
+from multiphi_exudyn.study.scene.demands import (
+    Demands,
+    Fault,
+    Lack,
+    beams_only,
+    between_two,
+    factors,
+    no_damping,
+    no_friction,
+    no_laws,
+    no_loads,
+    no_sparse,
+    no_weight,
+    not_round,
+    single_points,
+)
 from multiphi_exudyn.study.scene.fields import Modes, Name, Positive, RelativeTolerance, Table
 
 if TYPE_CHECKING:
@@ -27,8 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CraigBamptonModel",
-    "Demands",
-    "Fault",
     "FullModel",
     "GlobalBasisModel",
     "ModelSpec",
@@ -38,75 +45,6 @@ __all__ = [
     "TrainedBasisModel",
     "UserObjectModel",
 ]
-
-
-@dataclass(frozen=True)
-class Demands:
-    """What a scene asks of its models. given_as: its structure; printed: whether levels have printed frequencies."""
-
-    given_as: Literal["beams", "dense", "sparse"]
-    contacts: Sequence[UnilateralContact]
-    laws: Sequence[ForceLaw]
-    frictions: Sequence[Friction]
-    loads: Sequence[Load]
-    printed: bool
-
-    @property
-    def moving_stops(self) -> bool:
-        """Whether a stop moves beside the structure."""
-        return any(isinstance(load, StopMotion) or getattr(load, "fixed_stops", ()) for load in self.loads)
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A wrong field, of the model's own entry or, with ``whole``, of the file: what was given, what is needed."""
-
-    field: str
-    given: object
-    needed: str
-    whole: bool = False
-
-
-Lack = Callable[[Demands], Iterator[str]]  # why another kind is needed
-
-
-def _loads(demands: Demands) -> Iterator[str]:
-    if demands.loads:
-        yield "this one has no loads"
-
-
-def _weight(demands: Demands) -> Iterator[str]:
-    if any(isinstance(load, (Gravity, BaseMotion)) for load in demands.loads):
-        yield "this one has neither weight nor moving base"
-
-
-def _sparse(demands: Demands) -> Iterator[str]:
-    if demands.given_as == "sparse":
-        yield "this one takes dense matrices"
-
-
-def _matrices(demands: Demands) -> Iterator[str]:
-    if demands.given_as != "beams":
-        yield "matrices have no full model"
-
-
-def _friction(demands: Demands) -> Iterator[str]:
-    yield from (f"its contacts have no friction, {c.name} has" for c in demands.contacts if c.friction)
-    yield from (f"this one has no friction, and there is {friction.name}" for friction in demands.frictions)
-
-
-def _damping(demands: Demands) -> Iterator[str]:
-    yield from (f"its contacts have no damping, {c.name} has" for c in demands.contacts if c.damping)
-
-
-def _laws(demands: Demands) -> Iterator[str]:
-    yield from (f"this one has no force laws, and there is {law.name}" for law in demands.laws)
-
-
-def _pairs(demands: Demands) -> Iterator[str]:
-    for contact in demands.contacts:
-        if len(_factors(contact.direction)) > 1:
-            yield f"its contacts act on single points, {contact.name} on {len(_factors(contact.direction))}"
 
 
 class _Model(Table):
@@ -192,7 +130,7 @@ class FullModel(_Model):
     newton_tolerance: Positive = 1e-5  # relative and absolute
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_matrices,)
+    lacks: ClassVar[tuple[Lack, ...]] = (beams_only,)
     penalty: ClassVar[bool] = True
 
     def filled(self, default: int) -> FullModel:
@@ -204,20 +142,20 @@ class FullModel(_Model):
         for contact in demands.contacts:
             if contact.friction and math.isinf(contact.tangential_stiffness):
                 yield self._springless(f"tangential_stiffness of contact {contact.name}")
-            factors = _factors(contact.direction)
-            if len(factors) > 1 and (not _between_two(factors) or not factors[0]):
+            given = factors(contact.direction)
+            if len(given) > 1 and (not between_two(given) or not given[0]):
                 yield self._another("contacts act on a point, or between two", contact.name, contact.direction)
         for i, friction in enumerate(demands.frictions):
             if friction.rigid:
                 yield self._springless(f"friction[{i}].stiffness")
-            factors = _factors(friction.direction)
-            if len(factors) > 1 and not _between_two(factors):
-                yield self._another("friction acts on a point, or between two", friction.name, len(factors))
+            given = factors(friction.direction)
+            if len(given) > 1 and not between_two(given):
+                yield self._another("friction acts on a point, or between two", friction.name, len(given))
         for law in demands.laws:
-            if len(_factors(law.at)) > 1:
-                yield self._another("force laws act on single points", law.name, len(_factors(law.at)))
+            if len(factors(law.at)) > 1:
+                yield self._another("force laws act on single points", law.name, len(factors(law.at)))
         if self.contact == "circle":
-            yield from (Fault("contact", "circle", f"'coordinate': {why}") for why in _not_round(demands))
+            yield from (Fault("contact", "circle", f"'coordinate': {why}") for why in not_round(demands))
 
     def _springless(self, field: str) -> Fault:
         return Fault(field, "inf", f"a finite one: {self.name} has friction with a spring in series", whole=True)
@@ -235,7 +173,7 @@ class CraigBamptonModel(_Model):
     newton_tolerance: Positive = 1e-6  # relative and absolute
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_sparse, _loads, _friction, _damping, _laws, _pairs)
+    lacks: ClassVar[tuple[Lack, ...]] = (no_sparse, no_loads, no_friction, no_damping, no_laws, single_points)
     penalty: ClassVar[bool] = True
 
 
@@ -247,7 +185,7 @@ class StepwiseModel(_Model):
     method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
     rtol: RelativeTolerance
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_loads, _friction, _damping, _laws)
+    lacks: ClassVar[tuple[Lack, ...]] = (no_loads, no_friction, no_damping, no_laws)
     penalty: ClassVar[bool] = True
 
     def own_faults(self, demands: Demands) -> Iterator[Fault]:
@@ -263,7 +201,7 @@ class GlobalBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
     contact: Literal["as-given", "rigid"] = "as-given"
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_weight, _friction)
+    lacks: ClassVar[tuple[Lack, ...]] = (no_weight, no_friction)
 
 
 class TrainedBasisModel(_Model):
@@ -273,7 +211,7 @@ class TrainedBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None
     training: Positive = 0.1  # s, of the scene's own motion from its start
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_weight, _friction, _laws)
+    lacks: ClassVar[tuple[Lack, ...]] = (no_weight, no_friction, no_laws)
 
 
 class SplittingModel(_Model):
@@ -283,7 +221,7 @@ class SplittingModel(_Model):
     modes: Annotated[int, Field(ge=0)]  # with the interface held
     step: Positive  # s
 
-    lacks: ClassVar[tuple[Lack, ...]] = (_sparse, _loads, _friction, _damping, _laws)
+    lacks: ClassVar[tuple[Lack, ...]] = (no_sparse, no_loads, no_friction, no_damping, no_laws)
     penalty: ClassVar[bool] = True
 
 
@@ -297,23 +235,3 @@ ModelSpec = (
     | TrainedBasisModel
     | SplittingModel
 )
-
-
-def _not_round(demands: Demands) -> Iterator[str]:
-    """Why a round support will not do."""
-    if demands.moving_stops:
-        yield "a round support does not move"
-    for contact in demands.contacts:
-        if contact.damping:
-            yield "a round support has no damping"
-        if len(_factors(contact.direction)) > 1:
-            yield f"a round support does not move, {contact.name} is between two points"
-
-
-def _factors(at: object) -> list[float]:
-    """Coefficients of the points something acts on."""
-    return list(at.values()) if isinstance(at, Mapping) else [1.0]
-
-
-def _between_two(factors: Sequence[float]) -> bool:
-    return len(factors) == 2 and sum(factors) == 0

@@ -2,47 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
+import pandas as pd
+
+from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.stability.judgement import BEYOND
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
 from multiphi_exudyn.study.stability.run_laws import CLOSES
 from multiphi_exudyn.time.warning_groups import grouped
 
-__all__ = ["ModelSummary", "contents", "failures", "headline", "summaries", "warned"]
+__all__ = ["contents", "failures", "headline", "summaries", "warned"]
+
+TEMPLATE = "headline.txt.j2"
+STATUSES = (OK, FAILED, NOT_RUN)
+WORST = ("energy", "residual", "beyond", "difference")  # figures of which the largest one counts
+LOCATED = ("energy", "difference")  # of these the case is told
 
 
-@dataclass(frozen=True)
-class ModelSummary:
-    """Of one model in all cases: how many ended how, its worst figures, and the time of all its runs [s].
+def summaries(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
+    """Of every model in all cases: how many runs ended how, the worst figures, and the time [s] of all its runs.
 
-    energy_case, difference_case: the case that is the worst one, "" without any.
+    energy_case, difference_case: the case with the worst one, "" without any. None for what no run has.
     """
-
-    model: str
-    ok: int
-    failed: int
-    not_run: int
-    wrong: int
-    energy: float | None
-    residual: float | None
-    beyond: float | None
-    missed: int | None
-    difference: float | None
-    time_s: float
-    energy_case: str
-    difference_case: str
+    runs = _runs(results)
+    answers = runs.assign(**{name: runs[name].where(runs.status == OK) for name in WORST})
+    of_model = answers.groupby("model", sort=False)
+    counts = pd.crosstab(runs.model, runs.status).reindex(columns=STATUSES, fill_value=0)
+    worst = of_model[list(WORST)].max()
+    cases = {f"{name}_case": of_model[[name, "case"]].apply(_case_of, name) for name in LOCATED}
+    missed, time_s = of_model.missed.sum(min_count=1), of_model.time_s.sum()
+    found = worst.join(counts.rename(columns={NOT_RUN: "not_run"}))
+    found = found.assign(**cases, wrong=of_model.wrong.sum(), missed=missed, time_s=time_s).reset_index()
+    return [{str(name): _known(value) for name, value in row.items()} for row in found.to_dict("records")]
 
 
-def summaries(results: Sequence[CaseResult]) -> list[ModelSummary]:
-    """One of every model, in the order of the table."""
-    by_model: dict[str, dict[str, Outcome]] = {}
-    for result in results:
-        for outcome in result.outcomes:
-            by_model.setdefault(outcome.model, {})[result.name] = outcome
-    return [_summary(name, cases) for name, cases in by_model.items()]
+def _runs(results: Sequence[CaseResult]) -> pd.DataFrame:
+    """A row for every case and model."""
+    rows = [
+        {**asdict(outcome), "case": result.name, "wrong": bool(outcome.wrong)}
+        for result in results
+        for outcome in result.outcomes
+    ]
+    return pd.DataFrame(rows).astype(dict.fromkeys((*WORST, "missed", "time_s"), float))
+
+
+def _case_of(runs: pd.DataFrame, name: str) -> str:
+    """The case with the largest figure."""
+    found = runs.dropna(subset=name).sort_values(name, ascending=False, kind="stable")
+    return "" if found.empty else str(found["case"].iloc[0])
+
+
+def _known(value: Any) -> Any:
+    """A figure, None where there is none; whole ones as such."""
+    if not isinstance(value, float):
+        return value
+    return None if pd.isna(value) else int(value) if value.is_integer() else value
 
 
 def failures(results: Sequence[CaseResult]) -> list[tuple[str, Outcome]]:
@@ -50,34 +67,6 @@ def failures(results: Sequence[CaseResult]) -> list[tuple[str, Outcome]]:
     models = list(dict.fromkeys(outcome.model for result in results for outcome in result.outcomes))
     failed = [(result.name, o) for result in results for o in result.outcomes if o.status == FAILED]
     return sorted(failed, key=lambda found: models.index(found[1].model))
-
-
-def _summary(name: str, cases: Mapping[str, Outcome]) -> ModelSummary:
-    outcomes = list(cases.values())
-
-    def worst(value: Callable[[Outcome], float | None]) -> float | None:
-        return max((found for o in outcomes if o.status == OK and (found := value(o)) is not None), default=None)
-
-    def where(value: Callable[[Outcome], float | None]) -> str:
-        found = worst(value)
-        return "" if found is None else next(case for case, o in cases.items() if o.status == OK and value(o) == found)
-
-    missed = [o.missed for o in outcomes if o.missed is not None]
-    return ModelSummary(
-        model=name,
-        ok=sum(o.status == OK for o in outcomes),
-        failed=sum(o.status == FAILED for o in outcomes),
-        not_run=sum(o.status == NOT_RUN for o in outcomes),
-        wrong=sum(bool(o.wrong) for o in outcomes),
-        energy=worst(lambda o: o.energy),
-        residual=worst(lambda o: o.residual),
-        beyond=worst(lambda o: o.beyond),
-        missed=sum(missed) if missed else None,
-        difference=worst(lambda o: o.difference),
-        time_s=sum(o.time_s or 0.0 for o in outcomes),
-        energy_case=where(lambda o: o.energy),
-        difference_case=where(lambda o: o.difference),
-    )
 
 
 def warned(results: Sequence[CaseResult]) -> list[str]:
@@ -88,10 +77,8 @@ def warned(results: Sequence[CaseResult]) -> list[str]:
 
 def headline(results: Sequence[CaseResult]) -> str:
     """The outcome in one sentence."""
-    wrong = [result.name for result in results if result.wrong]
-    silent = [result.name for result in results if not result.answered]
-    told = f"{len(results)} cases, none wrong" if not wrong else f"{len(results)} cases, wrong: {', '.join(wrong)}"
-    return f"{told}; without an answer, with a cause: {', '.join(silent)}." if silent else f"{told}."
+    (told,) = sentences(__package__ or "", TEMPLATE, ["outcome"], results=results)["outcome"]
+    return told
 
 
 def contents(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> dict[str, Any]:
@@ -100,7 +87,7 @@ def contents(results: Sequence[CaseResult], environment: dict[str, Any], quick: 
         "environment": environment,
         "quick": quick,
         "limits": {"residual": CLOSES, "beyond_m": BEYOND},
-        "models": [asdict(summary) for summary in summaries(results)],
+        "models": summaries(results),
         "cases": {
             result.name: {
                 "hard": result.hard,

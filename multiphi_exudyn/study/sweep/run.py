@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_info
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.study.running.environment import machine
-from multiphi_exudyn.study.sweep.store import STATUSES, Row, pack, plain
+from multiphi_exudyn.study.sweep.row import STATUSES, Row, pack, plain
 from multiphi_exudyn.study.sweep.time_limit import call_within
 
 __all__ = ["Function", "Outcome", "ended", "run_case"]

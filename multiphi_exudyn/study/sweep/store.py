@@ -23,26 +23,23 @@ import contextlib
 import hashlib
 import io
 import json
-import math
 import os
 import sqlite3
 import tempfile
 import warnings
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.study.sweep.log import Log, read_log
+from multiphi_exudyn.study.sweep.row import STATUSES, Row, checked, key_of, plain
 
-__all__ = ["STATUSES", "Row", "Store", "checked", "key_of", "pack", "plain"]
+__all__ = ["Store"]
 
-STATUSES = ("ok", "failed", "over budget")
 FORMAT = 2
 MARK = int.from_bytes(b"mPhi", "big")  # SQLite's application id, bytes 68 to 71 of the file
 WAIT_S = 60.0  # s, for another process that writes
@@ -63,23 +60,6 @@ COMMIT;
 SUMMED = ("name", "key", "parameters", "status", "message", "content", "elapsed_s", "finished", "histories_sum")
 ROW = f"""SELECT {", ".join(f"runs.{column}" for column in SUMMED)}, environments.content, sum
 FROM runs LEFT JOIN environments ON environments.number = environment WHERE name = ?"""
-
-
-@dataclass(frozen=True)
-class Row:
-    """How the run with these parameters ended.
-
-    status: "ok", "failed" or "over budget"; message: the cause where it is not "ok". elapsed_s: s of wall clock.
-    environment: machine and versions. finished: ISO 8601, UTC.
-    """
-
-    parameters: Mapping[str, Any]
-    status: str
-    message: str
-    values: Mapping[str, Any]
-    elapsed_s: float
-    environment: Mapping[str, Any]
-    finished: str
 
 
 class Store:
@@ -174,51 +154,6 @@ class _Damaged(Exception):
 
 FULL = "database or disk is full"  # SQLite's words for it
 READING = (sqlite3.Error, UnicodeDecodeError, _Damaged)  # raised where a file is damaged
-
-
-def key_of(parameters: Mapping[str, Any]) -> str:
-    """sha256 of the parameters' canonical JSON."""
-    canonical = json.dumps(checked(parameters), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(canonical.encode()).hexdigest()
-
-
-def checked(parameters: Mapping[str, Any], place: str = "parameters") -> dict[str, Any]:
-    """The parameters as JSON has them, all numbers finite."""
-    if not isinstance(parameters, Mapping):
-        raise MultiPhiTypeError(f"{place}: {type(parameters).__name__}; need a mapping from names to values")
-    return plain(parameters, place, _refused)
-
-
-def plain(value: Any, place: str, not_finite: Callable[[float, str], Any] = lambda value, place: None) -> Any:
-    """``value`` as JSON has it: NumPy's numbers become Python's, tuples lists; ``not_finite`` answers for nan, inf."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if isinstance(value, int):
-        return int(value)
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else not_finite(value, place)
-    if isinstance(value, (list, tuple)):
-        return [plain(item, f"{place}[{index}]", not_finite) for index, item in enumerate(value)]
-    if isinstance(value, Mapping) and all(isinstance(name, str) for name in value):
-        return {str(name): plain(item, f"{place}[{name!r}]", not_finite) for name, item in value.items()}
-    kind = "a mapping with names that are no text" if isinstance(value, Mapping) else type(value).__name__
-    raise MultiPhiValueError(f"{place}: {kind}; need numbers, text, bool, None, lists and mappings of them")
-
-
-def pack(histories: Mapping[str, np.ndarray]) -> bytes:
-    """The arrays as a compressed npz file."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in histories.items():
-            with archive.open(f"{name}.npy", "w") as entry:
-                np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
-    return buffer.getvalue()
-
-
-def _refused(value: float, place: str) -> Any:
-    raise MultiPhiValueError(f"{place}: {value}; need a finite number")
 
 
 def _sum(*columns: Any) -> str:

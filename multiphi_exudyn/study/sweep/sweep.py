@@ -28,8 +28,9 @@ from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.study.sweep.executors import InProcess, worker_died, workers_of
+from multiphi_exudyn.study.sweep.row import Row, checked, key_of
 from multiphi_exudyn.study.sweep.run import Function, Outcome, ended, run_case
-from multiphi_exudyn.study.sweep.store import Row, Store, checked, key_of
+from multiphi_exudyn.study.sweep.store import Store
 
 __all__ = ["grid", "sweep"]
 
