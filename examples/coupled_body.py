@@ -30,10 +30,11 @@ import numpy as np
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, LinearizedStructure, body_histories, linear_structure_from
 from multiphi_exudyn.mechanics.beam import Beam, Clamp
-from reference_models.beam_system import DEFLECTION, BeamSystem, build_beam_system
+from reference_models.beam_system import BeamSystem, build_beam_system
 from reference_models.beams import as_beams
 from reference_models.exudyn_quiet import quiet
 from reference_models.full_beam_settings import FullBeamSettings
+from reference_models.laid_beam import DEFLECTION
 from reference_models.point_contact import point_contacts
 from reference_models.rig import rig_beam
 from reference_models.solver_settings import simulation_settings

@@ -15,9 +15,10 @@ import numpy as np
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import reduce
 from multiphi_exudyn.mechanics.structure import damping_matrix
-from reference_models.beam_system import DEFLECTION, build_beam_system
+from reference_models.beam_system import build_beam_system
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_run import FullRun
+from reference_models.laid_beam import DEFLECTION
 from reference_models.rig import rig_beam, rig_damping
 
 RING = mp.Friction("ring", "node2", limit=3.0, stiffness=2e4)

@@ -1,9 +1,7 @@
 """The Exudyn system of planar beams with contact elements: Exudyn's y is the beams' z.
 
-Elements are ANCFCable2D or ObjectBeamGeometricallyExact2D, point masses and the damping matrix are
-ObjectGenericODE2 items on the beam's own nodes, contacts are penalty elements on the node at their point.
-A beam's start is always held along its axis; a finite clamp stiffness acts through coordinate springs
-(on the slope y' in the ANCF beam, which is the sine of the rotation).
+The beams are laid by laid_beam.py. The damping matrix is an ObjectGenericODE2 item on the beams' own nodes, contacts
+are penalty elements on the node at their point.
 
 A viscous contact and a force law are springs with a user function, ObjectConnectorCoordinateSpringDamper: the
 damping of ObjectContactCoordinate pulls at the end of a contact, and no element has a force law of one's own.
@@ -11,10 +9,8 @@ damping of ObjectContactCoordinate pulls at the end of a contact, and no element
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import exudyn as exu
@@ -22,24 +18,16 @@ import exudyn.itemInterface as eii
 import numpy as np
 
 from multiphi_exudyn.mechanics.assembly import Tie
-from multiphi_exudyn.mechanics.beam import Beam
-from multiphi_exudyn.mechanics.planar_beam import beam_nodes
-from multiphi_exudyn.mechanics.section import Section
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
+from reference_models.laid_beam import AXIAL, DEFLECTION, Place, coordinate_marker, lay_beam
 from reference_models.point_contact import PointContact
 from reference_models.point_friction import FrictionConnector, PointFriction, add_friction, connector_of
 from reference_models.point_law import PointLaw
 from reference_models.rubbing import Rub
 
-__all__ = ["AXIAL", "DEFLECTION", "BeamSystem", "Stop", "bending_coordinates", "build_beam_system"]
+__all__ = ["BeamSystem", "Stop", "build_beam_system"]
 
-AXIAL, DEFLECTION = 0, 1  # coordinates of a node of either kind
-_ROTATION = {"ancf": 3, "geometrically-exact": 2}  # the slope y', or the angle
-_BENDS = {
-    "ancf": (False, True, False, True),
-    "geometrically-exact": (False, True, True),
-}  # of (x, y, x', y'), (x, y, phi)
 _CIRCLE_SEGMENTS = 3  # straight pieces an element is divided into where it meets a round support
 
 
@@ -108,9 +96,9 @@ def build_beam_system(
     """
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    ground = _marker(mbs, mbs.AddNode(eii.NodePointGround()), AXIAL)
-    laid = {name: _add_beam(mbs, beam, settings, ground) for name, beam in beams.parts.items()}
-    places = {point: _Place(laid[name], x) for point, (name, x) in beams.points.items()}
+    ground = coordinate_marker(mbs, mbs.AddNode(eii.NodePointGround()), AXIAL)
+    laid = {name: lay_beam(mbs, beam, settings, ground) for name, beam in beams.parts.items()}
+    places = {point: Place(laid[name], x) for point, (name, x) in beams.points.items()}
     for tie in beams.ties:
         _add_tie(mbs, tie, ground, places)
     stops = {contact.name: Stop(contact) for contact in contacts}
@@ -128,7 +116,9 @@ def build_beam_system(
     driver = mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=list(nodes))) if driven else None
     load = None
     if load_at is not None:
-        load = mbs.AddLoad(eii.LoadCoordinate(markerNumber=_marker(mbs, places[load_at].node, DEFLECTION), load=0.0))
+        load = mbs.AddLoad(
+            eii.LoadCoordinate(markerNumber=coordinate_marker(mbs, places[load_at].node, DEFLECTION), load=0.0)
+        )
     mbs.Assemble()
     first = np.array([mbs.GetNodeODE2Index(node) for node in nodes])
     points = {point: nodes.index(place.node) for point, place in places.items()}
@@ -139,134 +129,34 @@ def build_beam_system(
     return system
 
 
-def bending_coordinates(kind: str, count: int) -> np.ndarray:
-    """Which of the ``count`` coordinates of beams, node after node, are deflections or rotations, (count,)."""
-    bends = _BENDS[kind]
-    return np.tile(bends, count // len(bends))
-
-
-@dataclass(frozen=True)
-class _LaidBeam:
-    """positions: (nodes,) [m]; elements between its nodes."""
-
-    positions: np.ndarray
-    nodes: tuple[Any, ...]
-    elements: list[Any]
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Of a point: its beam and x [m]."""
-
-    beam: _LaidBeam
-    x: float
-
-    @property
-    def number(self) -> int:
-        """Number of its node along its beam."""
-        return _nearest(self.beam.positions, self.x)
-
-    @property
-    def node(self) -> Any:
-        """Its node."""
-        return self.beam.nodes[self.number]
-
-
-def _add_beam(mbs: Any, beam: Beam, settings: FullBeamSettings, ground: Any) -> _LaidBeam:
-    positions = beam_nodes(beam, settings.elements)
-    nodes = tuple(_add_node(mbs, settings.kind, x) for x in positions)
-    elements = [
-        _add_element(mbs, settings.kind, beam.section_at((left + right) / 2), right - left, nodes[i : i + 2])
-        for i, (left, right) in enumerate(pairwise(positions))
-    ]
-    _add_point_masses(mbs, beam, settings.kind, positions, nodes)
-    _add_clamp(mbs, beam, settings.kind, ground, nodes[0])
-    return _LaidBeam(positions, nodes, elements)
-
-
-def _add_tie(mbs: Any, tie: Tie, ground: Any, places: Mapping[str, _Place]) -> None:
+def _add_tie(mbs: Any, tie: Tie, ground: Any, places: Mapping[str, Place]) -> None:
     """Exudyn holds factor1 q(marker 1) - q(marker 0) at zero."""
     (tied, coefficient), *rest = tie.items()
-    markers = [_marker(mbs, places[point].node, DEFLECTION) for point, _ in rest] or [ground]
+    markers = [coordinate_marker(mbs, places[point].node, DEFLECTION) for point, _ in rest] or [ground]
     factor = -rest[0][1] / coefficient if rest else 1.0
     mbs.AddObject(
         eii.ObjectConnectorCoordinate(
-            markerNumbers=[_marker(mbs, places[tied].node, DEFLECTION), *markers], factor1=factor
+            markerNumbers=[coordinate_marker(mbs, places[tied].node, DEFLECTION), *markers], factor1=factor
         )
     )
 
 
-def _add_contact(mbs: Any, stop: Stop, settings: FullBeamSettings, ground: Any, places: Mapping[str, _Place]) -> None:
+def _add_contact(mbs: Any, stop: Stop, settings: FullBeamSettings, ground: Any, places: Mapping[str, Place]) -> None:
     contact, place = stop.contact, places[stop.contact.point]
     if settings.contact == "circle":
         near = place.beam.elements[max(place.number - 1, 0) : place.number + 1]
         _add_circle_contact(mbs, contact, settings.circle_radius, place.beam.positions[place.number], near)
         return
-    other = ground if contact.other is None else _marker(mbs, places[contact.other].node, DEFLECTION)
+    other = ground if contact.other is None else coordinate_marker(mbs, places[contact.other].node, DEFLECTION)
     if contact.damping:
         _add_viscous_contact(mbs, stop, other, place.node)
     else:
         stop.item = _add_coordinate_contact(mbs, contact, other, place.node)
 
 
-def _nearest(positions: np.ndarray, x: float) -> int:
-    return int(np.argmin(np.abs(positions - x)))
-
-
-def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
-    return mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
-
-
-def _add_node(mbs: Any, kind: str, x: float) -> Any:
-    if kind == "ancf":
-        return mbs.AddNode(eii.NodePoint2DSlope1(referenceCoordinates=[x, 0.0, 1.0, 0.0]))
-    return mbs.AddNode(eii.NodeRigidBody2D(referenceCoordinates=[x, 0.0, 0.0]))
-
-
-def _add_element(mbs: Any, kind: str, section: Section, length: float, nodes: Sequence[Any]) -> Any:
-    common: dict[str, Any] = {
-        "nodeNumbers": list(nodes),
-        "length": length,
-        "massPerLength": section.density * section.area,
-        "bendingStiffness": section.youngs_modulus * section.second_moment,
-        "axialStiffness": section.youngs_modulus * section.area,
-    }
-    if kind == "ancf":  # the lower Gauss order changes nothing that can be seen and costs a tenth less
-        return mbs.AddObject(eii.ObjectANCFCable2D(**common, useReducedOrderIntegration=1))
-    return mbs.AddObject(
-        eii.ObjectBeamGeometricallyExact2D(
-            **common,
-            crossSectionInertia=section.density * section.second_moment,
-            shearStiffness=section.shear_factor * section.shear_modulus * section.area,
-        )
-    )
-
-
-def _add_point_masses(mbs: Any, beam: Beam, kind: str, positions: np.ndarray, nodes: Sequence[Any]) -> None:
-    rotations = 2 if kind == "ancf" else 1  # both slope components carry J: their rates make up theta'
-    for mass in beam.masses:
-        matrix = np.diag([mass.mass, mass.mass] + rotations * [mass.inertia])
-        node = nodes[_nearest(positions, mass.at)]
-        mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[node], massMatrix=matrix))
-
-
-def _add_clamp(mbs: Any, beam: Beam, kind: str, ground: Any, node: Any) -> None:
-    springs = (
-        (AXIAL, math.inf),
-        (DEFLECTION, beam.clamp.translation),
-        (_ROTATION[kind], beam.clamp.rotation),
-    )
-    for coordinate, stiffness in springs:
-        markers = [ground, _marker(mbs, node, coordinate)]
-        if math.isinf(stiffness):
-            mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=markers))
-        elif stiffness > 0:
-            mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, stiffness=stiffness))
-
-
 def _add_coordinate_contact(mbs: Any, contact: PointContact, other: Any, node: Any) -> Any:
     """Exudyn's gap is q(marker 1) - q(marker 0) - offset, its force acts along +q of marker 1."""
-    point = _marker(mbs, node, DEFLECTION)
+    point = coordinate_marker(mbs, node, DEFLECTION)
     return mbs.AddObject(
         eii.ObjectContactCoordinate(
             markerNumbers=[point, other] if contact.above else [other, point],
@@ -281,7 +171,7 @@ def _add_viscous_contact(mbs: Any, stop: Stop, other: Any, node: Any) -> None:
     """A spring whose user function is the contact's law."""
     mbs.AddObject(
         eii.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=[other, _marker(mbs, node, DEFLECTION)], springForceUserFunction=stop.spring_force
+            markerNumbers=[other, coordinate_marker(mbs, node, DEFLECTION)], springForceUserFunction=stop.spring_force
         )
     )
 
@@ -290,21 +180,21 @@ def _add_law(mbs: Any, law: PointLaw, ground: Any, node: Any) -> None:
     def force(mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float) -> float:
         return law.spring_force(u)
 
-    markers = [ground, _marker(mbs, node, DEFLECTION)]
+    markers = [ground, coordinate_marker(mbs, node, DEFLECTION)]
     mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=force))
 
 
-def _add_rub(mbs: Any, rub: Rub, ground: Any, places: Mapping[str, _Place]) -> None:
+def _add_rub(mbs: Any, rub: Rub, ground: Any, places: Mapping[str, Place]) -> None:
     """A spring on the tangential deflection whose user function is the contact's friction."""
     tangent = rub.tangent
-    other = ground if tangent.other is None else _marker(mbs, places[tangent.other].node, DEFLECTION)
-    markers = [other, _marker(mbs, places[tangent.point].node, DEFLECTION)]
+    other = ground if tangent.other is None else coordinate_marker(mbs, places[tangent.other].node, DEFLECTION)
+    markers = [other, coordinate_marker(mbs, places[tangent.point].node, DEFLECTION)]
     mbs.AddObject(eii.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, springForceUserFunction=rub.force))
 
 
-def _add_friction(mbs: Any, friction: PointFriction, ground: Any, places: Mapping[str, _Place]) -> Any:
-    other = ground if friction.other is None else _marker(mbs, places[friction.other].node, DEFLECTION)
-    return add_friction(mbs, friction, ground, _marker(mbs, places[friction.point].node, DEFLECTION), other)
+def _add_friction(mbs: Any, friction: PointFriction, ground: Any, places: Mapping[str, Place]) -> Any:
+    other = ground if friction.other is None else coordinate_marker(mbs, places[friction.other].node, DEFLECTION)
+    return add_friction(mbs, friction, ground, coordinate_marker(mbs, places[friction.point].node, DEFLECTION), other)
 
 
 def _add_circle_contact(mbs: Any, contact: PointContact, radius: float, x: float, elements: list[Any]) -> None:

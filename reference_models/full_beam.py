@@ -28,7 +28,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from reference_models.actions import Actions, actions_of
-from reference_models.beam_system import DEFLECTION, BeamSystem, bending_coordinates, build_beam_system
+from reference_models.beam_system import BeamSystem, build_beam_system
 from reference_models.beams import Beams, as_beams
 from reference_models.drive import Drive
 from reference_models.energy_history import (
@@ -43,6 +43,7 @@ from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance, FullRun, closed_intervals
 from reference_models.histories import Histories, watched
 from reference_models.integration import Integration, integrate
+from reference_models.laid_beam import DEFLECTION, bending_coordinates
 from reference_models.point_contact import point_contacts
 from reference_models.point_friction import point_frictions
 from reference_models.point_law import Law, point_laws

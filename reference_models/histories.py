@@ -9,8 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from reference_models.actions import Way
-from reference_models.beam_system import AXIAL, BeamSystem
+from reference_models.beam_system import BeamSystem
 from reference_models.full_beam_settings import FullBeamSettings
+from reference_models.laid_beam import AXIAL
 from reference_models.point_contact import PointContact
 from reference_models.point_friction import PointFriction
 from reference_models.recorder import Recorder, Watched

@@ -30,10 +30,11 @@ from multiphi_exudyn import (
     UnilateralContact,
 )
 from reference_models.actions import actions_of
-from reference_models.beam_system import DEFLECTION, build_beam_system
+from reference_models.beam_system import build_beam_system
 from reference_models.drive import Drive
 from reference_models.exudyn_quiet import quiet
 from reference_models.full_beam import FullBeam, FullBeamSettings
+from reference_models.laid_beam import DEFLECTION
 
 BEAM = Beam(
     [Section.rectangle(0, 0.5, width=0.06, height=4e-3, youngs_modulus=43.5e9, density=2700, poisson_ratio=0.33)],
