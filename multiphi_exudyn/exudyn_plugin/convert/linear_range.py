@@ -39,8 +39,8 @@ def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
     """
     moving = amplitudes - np.mean(amplitudes, axis=0)
     powers = np.sum(moving**2, axis=1)
-    if not np.max(powers) > 0:
-        return 0.0
+    if np.max(powers) <= TOLERANCE**2 * np.max(np.sum(amplitudes**2, axis=1)):
+        return 0.0  # it stands, as good as; what is off there is an error, and no shift
     lasting = min(1.0, 2 * float(np.mean(powers) / np.max(powers)))  # share of the run in which it moves; of a sine 1
     return float(0.5 * turned * lasting * abs(np.sum(away * moving)) / np.sum(powers))
 

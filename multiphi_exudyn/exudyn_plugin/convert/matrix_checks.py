@@ -21,6 +21,7 @@ __all__ = ["ASYMMETRY", "Checked", "NoStructure", "checked_matrices", "coordinat
 
 ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
 DIFFERENTIATED = 1e-9  # of the largest damping or the fastest mode's critical one: what differentiating forces leaves
+UNDAMPED = 1e-14  # of the same: damping of a zero-frequency mode that is none, whatever couples it to others
 MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
 
 
@@ -69,7 +70,7 @@ def checked_matrices(
             f"one of them unstable {where}",
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))
-    return Checked(mass, stiffness, _not_driving(damping, mass, modes), tuple(told))
+    return Checked(mass, stiffness, _damping(damping, mass, modes), tuple(told))
 
 
 def _kind(lowest: float, largest: float) -> str:
@@ -84,15 +85,22 @@ def _critical(damping: np.ndarray, modes: Modes) -> float:
     return float(np.max(ratios, initial=0.0))
 
 
-def _not_driving(damping: np.ndarray, mass: np.ndarray, modes: Modes) -> np.ndarray:
-    """A symmetric damping matrix (n, n) without the negative damping that is round-off of differentiation."""
+def _damping(damping: np.ndarray, mass: np.ndarray, modes: Modes) -> np.ndarray:
+    """A symmetric damping matrix (n, n) without what is round-off of differentiation.
+
+    That is negative damping, and that of zero-frequency modes that are damped by nothing but it.
+    """
     own = modes.shapes.T @ damping @ modes.shapes
+    largest = max(np.max(np.abs(np.linalg.eigvalsh(own))), 2 * np.max(modes.omega))
+    undamped = (modes.omega == 0) & (np.abs(np.diagonal(own)) <= UNDAMPED * largest)
+    undamped &= np.max(np.abs(own), axis=1) <= 10 * DIFFERENTIATED * largest
+    own[undamped], own[:, undamped] = 0.0, 0.0
     values, vectors = np.linalg.eigh(own)
-    largest = max(np.max(np.abs(values)), 2 * np.max(modes.omega))
-    if not -DIFFERENTIATED * largest <= values[0] < 0:
+    driving = -DIFFERENTIATED * largest <= values[0] < 0
+    if not driving and not np.any(undamped):
         return damping
     momenta = mass @ modes.shapes @ vectors
-    found: np.ndarray = (momenta * np.maximum(values, 0.0)) @ momenta.T
+    found: np.ndarray = (momenta * (np.maximum(values, 0.0) if driving else values)) @ momenta.T
     return (found + found.T) / 2
 
 

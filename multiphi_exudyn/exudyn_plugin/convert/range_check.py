@@ -9,8 +9,8 @@ import numpy as np
 
 __all__ = ["LAG", "TOLERANCE", "RangeCheck"]
 
-TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
-LAG = 0.05  # rad: shift of an oscillation from which a motion is told to have left the range; an error of 4 %
+TOLERANCE = 0.01  # error from which a motion has left the range: a pendulum that swings by 1.1 degrees has it
+LAG = 0.017  # rad: shift of oscillations until the end of a run from which it is told; an error of 1 % of the run
 
 
 @dataclass(frozen=True)
