@@ -118,15 +118,15 @@ class _Constants(FunctionPass):
         for block in state.func_ir.blocks.values():
             known = dict[str, float]()
             for assignment in block.find_insts(statements.Assign):
-                number, name = _number(assignment.value, known), assignment.target.name
-                known.pop(name, None)
-                if number is not None:
-                    known[name], assignment.value = number, statements.Const(number, assignment.loc)
+                number = _number(assignment.value, known)
+                if number is not None:  # then it is a temporary, which is assigned once; variables are copies of these
+                    known[assignment.target.name] = number
+                    assignment.value = statements.Const(number, assignment.loc)
         return True
 
 
 def _number(value: Any, known: Mapping[str, float]) -> float | None:
-    """The number that a value is, of variables that are ``known``, or None."""
+    """The number that a value is, of temporaries that are ``known``, or None."""
     if isinstance(value, statements.Global | statements.Const):
         return value.value if type(value.value) in (int, float) else None
     if isinstance(value, statements.Expr) and value.op == "binop" and value.fn is operator.add:
