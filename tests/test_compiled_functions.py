@@ -24,6 +24,7 @@ pytest.importorskip("numba")
 compilation = importlib.import_module("multiphi_exudyn.mathematics.compilation")
 
 HALF = 0.5
+FIRST, SECOND = 1, 2
 NOTHING = np.zeros(1)
 
 
@@ -53,6 +54,20 @@ def falling(ints: Ints, n: int) -> int:
     while n > 0 and ints[n - 1] > ints[n]:
         n -= 1
     return n
+
+
+@compiled
+def chosen(ints: Ints, numbers: Numbers) -> float:
+    place, found = FIRST + SECOND, 0.0
+    if ints[0] > FIRST:
+        place = SECOND
+        place += FIRST + SECOND
+    for k in range(ints[FIRST + SECOND]):
+        found = numbers[place - FIRST] if k == SECOND else found + SECOND
+        place = FIRST
+    last = SECOND
+    last = ints[last]
+    return found + place / SECOND + (last + FIRST)
 
 
 @compiled
@@ -167,6 +182,12 @@ def test_a_compiled_function_returns_an_integer_or_nothing():
     ints = np.array([0, 9, 7, 5])
     assert Entry(falling)(ints, 3) == falling(ints, 3) == 1
     assert Entry(turn)(*buffers()[1:], 2) is None
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 0), (0, 1), (3, 3), (0, 4)])
+def test_variables_that_take_constants_of_the_module_have_their_values_in_turn(first, count):
+    given = np.array([first, 0, 7, count]), np.arange(8.0)
+    assert Entry(chosen)(*given) == chosen(*given)
 
 
 def test_a_number_is_taken_apart_and_put_together_as_in_python():

@@ -15,7 +15,7 @@ __all__ = ["RAISED", "load", "object_code", "refusal", "this_cpu"]
 RAISED = "multiphi_exudyn.raised"  # what a function would call that raises an error
 IN_NUMBA = ("numba_", "NRT_", "Py", RAISED)  # beginnings of what is in numba, in Python, or nowhere
 OF_C = {"numba_ldexp": "ldexp", "numba_frexp": "frexp"}  # what numba has of C's, under a name of its own
-LEVEL = 2  # of optimisation: 3 takes longer, and gains nothing
+LEVEL = 1  # of optimisation: more takes longer, and gains nothing
 
 
 @functools.cache
@@ -38,17 +38,22 @@ def _machine(cpu: str, features: str) -> llvm.TargetMachine:
     return _target().create_target_machine(cpu, features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True)
 
 
+_emitter = functools.cache(_machine)  # for all functions; one that loads is given away
+
+
 def object_code(module: llvm.ModuleRef, symbol: str, cpu: str, features: str) -> bytes:
     """The object file of a module in which ``symbol`` is the function that others call.
 
     That one calls RAISED after an error. As nothing may raise, this has to vanish with all that could, and the code
     needs nothing but the C library and the functions it calls.
     """
-    machine = _machine(cpu, features)
+    machine = _emitter(cpu, features)
     for function in module.functions:
         if not function.is_declaration and function.name != symbol:
             function.linkage = "internal"
-    passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=LEVEL))
+    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options.loop_unrolling = options.loop_interleaving = options.loop_vectorization = False  # loops are short
+    passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(module, passes)
     for function in module.functions:
         function.name = OF_C.get(function.name, function.name)

@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
-COMPILERS = ("multiphi_exudyn/mathematics/compilation.py", "multiphi_exudyn/mathematics/machine_code.py")
+COMPILERS = ("multiphi_exudyn/mathematics/translation.py", "multiphi_exudyn/mathematics/machine_code.py")
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": (

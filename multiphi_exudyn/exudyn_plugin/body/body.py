@@ -155,7 +155,12 @@ class MultiPhiBody:
     @property
     def events(self) -> list[Event]:
         """Closings and openings with their exact times."""
-        return self._events + ([] if self._run_ahead is None else self._run_ahead.events)
+        return [*self._seen, *(() if self._run_ahead is None else self._run_ahead.events)]
+
+    @property
+    def _seen(self) -> list[Event]:
+        """Those of the start, and those in steps that were done again."""
+        return [*self._events, *(() if self._exact is None else self._exact.events)]
 
     @property
     def time(self) -> float:
@@ -199,7 +204,7 @@ class MultiPhiBody:
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
         interface = self.coordinates.interface
         turned = () if interface is None else interface.warnings
-        return (*warnings_of_body(self.model, self._record.of(self._events, truncated)), *self._outside, *turned)
+        return (*warnings_of_body(self.model, self._record.of(self._seen, truncated)), *self._outside, *turned)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The level of elements in these states as the solver has it."""
@@ -279,7 +284,6 @@ class MultiPhiBody:
         step = Step(begun, t, before, self.coordinates.read(), self._state, self._most, jumped)
         found = exact_step(self, mbs, self._exact, step)
         self._most, self._state = found.most, found.state
-        self._events += found.events
         self._record.see(found.state)
         self._choose_test()
         self.coordinates.store(self.coordinates.layout.of(found.state))
@@ -354,6 +358,8 @@ class MultiPhiBody:
         if here.rigid and not alone:
             self._check_start(mbs)
         self._run_ahead, self._test, self._most, self._time, self._told = None, None, 0.0, t, t
+        if self._exact is not None:
+            self._exact.begin(t)
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
         if self.varies:
             self._own = OwnLoads(self.model, self._loads, self._size, t, end)
@@ -404,7 +410,7 @@ class MultiPhiBody:
         if self._exact is None or self.varies:
             self._motion.levels = self._own.loaded
             self._exact = ExactMotion(self._motion, self._own.levels, f"body {self.name!r}")
-        self._exact.begin(self._time)
+            self._exact.begin(self._time)
         self._take_step(step)
         self._begin_step(self._time, self.coordinates.read())
 

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.events.state import Event, State
+from multiphi_exudyn.events.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.surroundings import Instant, Surroundings, surroundings_of
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion, Reached
@@ -71,13 +71,12 @@ class Step:
 
 @dataclass(frozen=True)
 class Outcome:
-    """state: at the end of the step. events: in it. disturbed: whether what hangs on the body was moved.
+    """state: at the end of the step. disturbed: whether what hangs on the body was moved.
 
     most: as in the step.
     """
 
     state: State
-    events: tuple[Event, ...]
     disturbed: bool
     most: float
 
@@ -96,7 +95,7 @@ def exact_step(body: BodyInStep, mbs: Any, motion: ExactMotion, step: Step) -> O
     if not first.changed:
         if step.jumped:
             _write(body, mbs, first.state, force, step.time)
-        return Outcome(replace(first.state, level=start.level), (), disturbed=False, most=step.most)
+        return Outcome(replace(first.state, level=start.level), disturbed=False, most=step.most)
     instant = Instant(first.time, step.time, step.length, first.before, first.state)
     present, change = around.changed_by(mbs, instant, force)
     there = around.at_event(instant, force)
@@ -106,13 +105,13 @@ def exact_step(body: BodyInStep, mbs: Any, motion: ExactMotion, step: Step) -> O
         first = motion.advance(state, step.begun, step.time, stop=True)
     end, later = _last_part(body, motion, first, later, step.time)
     _write(body, mbs, end.state, later.force(end.state.states), step.time)
-    events, most = end.events, step.most
+    most = step.most
     if here.interface is not None:
         reached = there.settled(mbs, instant, change)
         missed = reached - later.force(end.state.states)
         most = _check_resolved(body, there, step, instant, own, end.state, missed)
         _write(body, mbs, end.state, reached, step.time)
-    return Outcome(end.state, events, disturbed=here.interface is not None, most=most)
+    return Outcome(end.state, disturbed=here.interface is not None, most=most)
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ def _last_part(
                 later = later.at(found.before)
                 motion.hold(_acting(body, later.force), later.around.inertia)
             found = motion.advance(reached.state, reached.time, until, stop=True)
-        reached = replace(found, events=(*reached.events, *found.events))
+        reached = found
     return reached, later
 
 

@@ -7,7 +7,7 @@ advance, the ring of the chatter check too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ ROOM = 32  # segments of a step that are recorded before they are taken
 
 @dataclass(frozen=True)
 class Reached:
-    """state at ``time`` [s]; changed: whether anything happened on the way, and the events, not of a trial.
+    """state at ``time`` [s]; changed: whether anything happened on the way.
 
     before: the state right before the last instant.
     """
@@ -38,25 +38,32 @@ class Reached:
     state: State
     changed: bool
     before: State
-    events: tuple[Event, ...]
 
 
 class ExactMotion:
-    """Motions in the levels of ``motion``; levels: those of its static loads. name: with which failures are told."""
+    """Motions in the levels of ``motion``; levels: those of its static loads. name: with which failures are told.
+
+    Nothing is asked of it before ``begin``.
+    """
 
     def __init__(self, motion: Motion, levels: LoadedLevels, name: str) -> None:
         self._motion, self._levels, self._name = motion, levels, name
         self._forces = motion.levels.held = motion.levels.held or _forces_in(motion.levels)
         self._arrays = motion.arrays = self._forces.arrays
-        self._record = Record(motion.model.contacts, self._arrays)
         self._window, self._allowed = window(motion.model), allowed(motion.model)
         self._ring = np.zeros(2 * (self._window + 1))
-        self._decisions, self._last_decision = 0, math.nan
+        self.begin(math.nan)
 
     def begin(self, time: float) -> None:
         """A run begins at a time [s]."""
         self._ring[:] = 0.0
         self._decisions, self._last_decision = 0, time
+        self._record = Record(self._motion.model.contacts, self._arrays)
+
+    @property
+    def events(self) -> Sequence[Event]:
+        """What has happened in the run, but in trials."""
+        return self._record.events()
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
         """From now on these forces act, by the states of a level, and this hangs on the structure."""
@@ -77,7 +84,7 @@ class ExactMotion:
         arrays.ints[a.STOP_AT_EVENT] = int(stop)
         try:
             with np.errstate(all="ignore"):
-                changed, events = self._run(until, trial)
+                changed = self._run(until, trial)
         except (MultiPhiError, np.linalg.LinAlgError) as failure:
             singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
             at = float(arrays.numbers[a.TIME])
@@ -85,7 +92,7 @@ class ExactMotion:
         if not trial:
             self._take_ring()
         after, end = self._state(a.CURRENT), float(arrays.numbers[a.TIME])
-        return Reached(end, after, changed, self._state(a.REACHED) if stop else after, events)
+        return Reached(end, after, changed, self._state(a.REACHED) if stop else after)
 
     def _put_ring(self) -> None:
         """The ring of the chatter check into the arrays, which other bodies use too."""
@@ -114,42 +121,38 @@ class ExactMotion:
             place, speed = (np.concatenate([x[:r], at, x[r:]]) for x, at in ((place, w), (speed, w_t)))
         arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
 
-    def _run(self, until: float, trial: bool) -> tuple[bool, tuple[Event, ...]]:
-        """The loop until it ends, with all that it needs; whether there were events on the way, and which."""
-        arrays, events, changed = self._arrays, list[Event](), False
+    def _run(self, until: float, trial: bool) -> bool:
+        """The loop until it ends, with all that it needs; whether anything happened on the way."""
+        arrays, changed = self._arrays, False
         while True:
             answer = int(carry(*arrays.buffers.all, until))
             if answer == a.NEED:
                 arrays.supply()
                 if not arrays.outgrown:
                     continue
-            if arrays.ints[a.EVENT_COUNT]:
-                changed = True
-                events += [] if trial else self._events()
-            arrays.begin_record()
-            if answer == a.FAILED and not trial:
-                raise self._motion.failure()
+            changed = changed or bool(arrays.ints[a.EVENT_COUNT])
+            if not trial:
+                self._record.take_events()
+                if answer == a.FAILED:
+                    raise self._motion.failure()
             if answer not in (a.FULL, a.NEED):
-                return changed or answer == a.FAILED, tuple(events)
-
-    def _events(self) -> list[Event]:
-        """What the loop has recorded, which is then forgotten."""
-        known = len(self._record.places)
-        self._record.take_events()
-        return [self._record.event(i) for i in range(known, len(self._record.places))]
+                return changed or answer == a.FAILED
+            arrays.begin_record()
 
     def _state(self, place: int) -> State:
         """A state of the run record, under static loads."""
         ints, numbers = self._arrays.ints, self._arrays.numbers
-        record = int(ints[place + a.LEVEL])
+        state = ints[place : place + a.STATE_INTS].tolist()
+        record, phases = state[a.LEVEL], state[a.PHASES]
         level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].states)
-        r, phases = level.modal.modes, ints[ints[place + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-        n, q = r + int(ints[a.CHANNELS]), int(ints[a.PRESCRIBED])
-        xi, xi_t = (numbers[ints[place + part] :][:n].copy() for part in (a.PLACE, a.SPEED))
+        standing = ints[phases : phases + ints[record + a.EXIT_COUNT]].tolist()
+        r, q = level.modal.modes, int(ints[a.PRESCRIBED])
+        n = r + int(ints[a.CHANNELS])
+        xi, xi_t = (numbers[start : start + n].copy() for start in (state[a.PLACE], state[a.SPEED]))
         if q:
             xi, xi_t = (np.delete(x, slice(r, r + q)) for x in (xi, xi_t))
         xi[:r] += self._forces.centre(record)
-        return State(level, xi, xi_t, tuple(PHASES[k] for k in phases.tolist()))
+        return State(level, xi, xi_t, tuple([PHASES[k] for k in standing]))
 
 
 def _forces_in(levels: LoadedLevels) -> HeldForces:
