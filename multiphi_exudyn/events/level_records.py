@@ -91,22 +91,21 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
 
 def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
     """The record of a signal."""
-    table = row.position[None, :], row.rate[None, :], np.array([row.constant])
+    table = np.concatenate([row.position, row.rate, [row.constant]])[None, :]
     return [int(part) for part in _put_signals(put, level, table)[0]]
 
 
-def _put_signals(put: Put, level: LoadedLevel, table: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
     """The records (e, 3) of signals (exits.signals_of)."""
-    position, rate, constant = table
-    r, shapes, moves = level.modal.modes, level.modal.response.shapes, rate.any(axis=1)
-    numbers = np.concatenate([position, rate, constant[:, None]], axis=1)
-    waves = np.zeros((len(numbers), 2 * shapes.shape[1]), complex)
-    waves[:, : shapes.shape[1]] = position[:, :r] @ shapes
+    n, r, shapes = level.width, level.modal.modes, level.modal.response.shapes
+    waves, records = np.zeros((len(table), 2 * shapes.shape[1]), complex), np.zeros((len(table), 3), int)
+    np.matmul(table[:, :r], shapes, out=waves[:, : shapes.shape[1]])
+    moves = table[:, n:-1].any(axis=1)
     if moves.any():
-        waves[:, shapes.shape[1] :] = rate[:, :r] @ shapes
-    records, k = np.empty((len(numbers), 3), int), np.arange(len(numbers))
-    records[:, 0] = put("numbers", numbers) + k * numbers.shape[1]
-    records[:, 1], records[:, 2] = put("waves", waves) + k * waves.shape[1], moves
+        waves[:, shapes.shape[1] :] = table[:, n : n + r] @ shapes
+        records[:, a.RATED] = moves
+    records[:, a.ROW] = put("numbers", table) + table.shape[1] * np.arange(len(table))
+    records[:, a.WAVE] = put("waves", waves) + waves.shape[1] * np.arange(len(table))
     return records
 
 
