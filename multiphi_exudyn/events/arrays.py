@@ -39,7 +39,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["Buffers"]
+__all__ = ["Batch", "Buffers"]
 
 # ---------------------------------------------------------------------- run record, ints
 
@@ -197,3 +197,29 @@ class Buffers:
         start = self.take(name, len(given))
         getattr(self, name)[start : start + len(given)] = given
         return start
+
+    def used(self, name: str) -> int:
+        """Where the next values will begin in the buffer ``name``."""
+        return self._used[name]
+
+
+class Batch:
+    """Values that go into the buffers together; where each begins is known before. Nothing else is put meanwhile."""
+
+    def __init__(self, buffers: Buffers) -> None:
+        self.buffers = buffers
+        self._parts: dict[str, list[np.ndarray]] = {"ints": [], "numbers": [], "waves": []}
+        self._ends = {name: buffers.used(name) for name in self._parts}
+
+    def put(self, name: str, values: object) -> int:
+        """Where these values will begin in the buffer ``name``."""
+        given, start = values if isinstance(values, np.ndarray) else np.array(values), self._ends[name]
+        self._parts[name].append(given)
+        self._ends[name] = start + given.size
+        return start
+
+    def write(self) -> None:
+        """Put all of them in the buffers."""
+        for name, parts in self._parts.items():
+            if parts:
+                self.buffers.put(name, np.concatenate(parts, axis=None))

@@ -26,6 +26,7 @@ __all__ = [
     "entered_row",
     "exits_of",
     "force_shares",
+    "rows_of",
     "signal_row",
     "signal_rows",
     "signal_table",
@@ -68,13 +69,18 @@ def asked_alone(exit_: Exit) -> Exit:
 
 def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
     """s of an element's exit in a level."""
-    position, rate, constant = (part[0] for part in signal_table(level, [(element, exit_)]))
-    return Row(position, rate, float(constant))
+    return rows_of(signal_table(level, [(element, exit_)]))[0]
 
 
-def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """s of exits of elements in a level: of xi (e, r), of xi' (e, r) and constant (e,)."""
+def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> np.ndarray:
+    """s of exits of elements in a level, rows (e, 2 n + 1) of (xi, xi', 1)."""
     return signals_of(level, ExitShares.of(level.level.base.link_places, exits))
+
+
+def rows_of(table: np.ndarray) -> list[Row]:
+    """The rows of a table of signals, each by itself."""
+    n = table.shape[1] // 2
+    return [Row(row[:n], row[n:-1], float(row[-1])) for row in table]
 
 
 @dataclass(frozen=True)
@@ -108,43 +114,47 @@ class ExitShares:
     def taken(self, kept: np.ndarray) -> ExitShares:
         """Of those exits that are ``kept`` (e,) alone."""
         numbers, links, shares = self.further
+        if not len(numbers):
+            return ExitShares(self.constants[kept], self.links[kept], self.shares[kept], self.further)
         rows, counted = kept[numbers], np.cumsum(kept) - 1
         further = counted[numbers[rows]], links[rows], shares[rows]
         return ExitShares(self.constants[kept], self.links[kept], self.shares[kept], further)
 
 
-def signals_of(level: LoadedLevel, exits: ExitShares) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """s of exits in a level: of xi (e, r), of xi' (e, r) and constant (e,).
+def signals_of(level: LoadedLevel, exits: ExitShares) -> np.ndarray:
+    """s of exits in a level, rows (e, 2 n + 1) of (xi, xi', 1).
 
     A load that is a limit leaves no round-off of both.
     """
-    position, rate, terms = _linked(level, exits.links, exits.shares)
+    table, terms = _linked(level, exits.links, exits.shares)
     constant, size = exits.constants + terms.sum(axis=1), np.abs(exits.constants) + np.abs(terms).sum(axis=1)
     numbers, links, shares = exits.further
     if len(numbers):
-        *rows, terms = _linked(level, links, shares)
-        np.add.at(position, numbers, rows[0])
-        np.add.at(rate, numbers, rows[1])
+        added, terms = _linked(level, links, shares)
+        np.add.at(table, numbers, added)
         constant += np.bincount(numbers, terms.sum(axis=1), len(constant))
         size += np.bincount(numbers, np.abs(terms).sum(axis=1), len(constant))
-    return position, rate, drop_round_off(constant, size)
+    table[:, -1] = drop_round_off(constant, size)
+    return table
 
 
-def _linked(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What links (s,) have in signals by their shares (s, 3): of xi and xi' (s, r), and constants (s, 2)."""
-    own, (gap, speed, force) = level.level, shares.T
-    rows, constants = own.gap_rows[links], np.zeros((len(links), 2))
-    position, rate = gap[:, None] * rows, speed[:, None] * rows
-    constants[:, 0] = gap * level.gap_constants[links]
-    pressing = np.flatnonzero(force)
+def _linked(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What links (s,) have in signals by their shares (s, 3): rows (s, 2 n + 1) of (xi, xi'), and constants (s, 2)."""
+    own, n = level.level, level.width
+    rows, table, constants = own.gap_rows[links], np.zeros((len(links), 2 * n + 1)), np.zeros((len(links), 2))
+    np.multiply(rows, shares[:, :1], out=table[:, :n])
+    if shares[:, 1].any():
+        np.multiply(rows, shares[:, 1:2], out=table[:, n:-1])
+    np.multiply(level.gap_constants[links], shares[:, 0], out=constants[:, 0])
+    pressing = shares[:, 2].nonzero()[0]
     if len(pressing):
         place = np.zeros(len(level.gap_constants), int)
         place[list(own.indices)] = range(len(own.indices))
-        held, share = place[links[pressing]], force[pressing]
-        position[pressing] += share[:, None] * own.force_rows[held]
-        rate[pressing] += share[:, None] * own.force_rate_rows[held]
+        held, share = place[links[pressing]], shares[pressing, 2]
+        table[pressing, :n] += share[:, None] * own.force_rows[held]
+        table[pressing, n:-1] += share[:, None] * own.force_rate_rows[held]
         constants[pressing, 1] = share * level.asymptotic.forces[held]
-    return position, rate, constants
+    return table, constants
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:
@@ -156,8 +166,7 @@ def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[in
 def signal_rows(level: LoadedLevel) -> list[Row]:
     """s of all exits of a level, which keeps them."""
     if "signals" not in level.entries:
-        table = signal_table(level, exits_of(level))
-        level.entries["signals"] = [Row(position, rate, float(c)) for position, rate, c in zip(*table, strict=True)]
+        level.entries["signals"] = rows_of(signal_table(level, exits_of(level)))
     rows: list[Row] = level.entries["signals"]
     return rows
 

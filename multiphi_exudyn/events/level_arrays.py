@@ -257,7 +257,7 @@ class LevelArrays:
         entered = self.level(after(level, element, asked_alone(exit_)))  # may make the buffers anew
         target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
-        signal = self.buffers.put("ints", put_signal(self.buffers, level, row))
+        signal = self.buffers.put("ints", put_signal(self.buffers.put, level, row))
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
         self.ints[record + a.ENTERED] = signal
         if self.held is not None:

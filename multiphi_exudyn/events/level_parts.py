@@ -21,20 +21,21 @@ LARGEST_PRIMITIVE = 1e3  # of the speeds in it, squared: what energies are made 
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
     """Motion, gaps and energies of a level."""
     own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
-    stiffness, damping = np.diag(modal.squares) + modal.coupling, modal.damping_matrix
-    motion = [-stiffness, channels.force, -damping, channels.force_rate, level.asymptotic.drive]
-    moved, patterns = channels.carried.T, level.excitation.patterns.T
+    stiffness, drive = np.diag(-modal.squares) - modal.coupling, level.asymptotic.drive[:, None]
+    motion = [stiffness, channels.force, -modal.damping_matrix, channels.force_rate, drive]
     parts = {
-        a.MOTION: np.column_stack(motion),
-        a.GAPS: np.column_stack([own.gap_rows, level.gap_constants]),
+        a.MOTION: np.concatenate(motion, axis=1),
+        a.GAPS: np.concatenate([own.gap_rows, level.gap_constants[:, None]], axis=1),
         a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
         a.FOLLOWS: form.follows,
-        a.PATTERNS: np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration]),
     }
+    if level.excitation.channels:
+        moved, patterns = channels.carried.T, level.excitation.patterns.T
+        parts[a.PATTERNS] = np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration])
+        if np.any(moved):
+            parts[a.CARRIED] = np.hstack([moved @ modal.vectors, moved @ channels.carried])
     if own is not modal:
         parts[a.SPEEDS] = np.column_stack([own.speed_rows, np.zeros(len(own.gap_rows))])
-    if np.any(moved):
-        parts[a.CARRIED] = np.hstack([moved @ modal.vectors, moved @ channels.carried])
     return parts
 
 

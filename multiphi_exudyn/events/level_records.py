@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.arrays import Batch, Buffers
 from multiphi_exudyn.events.defect_forms import struck_defects
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exit_table import ExitTable
@@ -21,42 +24,52 @@ from multiphi_exudyn.mechanics.element import Exit, Share
 
 __all__ = ["put_base", "put_level", "put_powers", "put_signal"]
 
+Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
+
 
 def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     """The record of the base as a level in which all contacts are open, where runs start."""
     elements, parts = int(buffers.ints[a.ELEMENTS]), base_parts(base, excitation)
+    batch = Batch(buffers)
     given = {
         a.MODES: base.modes.count,
-        a.STATES: buffers.take("ints", elements),
-        **_frequencies(buffers, base.modes.omega),
-        **{slot: buffers.put("numbers", values) for slot, values in parts.items()},
+        a.STATES: batch.put("ints", np.zeros(elements, int)),
+        **_frequencies(batch, base.modes.omega),
+        **{slot: batch.put("numbers", values) for slot, values in parts.items()},
     }
-    return _record(buffers, given)
+    record = _record(batch, given)
+    batch.write()
+    return record
 
 
 def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable) -> int:
     """The record of a level with a number, whose exits are all watched."""
-    own, modal, put, parts, kept = level.level, level.modal, buffers.put, level_parts(level), exits.of(level.states)
-    firsts = exits.firsts(kept).tolist()
+    own, modal, parts, kept = level.level, level.modal, level_parts(level), exits.of(level.states)
+    batch, firsts = Batch(buffers), exits.firsts(kept)
+    put, count = batch.put, int(firsts[-1])
+    basis = _put_basis(batch, modal.response.basis)
     given = {
         a.NUMBER: number,
         a.MODES: modal.modes,
         a.STATES: put("ints", level.states),
-        a.RESPONSE: _put_response(buffers, modal),
+        a.RESPONSE: _put_response(batch, modal, basis),
         a.FREE_SIZES: put("numbers", _free_sizes(modal)) if buffers.ints[a.PRESCRIBED] else -1,
         a.STRUCK_DEFECTS: put("numbers", struck_defects(level)) if buffers.ints[a.JUDGED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
-        a.EXITS: _put_exits(buffers, level, exits, kept),
-        a.EXIT_COUNT: firsts[-1],
+        a.EXITS: _put_exits(batch, level, exits, kept),
+        a.EXIT_COUNT: count,
         a.FIRST_EXITS: put("ints", firsts),
-        a.WATCHED: put("ints", range(firsts[-1])),
-        a.WATCHED_COUNT: firsts[-1],
-        **_frequencies(buffers, modal.omega),
+        a.WATCHED: put("ints", np.arange(count)),
+        a.WATCHED_COUNT: count,
+        **_frequencies(batch, modal.omega),
         a.HIGHEST_FREQUENCY: put("numbers", [max(own.highest_frequency, level.excitation.highest_frequency)]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
         **{slot: put("numbers", values) for slot, values in parts.items()},
     }
-    return _record(buffers, given)
+    record = _record(batch, given)
+    batch.write()
+    basis_arrays.describe_basis(*buffers.all, basis)
+    return record
 
 
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
@@ -76,46 +89,45 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
         buffers.ints[record + slot] = value
 
 
-def put_signal(buffers: Buffers, level: LoadedLevel, row: Row) -> list[int]:
+def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
     """The record of a signal."""
-    table = row.position[None, :], row.rate[None, :], np.array([row.constant])
-    return [int(part) for part in _put_signals(buffers, level, table)[0]]
+    table = np.concatenate([row.position, row.rate, [row.constant]])[None, :]
+    return [int(part) for part in _put_signals(put, level, table)[0]]
 
 
-def _put_signals(buffers: Buffers, level: LoadedLevel, table: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
     """The records (e, 3) of signals (exits.signals_of)."""
-    position, rate, constant = table
-    r, shapes, moves = level.modal.modes, level.modal.response.shapes, rate.any(axis=1)
-    numbers = np.concatenate([position, rate, constant[:, None]], axis=1)
-    waves = np.zeros((len(numbers), 2 * shapes.shape[1]), complex)
-    waves[:, : shapes.shape[1]] = position[:, :r] @ shapes
+    n, r, shapes = level.width, level.modal.modes, level.modal.response.shapes
+    waves, records = np.zeros((len(table), 2 * shapes.shape[1]), complex), np.zeros((len(table), 3), int)
+    np.matmul(table[:, :r], shapes, out=waves[:, : shapes.shape[1]])
+    moves = table[:, n:-1].any(axis=1)
     if moves.any():
-        waves[:, shapes.shape[1] :] = rate[:, :r] @ shapes
-    at, wave, k = buffers.put("numbers", numbers), buffers.put("waves", waves), np.arange(len(numbers))
-    return np.column_stack([at + k * numbers.shape[1], wave + k * waves.shape[1], moves])
+        waves[:, shapes.shape[1] :] = table[:, n : n + r] @ shapes
+        records[:, a.RATED] = moves
+    records[:, a.ROW] = put("numbers", table) + table.shape[1] * np.arange(len(table))
+    records[:, a.WAVE] = put("waves", waves) + waves.shape[1] * np.arange(len(table))
+    return records
 
 
-def _record(buffers: Buffers, given: dict[int, int]) -> int:
+def _record(batch: Batch, given: dict[int, int]) -> int:
     """A level's record; where it says nothing else, speeds are those of gaps."""
-    record = buffers.take("ints", a.LEVEL_INTS)
-    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}.items():
-        buffers.ints[record + slot] = value
-    return record
+    slots = {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}
+    return batch.put("ints", [slots.get(slot, 0) for slot in range(a.LEVEL_INTS)])
 
 
-def _frequencies(buffers: Buffers, omega: np.ndarray) -> dict[int, int]:
+def _frequencies(batch: Batch, omega: np.ndarray) -> dict[int, int]:
     """Where omega (r,) stands, and its inverses, zero where it is."""
     periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
-    return {a.FREQUENCIES: buffers.put("numbers", omega), a.PERIODS: buffers.put("numbers", periods)}
+    return {a.FREQUENCIES: batch.put("numbers", omega), a.PERIODS: batch.put("numbers", periods)}
 
 
-def _put_response(buffers: Buffers, level: Level) -> int:
+def _put_response(batch: Batch, level: Level, basis: int) -> int:
     """The record of a level's response (response_arrays.py)."""
-    response, put = level.response, buffers.put
+    response, put = level.response, batch.put
     maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-    basis, reached = _put_basis(buffers, response.basis), put("ints", response_arrays.reached_modes(maps))
+    reached = put("ints", response_arrays.reached_modes(maps))
     places = [put("waves", values) for values in maps]
-    places += [put("numbers", level.squares), put("numbers", np.diagonal(level.damping) / 2)]
+    places += [put("numbers", level.squares), put("numbers", level.damping.diagonal() / 2)]
     chains = [len(response.chains)]
     for chain in response.chains:
         parts = chain.mixing, chain.shapes.T, chain.pushes
@@ -130,28 +142,26 @@ def _free_sizes(level: Level) -> np.ndarray:
     return np.abs([response.from_displacement, response.from_velocity, response.from_force])
 
 
-def _put_basis(buffers: Buffers, basis: Exponentials) -> int:
-    """The record of a basis (basis_arrays.py)."""
-    put = buffers.put
+def _put_basis(batch: Batch, basis: Exponentials) -> int:
+    """The record of a basis (basis_arrays.py), which is still to be described."""
+    put = batch.put
     powers, rates, scales = put("ints", basis.powers), put("waves", basis.rates), put("numbers", [basis.unit, 0, 0])
-    record = put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
-    basis_arrays.describe_basis(*buffers.all, record)
-    return record
+    return put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
 
 
-def _put_exits(buffers: Buffers, level: LoadedLevel, exits: ExitTable, kept: np.ndarray) -> int:
+def _put_exits(batch: Batch, level: LoadedLevel, exits: ExitTable, kept: np.ndarray) -> int:
     """Records of the exits of a level, those of the table that are kept (e,)."""
-    described, signals = exits.described[kept], _put_signals(buffers, level, signals_of(level, exits.shares(kept)))
+    signals = _put_signals(batch.put, level, signals_of(level, exits.shares(kept)))
     table = np.full((len(signals), a.EXIT_INTS), -1)
-    table[:, :3], table[:, 3:6] = described, signals
+    table[:, :3], table[:, 3:6] = exits.described[kept], signals
     for k, exit_ in exits.turning(kept):
-        table[k, a.TURN :] = _turn(buffers, level, int(described[k, 0]), exit_)
-    return buffers.put("ints", table)
+        table[k, a.TURN :] = _turn(batch.put, level, int(table[k, 0]), exit_)
+    return batch.put("ints", table)
 
 
-def _turn(buffers: Buffers, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
+def _turn(put: Put, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
     """The signal of the speed that may turn an exit, and the states that it asks for then."""
     assert exit_.turn is not None, "only exits that turn have one"
     speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
     asked = [asked_state(level, element, Exit(name)) for name in (exit_.turn.forward, exit_.turn.backward)]
-    return [*put_signal(buffers, level, speed), *asked]
+    return [*put_signal(put, level, speed), *asked]

@@ -94,14 +94,16 @@ class LoadedLevel(Shown):
         yield "channels", str(self.level.modes - self.modal.modes)
 
     @classmethod
-    def of(cls, level: Level, load: np.ndarray) -> LoadedLevel:
-        """``level`` under a static load (m,) in base coordinates."""
+    def of(cls, level: Level, load: np.ndarray, states: tuple[int, ...] | None = None) -> LoadedLevel:
+        """``level`` under a static load (m,) in base coordinates, its elements in these states."""
         rest = level.asymptotic(load)
         magnitudes, initial = level.base.magnitudes
         gaps = level.base.directions.T @ rest.configuration + level.base.gaps
         terms = initial + np.abs(rest.configuration) @ magnitudes
-        gaps = drop_round_off(gaps, np.where(level.following, FOLLOWING / ZERO, 1.0) * terms)
-        return cls(level, rest, gaps, Excitation.constant(load, len(gaps)), Channels.none(level))
+        if level.following.any():
+            terms[level.following] *= FOLLOWING / ZERO
+        gaps = drop_round_off(gaps, terms)
+        return cls(level, rest, gaps, Excitation.constant(load, len(gaps)), Channels.none(level), own_states=states)
 
     def under(self, excitation: Excitation) -> LoadedLevel:
         """This one with the channels of an excitation; the last one is kept for other histories of these channels."""
@@ -160,7 +162,7 @@ class LoadedLevel(Shown):
     @functools.cached_property
     def driven(self) -> bool:
         """Whether a static load that is no channel drives zero-frequency modes."""
-        return bool(np.any(self.asymptotic.drive))
+        return bool(self.asymptotic.drive.any())
 
     def split(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """eta (r, ...) and w (q, ...) of xi."""
@@ -216,17 +218,19 @@ class LoadedLevel(Shown):
     @functools.cached_property
     def potential_form(self) -> PotentialForm:
         """The same as a form in xi."""
-        own, base, rest = self.level, self.level.base, self.asymptotic
-        y, r, static = rest.configuration, self.modal.modes, self.excitation.static
+        own, base, rest, patterns = self.level, self.level.base, self.asymptotic, self.excitation.patterns
+        y, r, q, static = rest.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
+        modal = rest.load - self.modal.vectors.T @ static - self.alone.asymptotic.drive
+        constant = rest.strain + self.stored - float(static @ y)
+        if not q:
+            return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)
         index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
         springs, rows = base.stiffnesses[index], own.gap_rows[index]
-        shapes, columns, pulled = own.vectors[:, r:], rows[:, r:], self.excitation.patterns.T @ own.vectors
+        shapes, columns, pulled = own.vectors[:, r:], rows[:, r:], patterns.T @ own.vectors
         form = (base.squares[:, None] * shapes).T @ own.vectors + (columns.T * springs) @ rows - pulled
         form[:, r:] -= pulled[:, r:].T
-        modal = rest.load - self.modal.vectors.T @ static - self.alone.asymptotic.drive
         load = base.squares * y - base.preload - static
-        along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - self.excitation.patterns.T @ y
-        constant = rest.strain + self.stored - float(static @ y)
+        along = shapes.T @ load + columns.T @ (springs * self.gap_constants[index]) - patterns.T @ y
         return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form, self.follows)
 
     def rubbing(self, element: int) -> tuple[np.ndarray, np.ndarray, float]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -118,7 +118,8 @@ class LoadedLevels:
         return self._known.get_or_build(states, lambda: self._loaded(states))
 
     def _loaded(self, states: tuple[int, ...]) -> _Known:
-        level, links = self.alone.pushed(states), self.model.links_held(states)
+        level = self.alone.pushed(states)
+        links = level.level.indices
         under = self.alone is not self or self.model.general
         return _Known(level.under(self.excitation) if under else level, links)
 
@@ -131,7 +132,8 @@ class LoadedLevels:
 
     def _made(self, states: tuple[int, ...]) -> LoadedLevel:
         level = self.model.level_at(self.model.links_held(states))
-        return replace(LoadedLevel.of(level, self.load + self.model.push(states)), own_states=states)
+        load = self.load + self.model.push(states) if self.model.general else self.load
+        return LoadedLevel.of(level, load, states)
 
     def with_channels(self, state: State) -> State:
         """A state under the static loads alone as one of these levels, at the time at which they set out."""

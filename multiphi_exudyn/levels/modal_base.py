@@ -24,8 +24,8 @@ from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
-from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.element_table import ElementTable
 
 __all__ = ["ModalBase", "parallel"]
 
@@ -34,7 +34,7 @@ CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is ro
 
 
 @dataclass(frozen=True, repr=False)
-class ModalBase(Shown):
+class ModalBase(ElementTable, Shown):
     """The structure and its contacts in coordinates y of its own modes, x = Phi y.
 
     modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, l) of
@@ -85,32 +85,6 @@ class ModalBase(Shown):
         return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
 
     @functools.cached_property
-    def links(self) -> tuple[AnyLink, ...]:
-        """All links (l,)."""
-        return links_of(self.contacts)
-
-    @functools.cached_property
-    def link_places(self) -> tuple[tuple[int, ...], ...]:
-        """Where every element's links stand among them (c,)."""
-        return link_places(self.contacts)
-
-    @functools.cached_property
-    def held(self) -> tuple[int, ...]:
-        """Links with a held place, in the order of their channels."""
-        return tuple(k for k, link in enumerate(self.links) if link.held)
-
-    @functools.cached_property
-    def oblique(self) -> dict[int, int]:
-        """Links whose force acts along another direction than theirs, each with the first link of its element."""
-        given = ((k, places[0]) for places in self.link_places for k in places[1:])
-        return {k: first for k, first in given if is_oblique(self.links[k])}
-
-    @functools.cached_property
-    def gaps(self) -> np.ndarray:
-        """Initial gaps (l,) [m]."""
-        return np.array([link.gap for link in self.links])
-
-    @functools.cached_property
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """|H| (m, l) and |gaps| (l,): with them a gap's round-off is judged."""
         return np.abs(self.directions), np.abs(self.gaps)
@@ -121,20 +95,15 @@ class ModalBase(Shown):
         return np.linalg.norm(self.directions, axis=0)
 
     @functools.cached_property
+    def units(self) -> np.ndarray:
+        """Directions (m, l) as unit vectors, zero where no mode of the base moves a contact."""
+        return self.directions / np.where(self.lengths > 0, self.lengths, 1.0)
+
+    @functools.cached_property
     def seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows (k, m) of links and points, and what a mode of unit length can move them by, then the coordinates."""
         rows = np.vstack([self.directions.T, self.points])
         return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
-
-    @functools.cached_property
-    def stiffnesses(self) -> np.ndarray:
-        """Stiffnesses (l,) [N/m], inf where rigid."""
-        return np.array([link.stiffness for link in self.links])
-
-    @functools.cached_property
-    def dampings(self) -> np.ndarray:
-        """Dampings (l,) [N s/m]."""
-        return np.array([link.damping for link in self.links])
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:
@@ -146,17 +115,6 @@ class ModalBase(Shown):
         """Sign (c,) of every contact's direction to the one that stands for it."""
         along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
         return np.where(along < 0, -1, 1)
-
-    @functools.cached_property
-    def laws(self) -> dict[int, ForceLaw]:
-        """Every force law by its position."""
-        return {i: element for i, element in enumerate(self.contacts) if isinstance(element, ForceLaw)}
-
-    def label(self, link: int) -> str:
-        """What a link is called: its name, of a force law the law's, with friction that of its contact."""
-        element = next(i for i, places in enumerate(self.link_places) if link in places)
-        own = element in self.laws or link in self.oblique
-        return self.links[element if own else link].name
 
     def pressing(self, element: int) -> dict[int, int]:
         """The links of an element that have no held place, and the sign of their directions to its own."""
@@ -214,6 +172,11 @@ class ModalBase(Shown):
             return self.damping
         directions = self.directions[:, viscous]
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
+
+    def largest_damping(self, closed: Sequence[int]) -> float:
+        """The largest number in C_l: as C_l is positive semidefinite, it stands on the diagonal."""
+        own = np.diagonal(self.damping) + self.directions[:, closed] ** 2 @ self.dampings[closed]
+        return float(own.max(initial=0.0))
 
     def damped(self, vectors: np.ndarray, closed: Sequence[int]) -> np.ndarray:
         """C_l v (m, k) of vectors (m, k), without the matrix."""

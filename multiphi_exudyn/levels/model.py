@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,7 +22,8 @@ from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, 
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.lowest_modes import left_out
 from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
+from multiphi_exudyn.mechanics.element import AnyLink, Element
+from multiphi_exudyn.mechanics.element_table import ElementTable
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -37,7 +37,7 @@ LOADS = 16  # keys of loads for which a model keeps what simulations have made o
 
 
 @dataclass(frozen=True, repr=False)
-class MultiPhiModel(Shown):
+class MultiPhiModel(ElementTable, Shown):
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
     With c contacts there are 2^c levels; every friction makes three times as many, every force law as many times as it
@@ -154,71 +154,10 @@ class MultiPhiModel(Shown):
         """Whether levels with so many modes may be taken from a base."""
         return base.complete or (modes is not None and modes <= base.served)
 
-    @functools.cached_property
-    def force_laws(self) -> tuple[ForceLaw, ...]:
-        """The force laws among the contacts."""
-        return tuple(contact for contact in self.contacts if isinstance(contact, ForceLaw))
-
-    @functools.cached_property
-    def general(self) -> bool:
-        """Whether there are elements that do more than their links: some have held places, or push."""
-        states = (state for contact in self.contacts for state in contact.states)
-        return bool(self.held) or any(state.push for state in states)
-
-    @functools.cached_property
-    def held(self) -> tuple[int, ...]:
-        """Positions of the links that have a held place, one channel each."""
-        return tuple(i for i, link in enumerate(self.links) if link.held)
-
-    @functools.cached_property
-    def links(self) -> tuple[AnyLink, ...]:
-        """The links of all elements, the first ones first: a direction with a gap, a stiffness and a damping each."""
-        return links_of(self.contacts)
-
-    @functools.cached_property
-    def link_places(self) -> tuple[tuple[int, ...], ...]:
-        """Where every element's links stand among them."""
-        return link_places(self.contacts)
-
-    @functools.cached_property
-    def rubbing(self) -> tuple[int, ...]:
-        """Positions of the elements that have friction: a link with a held place."""
-        return tuple(i for i, places in enumerate(self.link_places) if not set(places).isdisjoint(self.held))
-
-    def pressing_links(self, element: int) -> list[int]:
-        """Positions of the links that press where a contact is closed, with and without friction.
-
-        Their gap is that of its first one. Of a force law, those that hold where it is not in segment "0".
-        """
-        own, *further = self.link_places[element]
-        if isinstance(self.contacts[element], ForceLaw):
-            return further
-        return [own, *(k for k in further if is_oblique(self.links[k]))]
-
-    def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
-        """Positions of the links that hold where the elements are in these states: they name the modes."""
-        return tuple(sorted(link for held, state in zip(self._holding, states, strict=True) for link in held[state]))
-
-    @functools.cached_property
-    def _holding(self) -> list[list[list[int]]]:
-        """Positions of the links that hold, of every element in each of its states."""
-        given = zip(self.contacts, self.link_places, strict=True)
-        return [[[places[k] for k in state.holds] for state in contact.states] for contact, places in given]
-
     def push(self, states: Sequence[int]) -> np.ndarray:
         """Load (m,) of the constant forces of elements in these states."""
-        pushes = [pushed[state] for pushed, state in zip(self._pushes, states, strict=True)]
+        pushes = [pushed[state] for pushed, state in zip(self.pushes_of_states, states, strict=True)]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
-
-    @functools.cached_property
-    def _pushes(self) -> list[list[float]]:
-        """Constant forces [N] of every element in each of its states."""
-        return [[state.push for state in contact.states] for contact in self.contacts]
-
-    @functools.cached_property
-    def levels_possible(self) -> int:
-        """Number of levels: the product of the states of all elements."""
-        return math.prod(len(contact.states) for contact in self.contacts)
 
     @property
     def most_modes(self) -> int | None:

@@ -33,20 +33,17 @@ def static_response(
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``static_response`` where the directions of rigid contacts are orthogonal."""
-    elastic, free, compliance = slice(base.modes.rigid, None), slice(base.modes.rigid), base.compliance
-    touching, offsets = closed_directions.vectors[elastic], closed_directions.offsets
+    rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
+    free, touching, pressing = closed_directions.vectors[:rigid], closed_directions.vectors[rigid:], load[rigid:]
     sprung = closed_directions.stiffness != 0  # the others push with G, whatever y is
     own = 1 / np.where(sprung, closed_directions.stiffness, 1.0)
-    bent = touching.T @ (compliance[:, None] * touching)
-    carried = np.zeros((0, 0))
-    if base.modes.rigid:
-        carried = _range(closed_directions.resisting[free], INDEPENDENT * closed_directions.size)
-    coupling = closed_directions.vectors[free].T @ carried
-    sizes = _sizes(np.diagonal(bent) + sprung * np.abs(own), coupling)
-    solved = _solver(sprung[:, None] * bent + np.diag(own), sprung[:, None] * coupling, coupling, sizes)
-    pressed = -offsets - sprung * (touching.T @ (compliance * load[elastic]))
-    forces, moved = solved(pressed, -carried.T @ load[free])
-    total = drop_round_off(load[elastic] + touching @ forces, np.abs(load[elastic]) + np.abs(touching) @ np.abs(forces))
+    carried = np.zeros((rigid, 0))
+    if rigid:
+        carried = _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
+    solved = _solver(touching.T @ (compliance[:, None] * touching), own, sprung, free.T @ carried)
+    pressed = -offsets - sprung * (touching.T @ (compliance * pressing))
+    forces, moved = solved(pressed, -carried.T @ load[:rigid])
+    total = drop_round_off(pressing + touching @ forces, np.abs(pressing) + np.abs(touching) @ np.abs(forces))
     configuration = np.concatenate([carried @ moved, compliance * total])
     left = offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
     further, moved = solved(-left, np.zeros(len(moved)))  # what soft modes magnified
@@ -57,15 +54,20 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
 Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def _solver(flexibility: np.ndarray, above: np.ndarray, coupling: np.ndarray, sizes: np.ndarray) -> Solver:
-    """f (d,), z (k,) of [[flexibility, above], [coupling^T, 0]] (f, z) = (a, b) from a (d,) and b (k,).
+def _solver(bent: np.ndarray, own: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
+    """f (d,), z (k,) of [[S bent + own, S coupling], [coupling^T, 0]] (f, z) = (a, b) from a (d,) and b (k,), S 0 or 1.
 
-    Scaled by the sizes (d + k,) of the unknowns, and of the rows: pivots then do not hang on units. The smallest
-    solution where the matrix is singular: springs that cancel, under a load they allow.
+    Scaled by the sizes of the unknowns, and of the rows: pivots then do not hang on units. The smallest solution where
+    the matrix is singular: springs that cancel, under a load they allow.
     """
-    d = len(flexibility)
-    matrix = np.zeros((d + above.shape[1],) * 2)
-    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = flexibility, above, coupling.T
+    d = len(own)
+    if d == 1 and not coupling.size and own[0] + sprung[0] * bent[0, 0] != 0:
+        flexibility = own[0] + sprung[0] * bent[0, 0]
+        return lambda a, b: (a / flexibility, b)
+    sizes = _sizes(bent.diagonal() + sprung * np.abs(own), coupling)
+    matrix = np.zeros((d + coupling.shape[1],) * 2)
+    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = sprung[:, None] * bent, sprung[:, None] * coupling, coupling.T
+    matrix.flat[: d * (len(matrix) + 1) : len(matrix) + 1] += own
     matrix *= sizes
     lengths = np.abs(matrix).max(axis=1, initial=0.0)
     rows = 1 / np.where(lengths > 0, lengths, 1.0)

@@ -34,17 +34,22 @@ def modal_response(squares: np.ndarray, damping: np.ndarray, coupling: np.ndarra
 
     Raises NumericalFailure where the rates are not told apart by more than round-off.
     """
-    diagonal = np.diagonal(damping)
-    scale = np.sqrt(np.abs(np.outer(diagonal, diagonal)))
-    off_diagonal = damping - np.diag(diagonal)
-    apart = np.all(np.abs(off_diagonal) <= DIAGONAL * np.maximum(scale, np.max(scale, initial=0.0) * DIAGONAL))
-    if coupling is None or not np.any(coupling):
-        if apart:
-            return uncoupled(squares, diagonal)
-        found = lightly_damped(squares, damping)
-        if found is not None:
-            return found
-    return _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
+    alone = coupling is None or not coupling.any()
+    if alone and _uncoupled(damping):
+        return uncoupled(squares, np.diagonal(damping))
+    found = lightly_damped(squares, damping) if alone else None
+    return found or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
+
+
+def _uncoupled(damping: np.ndarray) -> bool:
+    """Whether what damping (r, r) has beside its diagonal is round-off."""
+    diagonal, beside = np.abs(damping.diagonal()), np.abs(damping)
+    beside.flat[:: len(beside) + 1] = 0.0
+    largest = diagonal.max(initial=0.0)
+    if beside.max(initial=0.0) > DIAGONAL * largest:
+        return False
+    scale = np.sqrt(np.outer(diagonal, diagonal))
+    return bool((beside <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> ModalResponse:

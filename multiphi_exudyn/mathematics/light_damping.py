@@ -26,31 +26,35 @@ __all__ = ["lightly_damped"]
 
 LIGHT = 0.2  # of omega, and of a distance of two modes: more damping is not light
 SYMMETRIC = 1e-13  # of the largest damping: round-off of a symmetric matrix
-LAST = 1e-15  # of a mode: the step after a smaller one is a fifth of it
-MOST_STEPS = 30  # of the iteration; six to ten are typical
+LAST = 2e-16  # of a mode: the step after the last, if it is as much smaller as the least of those before
+MOST_STEPS = 30  # of the iteration; three to ten are typical
 
 
 def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | None:
     """Closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
     omega, own = np.sqrt(np.maximum(squares, 0.0)), damping.diagonal()
-    mixed = (damping + damping.T) / 2
-    if not (np.abs(own) < LIGHT * omega).all() or not (np.abs(damping - mixed) <= SYMMETRIC * own.max()).all():
+    mixed, transposed = damping.copy(), damping.T
+    if not (np.abs(own) < LIGHT * omega).all() or np.abs(damping - transposed).max() > SYMMETRIC * own.max():
         return None
     each = slice(None, None, len(omega) + 1)  # the diagonal of a flat matrix
     apart = (omega[:, None] - omega) * (omega[:, None] + omega)
     mixed.flat[each], apart.flat[each] = 0.0, np.inf
     if not (np.abs(mixed).sum(axis=1)[:, None] * omega <= LIGHT * np.abs(apart)).all():
         return None
-    vectors = np.eye(len(omega), dtype=complex)
+    vectors, moved, before, falls = np.eye(len(omega), dtype=complex), mixed + 0j, 1.0, 0.0
+    coupling, diagonal, parts = moved.copy(), moved.ravel()[each], vectors.view(float)
     for _ in range(MOST_STEPS):
-        moved = mixed @ vectors
-        half = (own + moved.flat[each]) / 2
+        half = (own + diagonal) / 2
         rates = 1j * np.sqrt(squares - half * half) - half
-        moved *= rates / ((half * -2 + own[:, None]) * rates + apart)
-        moved.flat[each] = -1.0
-        step, vectors = np.abs(moved + vectors).max(), -moved
-        if step <= LAST:
+        moved *= rates / ((own[:, None] - 2 * half) * rates + apart)
+        diagonal[:] = -1.0
+        vectors += moved
+        step = float(np.abs(parts).max())
+        np.negative(moved, out=vectors)
+        before, falls = step, max(falls, step / before)
+        if step * falls <= LAST:
             return _response(squares, damping, rates, vectors)
+        np.matmul(coupling, vectors, out=moved)
     return None
 
 
@@ -59,7 +63,7 @@ def _response(squares: np.ndarray, damping: np.ndarray, rates: np.ndarray, vecto
     r = len(rates)
     theta = ((2 * rates * vectors + damping @ vectors) * vectors).sum(axis=0)
     from_velocity = (2 / theta * vectors).T
-    from_displacement = from_velocity * squares / -rates[:, None]
+    from_displacement = from_velocity * (squares / -rates[:, None])
     return ModalResponse(
         basis=Exponentials(rates, np.zeros(r, int)),
         shapes=vectors,

@@ -65,7 +65,7 @@ class Modes:
     def turned(self, rows: np.ndarray) -> Modes:
         """The same modes with what an eigensolver leaves open chosen by ``rows`` (k, n), then by the coordinates."""
         sizes = np.linalg.norm(np.vstack([rows @ self.shapes, self.shapes]), axis=1)
-        squares, shapes = turned(self.omega**2, self.shapes, rows, sizes)
+        squares, shapes, _ = turned(self.omega**2, self.shapes, rows, sizes)
         return Modes(np.sqrt(squares), shapes, self.rigid)
 
 
@@ -103,30 +103,44 @@ def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def turned(
     squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """omega^2 (m,) and modes (n, m), the same on every processor: signs, and bases of clusters of equal omega^2.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """omega^2 (m,), modes (n, m) and what rows see of them (k, m), the same on every processor.
 
-    squares: ascending. rows: (k, n), followed by the coordinates themselves. sizes: (k + n,), what modes of unit length
-    can move each of these by. Of a cluster the first row that moves in it sees the first mode only, of the others the
-    first row that moves in one of them sees the first of these only, and so on; its omega^2 become their mean. The
-    first row that moves in a mode moves forward.
+    What an eigensolver leaves open are signs, and bases of clusters of equal omega^2. squares: ascending. rows: (k, n),
+    followed by the coordinates themselves. sizes: (k + n,), what modes of unit length can move each of these by. Of a
+    cluster the first row that moves in it sees the first mode only, of the others the first row that moves in one of
+    them sees the first of these only, and so on; its omega^2 become their mean. The first row that moves in a mode
+    moves forward.
     """
-    squares, shapes = squares.copy(), shapes.copy()
-    seen = np.vstack([rows @ shapes, shapes])
-    for first, last in _clusters(squares):
+    clusters, seen = _clusters(squares), rows @ shapes
+    if clusters:
+        squares, shapes = squares.copy(), shapes.copy()
+    for first, last in clusters:
         squares[first:last] = np.mean(squares[first:last])
-        turn = _turn(seen[:, first:last], sizes)
+        turn = _turn(np.vstack([seen[:, first:last], shapes[:, first:last]]), sizes)
         lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
         cluster = shapes[:, first:last] @ turn
         shapes[:, first:last] = np.where(np.abs(cluster) <= TURNED * lengths, 0.0, cluster)
         seen[:, first:last] = seen[:, first:last] @ turn
-    forward = seen[_first_moved(np.abs(seen), sizes[:, None]), np.arange(len(squares))] >= 0
-    return squares, np.where(forward, shapes, -shapes)
+    signs = _signs(seen, shapes, sizes)
+    return squares, shapes * signs, seen * signs
+
+
+def _signs(seen: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Of every mode the sign (m,) with which the first row or coordinate moves that moves in it."""
+    moves = np.abs(seen) > MOVES * sizes[: len(seen), None]
+    if not moves.any(axis=0).all():
+        seen = np.vstack([seen, shapes])
+    first = _first_moved(np.abs(seen), sizes[: len(seen), None])
+    return np.where(seen[first, np.arange(seen.shape[1])] >= 0, 1.0, -1.0)
 
 
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
     """First and one past the last mode of every cluster of two or more equal omega^2, ascending."""
-    apart = np.diff(squares) > EQUAL * np.maximum(np.abs(squares[1:]), np.abs(squares[:-1]))
+    sizes = np.abs(squares)
+    apart = squares[1:] - squares[:-1] > EQUAL * np.maximum(sizes[1:], sizes[:-1])
+    if apart.all():
+        return []
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(squares)]
     return [(first, last) for first, last in itertools.pairwise(edges) if last - first > 1]
 

@@ -1,4 +1,4 @@
-"""Roots of the secular equation are eigenvalues to round-off, for symmetric structures too, in a few steps."""
+"""Roots of the secular equation are eigenvalues to round-off, for symmetric structures too."""
 
 import math
 
@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics import secular_equation
 from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
 
 COUNT = 12
@@ -103,15 +102,6 @@ def test_soft_modes_keep_their_digits_beside_stiff_ones():
     residual = np.sum(1 / (d - values[:, None]), axis=1)
     slope = np.sum(1 / (d - values[:, None]) ** 2, axis=1)
     assert np.max(np.abs(residual / slope) / values) < 1e-14
-
-
-@pytest.mark.parametrize("k", STIFFNESSES)
-def test_all_roots_take_a_few_steps(monkeypatch, k):
-    steps, step = [], secular_equation._middle_way
-    monkeypatch.setattr(secular_equation, "_middle_way", lambda *given: steps.append(1) or step(*given))
-    omega = np.arange(1, 201) ** 2.0
-    rank_one_modes(omega**2, np.sin(0.7 * np.arange(1, 201)), k, COUNT)
-    assert len(steps) <= 8
 
 
 def test_more_than_there_are_between_the_poles_are_left_to_others():
