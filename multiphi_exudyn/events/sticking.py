@@ -46,6 +46,7 @@ from multiphi_exudyn.events.arrays import (
     SLIP_FORWARD,
     SMALL_PROBLEM,
     SPEED,
+    SPEEDS,
     STATES,
     STATIC_LIMITS,
     STICKS,
@@ -68,7 +69,7 @@ from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, 
 from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
-from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, product
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, norm, product
 
 __all__ = ["stick_together"]
 
@@ -123,10 +124,11 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
+    sort_by_reserve(ints, numbers, count)
     pull(ints, numbers, count, asking)
     falling = 1
     while falling > 0:
-        if solve(ints, numbers, ints[SMALL_PROBLEM]) != SOLVED:
+        if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
         falling = choose(ints, numbers, count)
@@ -165,7 +167,7 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
         numbers[ints[LOWEST] + k] = -math.inf
         numbers[ints[HIGHEST] + k] = math.inf
     pose_rows(ints, count, r, n)
-    if solve(ints, numbers, problem) != SOLVED:
+    if solve(ints, numbers, problem, 0) != SOLVED:
         ints[CAUSE] = UNSETTLED
         return FAILED
     for i in range(r):
@@ -205,6 +207,30 @@ def list_at_rest(ints: Ints, numbers: Numbers, asking: int) -> int:
                 count += 1
                 asks += 1 if asked != NOBODY else 0
     return count if asks > 0 else 0
+
+
+@compiled
+def sort_by_reserve(ints: Ints, numbers: Numbers, count: int) -> None:
+    """12. Those at rest by what they bear beyond their limits: of redundant ones who has most comes to its limit last.
+
+    The others of them push with their limit, and may not bear more.
+    """
+    level, sizes = ints[ENTERED_STATE + LEVEL], ints[VALUES]
+    n = ints[level + MODES] + ints[CHANNELS]
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        more = numbers[ints[STATIC_LIMITS] + i] - numbers[ints[LIMITS] + i]
+        row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
+        size = more * pressure(ints, numbers, i) * norm(numbers, row, ints[level + MODES]) if more > 0.0 else 0.0
+        at = k
+        while at > 0 and numbers[sizes + at - 1] > size:
+            numbers[sizes + at] = numbers[sizes + at - 1]
+            ints[ints[RESTING_LIST] + at] = ints[ints[RESTING_LIST] + at - 1]
+            at -= 1
+        numbers[sizes + at] = size
+        ints[ints[RESTING_LIST] + at] = i
+    for k in range(count):
+        ints[ints[TOUCHING] + k] = ints[ints[HELD_LINKS] + ints[ints[RESTING_LIST] + k]]
 
 
 @compiled
