@@ -230,3 +230,19 @@ def test_a_spring_held_at_its_limit_does_not_ask_with_the_block_that_holds_it(
     assert [run.status for run in runs] == ["ok", "ok"]
     assert [(e.contact, e.kind) for e in runs[0].events] == [(e.contact, e.kind) for e in runs[1].events]
     assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("spring", [2e4, 1e5])
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_a_block_lets_go_beside_a_stiff_spring_that_holds_it_too(weight, spring):
+    """What its speed begins with is round-off of what the spring's mode makes of the displacement: no slip that ends."""
+    along = np.array([1.574501, -0.226633])
+    structure = mp.LinearStructure(
+        [[1.249432, 0.496701], [0.496701, 2.013816]], [[7.222403, 2.48364], [2.48364, 11.515575]]
+    )
+    pair = [mp.Friction("b", along, 1.0), mp.Friction("j", -along, 1.9, stiffness=spring)]
+    loads = [mp.HarmonicLoad([1.68, 0.9927], 5.56, 0.268), mp.ConstantLoad([1.7, 2.5], -weight)]
+    run = mp.simulate(mp.MultiPhiModel(structure, pair, modes="all"), 6.3, loads=loads)
+    assert run.status == "ok"
+    assert len(run.events) < 40
+    assert abs(run.ledger.residual) < 1e-12 * run.ledger.friction
