@@ -235,7 +235,7 @@ def test_a_spring_held_at_its_limit_does_not_ask_with_the_block_that_holds_it(
 @pytest.mark.parametrize("spring", [2e4, 1e5])
 @pytest.mark.parametrize("weight", [0.0, 1.0])
 def test_a_block_lets_go_beside_a_stiff_spring_that_holds_it_too(weight, spring):
-    """What its speed begins with is round-off of what the spring's mode makes of the displacement: no slip that ends."""
+    """Its speed begins with round-off of what the spring's mode makes of the displacement: the slip does not end."""
     along = np.array([1.574501, -0.226633])
     structure = mp.LinearStructure(
         [[1.249432, 0.496701], [0.496701, 2.013816]], [[7.222403, 2.48364], [2.48364, 11.515575]]
