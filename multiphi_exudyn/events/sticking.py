@@ -4,7 +4,9 @@
 
 f is the force along +h, f_0 that of slip, eta''_0 the acceleration in the level in which all of them slip: those that
 stick or turn are at rest relative to their counter-surface. f = -limit: slip+, f = limit: slip-, between: stick. The
-limit of a contact that gives way is mu N, a number at an instant: N goes with places and speeds alone.
+limit of a contact that gives way is mu N, a number at an instant: N goes with places and speeds alone. Such contacts
+do not slip in that level but are idle, f_0 = 0, and stay so where others stick for them: of two with one pressure the
+push of one would be the limit of the other, for as long as they are.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from multiphi_exudyn.events.arrays import (
     FURTHER,
     HELD_LINKS,
     HIGHEST,
+    IDLE,
     KEY,
     KINDS,
     LEADERS,
@@ -60,7 +63,7 @@ from multiphi_exudyn.events.arrays import (
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, is_held, transfer
+from multiphi_exudyn.events.changes import NOBODY, is_held, transfer, without_stick
 from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
 from multiphi_exudyn.events.independence import held_links, independent
 from multiphi_exudyn.events.phases import first_exit, opening
@@ -120,7 +123,7 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
         ints[key + i] = ints[wishes + i]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
-        ints[key + i] = max(ints[states + i], ints[ints[STICKS] + i] + SLIP_FORWARD)
+        ints[key + i] = without_stick(ints, i, ints[states + i])
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
@@ -245,7 +248,7 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
         i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
         presses, forward = pressure(ints, numbers, i), ints[ints[STICKS] + i] + SLIP_FORWARD
         limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
-        slipped = limit if ints[ints[KEY] + i] == forward else -limit
+        slipped = key_push(ints, i, limit)
         low, high = slipped - most, slipped + most
         if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
             low = slipped - limit if ints[asking + i] == forward else slipped + limit
@@ -257,6 +260,15 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
             numbers, ints[ACCELERATION_TERMS], ints[ACCELERATION_TERMS], row, n
         )
     pose_rows(ints, count, ints[level + MODES], n)
+
+
+@compiled
+def key_push(ints: Ints, element: int, limit: float) -> float:
+    """With what force against +h an element pushes that does not stick, in the level of ENTERED_STATE; zero if idle."""
+    way = ints[ints[KEY] + element] - ints[ints[STICKS] + element]
+    if way == IDLE:
+        return 0.0
+    return limit if way == SLIP_FORWARD else -limit
 
 
 @compiled
@@ -298,7 +310,7 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
             i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
             presses, sticks = pressure(ints, numbers, i), ints[ints[STICKS] + i]
             limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
-            slipped = limit if ints[ints[KEY] + i] == sticks + SLIP_FORWARD else -limit
+            slipped = key_push(ints, i, limit)
             side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks
             if numbers[low] == numbers[high]:
                 entered += SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
