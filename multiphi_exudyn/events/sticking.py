@@ -156,12 +156,22 @@ def let_go(ints: Ints, numbers: Numbers) -> int:
 
 @compiled
 def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
-    """ENTERED_STATE: those at rest have no speed; what is left of one for round-off would turn them. OK or FAILED."""
+    """ENTERED_STATE: those at rest have no speed; what is left of one for round-off would turn them. OK or FAILED.
+
+    Those that stick are held.
+    """
     level, v, problem = ints[ENTERED_STATE + LEVEL], ints[ENTERED_STATE + SPEED], ints[SMALL_PROBLEM]
-    r = ints[level + MODES]
+    r, loose = ints[level + MODES], 0
     n = r + ints[CHANNELS]
-    fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
     for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        if ints[ints[level + STATES] + i] != ints[ints[STICKS] + i]:
+            ints[ints[TOUCHING] + loose] = ints[ints[HELD_LINKS] + i]
+            loose += 1
+    if loose == 0:
+        return OK
+    fill_rows(ints, numbers, level, ints[TOUCHING], loose, 0)
+    for k in range(loose):
         row, terms = ints[ROWS] + k * n, 0.0
         for j in range(n):
             terms += abs(numbers[row + j]) * abs(numbers[v + j])
@@ -169,7 +179,7 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
         numbers[ints[VALUE_SIZES] + k] = terms
         numbers[ints[LOWEST] + k] = -math.inf
         numbers[ints[HIGHEST] + k] = math.inf
-    pose_rows(ints, count, r, n)
+    pose_rows(ints, loose, r, n)
     if solve(ints, numbers, problem, 0) != SOLVED:
         ints[CAUSE] = UNSETTLED
         return FAILED

@@ -246,3 +246,20 @@ def test_a_block_lets_go_beside_a_stiff_spring_that_holds_it_too(weight, spring)
     assert run.status == "ok"
     assert len(run.events) < 40
     assert abs(run.ledger.residual) < 1e-12 * run.ledger.friction
+
+
+@pytest.mark.parametrize("speed", [0.565, 0.3])
+@pytest.mark.parametrize("mass", [1.0, 1.3, 1.6, 2.0])
+def test_two_that_stick_to_each_other_come_to_rest_on_a_belt_as_one_body(mass, speed):
+    """No unknown is left there: the round-off of the belt's speed is no speed that something could take away."""
+    pull, runs = mp.HarmonicLoad("a", 2.05, 1.23), []
+    for masses, stiffness in ((np.diag([1.26, mass]), [[40.0, -40.0], [-40.0, 40.0]]), ([[1.26 + mass]], [[0.0]])):
+        structure = mp.LinearStructure(masses, stiffness, points={"a": 0})
+        belt = mp.Friction("belt", {"a": -1.0}, 1.05, velocity=speed)
+        joint = [mp.Friction("joint", [-1.0, 1.0], 8.8)] if len(stiffness) > 1 else []
+        start = np.full(len(stiffness), 0.3)
+        runs.append(mp.simulate(mp.MultiPhiModel(structure, [belt, *joint], modes="all"), 6.0, None, start, [pull]))
+    t = np.linspace(0, 6, 61)
+    assert [run.status for run in runs] == ["ok"] * 2
+    assert_allclose(runs[0].at("a", t), runs[1].at("a", t), rtol=0, atol=1e-12)
+    assert np.any(np.diff(runs[0].stick_intervals("belt")) > 0)
