@@ -12,12 +12,14 @@ from multiphi_exudyn.events.arrays import (
     CHANGE_IMPULSES,
     CHANGE_WIDTH,
     CHANGES,
+    COMPLIANT,
     ELEMENT,
     ELEMENTS,
     EXIT_COUNT,
     EXIT_INTS,
     EXITS,
     FORWARD,
+    IDLE,
     KINDS,
     LEVEL,
     LOSSES,
@@ -27,11 +29,13 @@ from multiphi_exudyn.events.arrays import (
     OPEN,
     RIGID,
     SEGMENTS,
+    SLIP_FORWARD,
     SPRINGS,
     STATES,
     STICKS,
     TRANSITIONS_NOW,
     TURN,
+    VISCOUS,
     WORKED,
 )
 from multiphi_exudyn.events.energies import lose
@@ -52,6 +56,7 @@ __all__ = [
     "segment_at",
     "transfer",
     "turn_wishes",
+    "without_stick",
 ]
 
 NOBODY = -1  # in place of the state that an element asks for
@@ -108,6 +113,17 @@ def bears_nothing(ints: Ints, numbers: Numbers, element: int) -> int:
     """12. 1 where friction without a spring bears no impulse: its pressure is no reaction."""
     rigid = ints[ints[STICKS] + element] >= 0 and numbers[ints[SPRINGS] + element] == 0.0
     return 1 if rigid and ints[ints[KINDS] + element] != RIGID else 0
+
+
+@compiled
+def without_stick(ints: Ints, element: int, before: int) -> int:
+    """12. The state of friction that does not stick where it could: idle at a contact that gives way, else in slip.
+
+    There the slip that it is in ``before``, or forward.
+    """
+    sticks = ints[ints[STICKS] + element]
+    gives_way = ints[ints[KINDS] + element] in (COMPLIANT, VISCOUS)
+    return sticks + IDLE if gives_way else max(before, sticks + SLIP_FORWARD)
 
 
 @compiled

@@ -59,12 +59,14 @@ bases of two levels need not agree, so the law says what happens then; each sent
    give way with their mu N of the instant: their forces within their limits, static ones until they slip, are
    complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:
    others may bear less after it, and stick on. What that leaves to the next derivative, and to truncation, each decides
-   alone. Of redundant ones an independent set sticks; the others push with their limit, as if they slipped, and take
-   over when they are needed: the motion is the same. So do those along a closed rigid contact. One that would be pulled
-   beside what sticks opens, and all is decided once more without it. None bears an impulse, nor does the friction of a
-   contact that gives way.
-   -> sticking.stick_together, sticking.decide_at_rest, sticking.choose, sticking.thin_out_idle, sticking.let_go,
-   independence.thin_out, independence.follows, striking.slide_on, changes.bears_nothing
+   alone. Of redundant ones an independent set sticks, at last who bears the most beyond its limit; the others push with
+   their limit, as if they slipped, or are idle at a contact that gives way, and take over when they are needed: the
+   motion is the same where not more than one has a static limit. So do those along a closed rigid contact. One that
+   would be pulled beside what sticks opens, and all is decided once more without it. None bears an impulse, nor does
+   the friction of a contact that gives way.
+   -> sticking.stick_together, sticking.decide_at_rest, sticking.sort_by_reserve, sticking.choose,
+   sticking.thin_out_idle, sticking.let_go, independence.thin_out, independence.follows, striking.slide_on,
+   changes.bears_nothing, changes.without_stick
 
 An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
 ``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing

@@ -167,7 +167,7 @@ def nearest(
         ints, problem, rows, r, n, ints[ROWS], ints[PUSHING], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
         ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], multipliers,
     )  # fmt: skip
-    answer = solve(ints, numbers, problem)
+    answer = solve(ints, numbers, problem, 0)
     if answer == EXCLUDED:
         ints[CAUSE] = SQUEEZED
         for i in range(ints[ELEMENTS]):

@@ -23,7 +23,7 @@ from multiphi_exudyn.events.arrays import (
     UNION,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY
+from multiphi_exudyn.events.changes import NOBODY, without_stick
 from multiphi_exudyn.events.phases import is_refused
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.free_rows import norm
@@ -94,8 +94,8 @@ def thin_out(ints: Ints, numbers: Numbers, wishes: int) -> None:
             ints[union + i] = held
             if independent(ints, numbers, union) == 0:
                 ints[union + i] = before
-                slips = ints[ints[STICKS] + i] + 1
-                ints[wishes + i] = NOBODY if ints[states + i] >= slips else slips
+                slips = ints[states + i] > ints[ints[STICKS] + i]
+                ints[wishes + i] = NOBODY if slips else without_stick(ints, i, ints[states + i])
 
 
 @compiled

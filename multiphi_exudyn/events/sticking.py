@@ -4,7 +4,9 @@
 
 f is the force along +h, f_0 that of slip, eta''_0 the acceleration in the level in which all of them slip: those that
 stick or turn are at rest relative to their counter-surface. f = -limit: slip+, f = limit: slip-, between: stick. The
-limit of a contact that gives way is mu N, a number at an instant: N goes with places and speeds alone.
+limit of a contact that gives way is mu N, a number at an instant: N goes with places and speeds alone. Such contacts
+do not slip in that level but are idle, f_0 = 0, and stay so where others stick for them: of two with one pressure the
+push of one would be the limit of the other, for as long as they are.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from multiphi_exudyn.events.arrays import (
     FURTHER,
     HELD_LINKS,
     HIGHEST,
+    IDLE,
     KEY,
     KINDS,
     LEADERS,
@@ -46,6 +49,7 @@ from multiphi_exudyn.events.arrays import (
     SLIP_FORWARD,
     SMALL_PROBLEM,
     SPEED,
+    SPEEDS,
     STATES,
     STATIC_LIMITS,
     STICKS,
@@ -59,7 +63,7 @@ from multiphi_exudyn.events.arrays import (
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.changes import NOBODY, is_held, transfer
+from multiphi_exudyn.events.changes import NOBODY, is_held, transfer, without_stick
 from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
 from multiphi_exudyn.events.independence import held_links, independent
 from multiphi_exudyn.events.phases import first_exit, opening
@@ -68,7 +72,7 @@ from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, 
 from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
-from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, product
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, norm, product
 
 __all__ = ["stick_together"]
 
@@ -119,14 +123,15 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
         ints[key + i] = ints[wishes + i]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
-        ints[key + i] = max(ints[states + i], ints[ints[STICKS] + i] + SLIP_FORWARD)
+        ints[key + i] = without_stick(ints, i, ints[states + i])
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
+    sort_by_reserve(ints, numbers, count)
     pull(ints, numbers, count, asking)
     falling = 1
     while falling > 0:
-        if solve(ints, numbers, ints[SMALL_PROBLEM]) != SOLVED:
+        if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
         falling = choose(ints, numbers, count)
@@ -151,12 +156,22 @@ def let_go(ints: Ints, numbers: Numbers) -> int:
 
 @compiled
 def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
-    """ENTERED_STATE: those at rest have no speed; what is left of one for round-off would turn them. OK or FAILED."""
+    """ENTERED_STATE: those at rest have no speed; what is left of one for round-off would turn them. OK or FAILED.
+
+    Those that stick are held.
+    """
     level, v, problem = ints[ENTERED_STATE + LEVEL], ints[ENTERED_STATE + SPEED], ints[SMALL_PROBLEM]
-    r = ints[level + MODES]
+    r, loose = ints[level + MODES], 0
     n = r + ints[CHANNELS]
-    fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
     for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        if ints[ints[level + STATES] + i] != ints[ints[STICKS] + i]:
+            ints[ints[TOUCHING] + loose] = ints[ints[HELD_LINKS] + i]
+            loose += 1
+    if loose == 0:
+        return OK
+    fill_rows(ints, numbers, level, ints[TOUCHING], loose, 0)
+    for k in range(loose):
         row, terms = ints[ROWS] + k * n, 0.0
         for j in range(n):
             terms += abs(numbers[row + j]) * abs(numbers[v + j])
@@ -164,8 +179,8 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
         numbers[ints[VALUE_SIZES] + k] = terms
         numbers[ints[LOWEST] + k] = -math.inf
         numbers[ints[HIGHEST] + k] = math.inf
-    pose_rows(ints, count, r, n)
-    if solve(ints, numbers, problem) != SOLVED:
+    pose_rows(ints, loose, r, n)
+    if solve(ints, numbers, problem, 0) != SOLVED:
         ints[CAUSE] = UNSETTLED
         return FAILED
     for i in range(r):
@@ -208,6 +223,30 @@ def list_at_rest(ints: Ints, numbers: Numbers, asking: int) -> int:
 
 
 @compiled
+def sort_by_reserve(ints: Ints, numbers: Numbers, count: int) -> None:
+    """12. Those at rest by what they bear beyond their limits: of redundant ones who has most comes to its limit last.
+
+    The others of them push with their limit, and may not bear more.
+    """
+    level, sizes = ints[ENTERED_STATE + LEVEL], ints[VALUES]
+    n = ints[level + MODES] + ints[CHANNELS]
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        more = numbers[ints[STATIC_LIMITS] + i] - numbers[ints[LIMITS] + i]
+        row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
+        size = more * pressure(ints, numbers, i) * norm(numbers, row, ints[level + MODES]) if more > 0.0 else 0.0
+        at = k
+        while at > 0 and numbers[sizes + at - 1] > size:
+            numbers[sizes + at] = numbers[sizes + at - 1]
+            ints[ints[RESTING_LIST] + at] = ints[ints[RESTING_LIST] + at - 1]
+            at -= 1
+        numbers[sizes + at] = size
+        ints[ints[RESTING_LIST] + at] = i
+    for k in range(count):
+        ints[ints[TOUCHING] + k] = ints[ints[HELD_LINKS] + ints[ints[RESTING_LIST] + k]]
+
+
+@compiled
 def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
     """The problem of those at rest: what accelerates them where all of them slip, and what force they may add."""
     level = ints[ENTERED_STATE + LEVEL]
@@ -219,7 +258,7 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
         i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
         presses, forward = pressure(ints, numbers, i), ints[ints[STICKS] + i] + SLIP_FORWARD
         limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
-        slipped = limit if ints[ints[KEY] + i] == forward else -limit
+        slipped = key_push(ints, i, limit)
         low, high = slipped - most, slipped + most
         if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
             low = slipped - limit if ints[asking + i] == forward else slipped + limit
@@ -231,6 +270,15 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
             numbers, ints[ACCELERATION_TERMS], ints[ACCELERATION_TERMS], row, n
         )
     pose_rows(ints, count, ints[level + MODES], n)
+
+
+@compiled
+def key_push(ints: Ints, element: int, limit: float) -> float:
+    """With what force against +h an element pushes that does not stick, in the level of ENTERED_STATE; zero if idle."""
+    way = ints[ints[KEY] + element] - ints[ints[STICKS] + element]
+    if way == IDLE:
+        return 0.0
+    return limit if way == SLIP_FORWARD else -limit
 
 
 @compiled
@@ -272,7 +320,7 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
             i, low, high = ints[ints[RESTING_LIST] + k], ints[LOWEST] + k, ints[HIGHEST] + k
             presses, sticks = pressure(ints, numbers, i), ints[ints[STICKS] + i]
             limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
-            slipped = limit if ints[ints[KEY] + i] == sticks + SLIP_FORWARD else -limit
+            slipped = key_push(ints, i, limit)
             side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks
             if numbers[low] == numbers[high]:
                 entered += SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD

@@ -101,7 +101,7 @@ def wait_for(
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
     n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
     x, v, scale = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH]
-    first = ints[SIGNALS] + count * p
+    first, swing = ints[SIGNALS] + count * p, ints[CURRENT + SWING]
     signal_waves(ints, numbers, waves, CURRENT, signal, first)
     constant, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
     constant = sign * (constant + held_part(ints, numbers, CURRENT, signal))
@@ -113,7 +113,7 @@ def wait_for(
     begins = sign * numbers[row + 2 * n]
     for i in range(n):
         size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
-        size += abs(numbers[row + n + i]) * abs(numbers[v + i])
+        size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
         begins += sign * (numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i])
     if rate == 0 and entered == 0 and begins < 0.0:
         terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)

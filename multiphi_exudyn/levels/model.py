@@ -295,8 +295,9 @@ class MultiPhiModel(ElementTable, Shown):
         ----------
         closed : iterable of str, or mapping of str to str, default ()
             Names of the closed contacts, all others open, force laws in segment "0". Or {name: state}: "closed" of a
-            contact, "stick", "slip+" or "slip-" of friction, "+1", "-1", ... of a force law; the others are in their
-            first state, contacts open. States that differ by constant forces alone have one level.
+            contact, "stick", "slip+" or "slip-" of friction, "idle" where it gives way and others stick for it, "+1",
+            "-1", ... of a force law; the others are in their first state, contacts open. States that differ by constant
+            forces alone have one level.
 
         Raises
         ------

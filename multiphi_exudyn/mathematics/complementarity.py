@@ -160,8 +160,11 @@ def pose(
 
 
 @compiled
-def solve(ints: Ints, numbers: Numbers, problem: int) -> int:
-    """x (r,) and z (k,); SOLVED, EXCLUDED with those rows that exclude each other, or UNDECIDED."""
+def solve(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> int:
+    """x (r,) and z (k,); SOLVED, EXCLUDED with those rows that exclude each other, or UNDECIDED.
+
+    in_turn: 1 where the first of redundant rows come to their bounds first, 0 where those violated most do.
+    """
     count, x, z = ints[problem + COUNT], ints[problem + X], ints[problem + Z]
     for i in range(ints[problem + UNKNOWNS]):
         numbers[x + i] = 0.0
@@ -169,8 +172,8 @@ def solve(ints: Ints, numbers: Numbers, problem: int) -> int:
         numbers[z + k] = 0.0
     if count == 1:
         return only_one(ints, numbers, problem)
-    answer = attempt(ints, numbers, problem, 0)
-    return answer if answer == SOLVED else attempt(ints, numbers, problem, 1)
+    answer = attempt(ints, numbers, problem, in_turn)
+    return answer if answer == SOLVED else attempt(ints, numbers, problem, 1 - in_turn)
 
 
 @compiled

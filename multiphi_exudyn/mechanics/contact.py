@@ -233,7 +233,7 @@ class UnilateralContact:
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """Open and closed; where there is friction, open, stick, slip+ and slip-."""
+        """Open and closed; where there is friction, open, stick, slip+, slip-, and idle where others stick for it."""
         plain = contact_states(self.rigid, self.damping > 0)
         if not self.further:
             return plain
@@ -249,7 +249,13 @@ class UnilateralContact:
             ElementState("stick", "stick", (*stick, opening), holds=(0, 1)),
             self._slip("+", 1.0, 2, opening),
             self._slip("-", -1.0, 3, opening),
+            *(() if self.rigid or turn is None else (self._idle(opening),)),
         )
+
+    def _idle(self, opening: Exit) -> ElementState:
+        """It does not push, as what sticks elsewhere holds it: h_t.x' = v_t, and it sticks itself where that ends."""
+        moves = (Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),)) for s in (1.0, -1.0))
+        return ElementState("idle", "stick", (*moves, opening), holds=(0,))
 
     def _slip(self, sign: str, s: float, link: int, opening: Exit) -> ElementState:
         """s (h_t.x' - v_t - s mu N' / k_t) >= 0, N' = -k h.x' of an elastic contact; and what opens it."""

@@ -7,6 +7,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
     "backward slip: ..."      truncated friction that moves against its slip (rubbing.py)
     "redundant friction: ..." which of several bears the load, and when they slip, is not unique (rubbing.py)
+    "friction in turn: ..."   rigid contacts that rub and turn at one instant, whose order may count (rubbing.py)
     "lost energy: ..."        what truncation took of the largest energy of the run
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
     "undamped modes: ..."     modes for which a list of modal ratios has none

@@ -1,8 +1,10 @@
 """What to distrust in the friction of a run: what several bear together, and what truncation turns round.
 
 Friction without a spring that follows from what sticks beside it moves as that does: it pushes with its kinetic limit,
-as if it slipped (decision.py). Which of them bears the load is then not determined, and where static limits are higher
-neither is when they begin to slip: two of equal limits F and static limits S do at S + F here, and might at 2 S.
+as if it slipped (decision.py). Where one of them has a higher static limit, that one bears it. Where several have,
+which of them bears the load is not determined, nor when they begin to slip: two of equal limits F and static limits S
+do at S + F here, and might at 2 S. Friction at rigid contacts is decided one contact after the other: where several
+turn at one instant, their order may count.
 
 A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py).
 """
@@ -10,14 +12,17 @@ A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.exits import signal_row, state_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import CLEAR
@@ -35,43 +40,88 @@ def rubbing_warnings(segments: Sequence[Segment], model: MultiPhiModel) -> Itera
     """One sentence of each kind at most."""
     if model.general and len(segments):
         yield from _shared(listed(segments))
+        yield from _in_turn(listed(segments))
         if not model.whole:
             yield from _backwards(listed(segments))
 
 
 def _shared(segments: Segments) -> Iterator[str]:
     """Of those that push with the smallest share of their static limit."""
-    contacts = segments.levels[0].level.base.contacts
-    springs = [(i, *friction_spring(element)) for i, element in enumerate(contacts)]
-    dropping = [(i, sticks, number, drop) for i, sticks, number, spring, drop in springs if drop > 0 and not spring]
-    found = [together for level in segments.levels for given in dropping for together in _together(level, *given)]
+    dropping = [rub for rub in _rigid_friction(segments) if rub.drop > 0]
+    pairs = [(one, other) for one in dropping for other in dropping if one is not other]
+    found = [together for level in segments.levels for pair in pairs for together in _together(level, *pair)]
     if found:
         share, name, others = min(found)
         yield (
-            f"redundant friction: {name!r} follows from what sticks at {', '.join(map(repr, others))}, so which of "
-            f"them bears the load, and when they begin to slip, is not unique: it pushes with its kinetic limit, "
-            f"{per_cent(share)} of its static one; {REMEDY}"
+            f"redundant friction: {name!r} follows from {', '.join(map(repr, others))}, so which of them bears the "
+            f"load, and when they begin to slip, is not unique: it pushes with its kinetic limit, {per_cent(share)} of "
+            f"its static one; {REMEDY}"
         )
 
 
-def _together(
-    level: LoadedLevel, element: int, sticks: int, number: int, drop: float
-) -> Iterator[tuple[float, str, tuple[str, ...]]]:
-    """Of friction that follows from what is held in a level: its share of its static limit, itself, and the others."""
-    base = level.level.base
-    held, link = [k for k in level.level.indices if base.links[k].rigid], base.link_places[element][number]
-    if not held or level.states[element] <= sticks:
+class _Rub(NamedTuple):
+    """Friction without a spring: its place, name and link, the state in which it sticks, and what it drops there."""
+
+    element: int
+    name: str
+    link: int
+    sticks: int
+    drop: float
+    pressed: bool  # by a rigid contact
+
+
+def _rigid_friction(segments: Segments) -> list[_Rub]:
+    base, found = segments.levels[0].level.base, []
+    for i, element in enumerate(base.contacts):
+        sticks, number, spring, drop = friction_spring(element)
+        if sticks >= 0 and not spring:
+            pressed = element.rigid and not element.held
+            found.append(_Rub(i, element.name, base.link_places[i][number], sticks, drop, pressed))
+    return found
+
+
+def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[float, str, tuple[str, ...]]]:
+    """Of friction that slips in a level, and follows from another one and from what is held there: its share, all."""
+    base, open_ = level.level.base, level.states[other.element] < other.sticks
+    if open_ or level.states[one.element] <= one.sticks:
         return
-    rows, row = base.directions[:, held], base.directions[:, link]
+    held = [k for k in level.level.indices if base.links[k].rigid and k != other.link] + [other.link]
+    rows, row = base.directions[:, held], base.directions[:, one.link]
     shares = np.linalg.lstsq(rows, row, rcond=None)[0]
-    own, carried = base.links[link].velocity, shares * [base.links[k].velocity for k in held]
+    own, carried = base.links[one.link].velocity, shares * [base.links[k].velocity for k in held]
     slides = abs(own - np.sum(carried)) > CLEAR * (abs(own) + np.sum(np.abs(carried)))
-    if slides or np.linalg.norm(row - rows @ shares) > INDEPENDENT * np.linalg.norm(row):
+    alone = np.linalg.norm(row - rows @ shares) > INDEPENDENT * np.linalg.norm(row)
+    if slides or alone or abs(shares[-1]) <= INDEPENDENT:
         return
     owners = {k: i for i, places in enumerate(base.link_places) for k in places}
     taken = [owners[k] for k, share in zip(held, shares, strict=True) if abs(share) > INDEPENDENT]
-    others = tuple(dict.fromkeys(base.contacts[k].name for k in taken))
-    yield math.sqrt(1.0 - drop), base.contacts[element].name, others
+    yield math.sqrt(1.0 - one.drop), one.name, tuple(dict.fromkeys(base.contacts[k].name for k in taken))
+
+
+def _in_turn(segments: Segments) -> Iterator[str]:
+    """Of friction at rigid contacts that turns with other friction at one instant, where not all of it sticks."""
+    rubs = _rigid_friction(segments)
+    if len(rubs) < 2 or not any(rub.pressed for rub in rubs):
+        return
+    for before, after in np.unique(np.column_stack([segments.numbers[:-1], segments.numbers[1:]]), axis=0):
+        left, entered = (segments.levels[k].states for k in (before, after))
+        turned = [r for r in rubs if left[r.element] > r.sticks <= entered[r.element] != left[r.element]]
+        several = any(_coupled(segments.levels[0].level.base, *pair) for pair in itertools.combinations(turned, 2))
+        loose = any(entered[rub.element] > rub.sticks for rub in turned)
+        if several and loose and any(rub.pressed for rub in turned) and any(rub.drop > 0 for rub in turned):
+            yield (
+                f"friction in turn: {', '.join(repr(rub.name) for rub in turned)} come to rest at one instant and are "
+                f"decided one after the other, as a rigid contact rubs: with static limits above the kinetic ones "
+                f"another order may have another answer; {REMEDY}"
+            )
+            return
+
+
+def _coupled(base: ModalBase, one: _Rub, other: _Rub) -> bool:
+    """Whether a force of one accelerates the other."""
+    first, second = (base.directions[:, [rub.element, rub.link]] for rub in (one, other))
+    sizes = np.outer(np.linalg.norm(first, axis=0), np.linalg.norm(second, axis=0))
+    return bool(np.any(np.abs(first.T @ second) > INDEPENDENT * sizes))
 
 
 def _backwards(segments: Segments) -> Iterator[str]:

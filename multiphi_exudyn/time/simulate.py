@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.arrays import CLOSE, OPEN
+from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -349,7 +349,7 @@ def started(run: Run) -> Run:
 
 
 def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
-    """States of which, of rigid links that would stick, an independent set does; the others push till it is decided."""
+    """States of which, of rigid links that would stick, an independent set does; the others wait till it is decided."""
     found = np.zeros((0, len(model.base.directions)))
     for i, element in enumerate(model.contacts):
         sticks, number, spring, _ = friction_spring(element)
@@ -362,7 +362,7 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
             if size > INDEPENDENT:
                 found = np.vstack([found, left / size])
             else:
-                states[i] = sticks + 1
+                states[i] = sticks + (SLIP_FORWARD if element.held else IDLE)
     return states
 
 

@@ -145,7 +145,7 @@ class Search:
         )  # fmt: skip
 
 
-def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=None, run=fast):
+def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=None, in_turn=0, run=fast):
     """(x, z, answer, rows that exclude each other) of complementarity.py; pushes None: the rows themselves."""
     (k, r), buffers = rows.shape, Buffers()
     given = [buffers.put_numbers(rows)]
@@ -158,7 +158,7 @@ def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=Non
     problem = buffers.put_ints(np.full(complementarity.problem_ints(k), -1))
     complementarity.lay_out(buffers.ints, problem, k, r, scratch)
     complementarity.pose(buffers.ints, problem, k, r, r, *given, led, tied, x, z)
-    answer = run(complementarity.solve)(*buffers.all[:2], problem)
+    answer = run(complementarity.solve)(*buffers.all[:2], problem, in_turn)
     listed = buffers.ints[problem + free_rows.EXCLUDED_ROWS]
     excluded = buffers.ints[listed:][: buffers.ints[problem + free_rows.EXCLUDING]].tolist()
     return buffers.numbers[x : x + r].copy(), buffers.numbers[z : z + k].copy(), answer, excluded

@@ -122,6 +122,17 @@ def test_equal_friction_on_one_point_is_borne_by_both():
     assert_allclose(z, limits, rtol=0, atol=0)
 
 
+@pytest.mark.parametrize("pull", [0.8, 2.5, 3.2, 4.0])
+def test_redundant_rows_in_turn_come_to_their_bounds_in_turn(pull):
+    """The first bears what it can, then the next, whichever of their rows is the longest."""
+    levers, most = np.array([1.0, -3.0, 0.5]), np.array([1.0, 2.0, 1.0])
+    rows, limits = levers[:, None], most / np.abs(levers)
+    values = -pull * levers
+    _, z, answer, _ = complementary(rows, None, values, np.abs(values), -limits, limits, in_turn=1)
+    assert answer == SOLVED
+    assert_allclose(z * levers, np.clip(pull - np.array([0.0, 1.0, 3.0]), 0.0, most), atol=1e-14)
+
+
 def test_rows_that_exclude_each_other_are_named():
     rows = np.array([[1.0, 0.0], [0.0, 1.0], [-2.0, 0.0]])
     *_, answer, excluded = complementary(

@@ -350,8 +350,42 @@ class TestFriction:
         return mp.simulate(model, 1.0, loads=[mp.SampledLoad("m", [0.0, 1.0], [0.0, 1.0])])
 
     def test_that_is_redundant_is_told_where_static_limits_make_it_ambiguous(self):
-        with pytest.warns(mp.MultiPhiWarning, match="redundant friction: 'b' follows from what sticks at 'a'.*67 % of"):
+        with pytest.warns(mp.MultiPhiWarning, match="redundant friction: 'b' follows from 'a'.*67 % of"):
             self.pads(1.5)
+
+    @pytest.mark.parametrize(("static", "told"), [((1.5, 2.0), ["redundant friction"]), ((1.0, 2.0), [])])
+    def test_that_is_redundant_is_told_where_it_only_slips(self, static, told):
+        """A drive that 1.5 + 2 would hold and 1 + 2 does not turns them: no instant at which one sticks for both."""
+        pads = [mp.Friction(name, "m", 1.0, limit) for name, limit in zip("ab", static, strict=True)]
+        structure = mp.LinearStructure([[1.0]], [[0.0]], points={"m": 0})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            model = mp.MultiPhiModel(structure, pads, modes="all")
+            run = mp.simulate(model, 2.0, velocity=[1.0], loads=[mp.ConstantLoad("m", -3.2)])
+        assert run.velocity(2.0) == pytest.approx([-(2.0 - 1 / 5.2) * 1.2], rel=1e-12)
+        assert kinds(run) == told
+
+    @pytest.mark.parametrize(
+        ("loads", "coupling", "told"),
+        [((4.5, 3.8), -0.3, ["friction in turn"]), ((3.5, 3.5), -0.3, []), ((4.5, 3.8), 0.0, [])],
+    )
+    def test_at_rigid_contacts_that_turns_at_one_instant_is_told(self, loads, coupling, told):
+        """Two blocks on the floor, coupled by their mass; at 3.5 N both stick, which no order changes."""
+        mass, kinetic = np.eye(4), 0.3 * 9.81
+        mass[0, 2] = mass[2, 0] = coupling
+        structure = mp.LinearStructure(mass, np.zeros((4, 4)), points={"x": 0, "y": 1, "u": 2, "v": 3})
+        blocks = [
+            mp.UnilateralContact(name, up, 0.0, friction=0.3, tangential=along, static_friction=0.4)
+            for name, along, up in (("a", "x", "y"), ("b", "u", "v"))
+        ]
+        slowed = np.linalg.solve(mass[::2, ::2], np.array(loads) + kinetic)  # both stop after 1 s
+        weight = [mp.ConstantLoad(up, -9.81) for up in "yv"]
+        pulls = [mp.ConstantLoad(along, -load) for along, load in zip("xu", loads, strict=True)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            model = mp.MultiPhiModel(structure, blocks, modes="all")
+            run = mp.simulate(model, 2.0, velocity=[slowed[0], 0.0, slowed[1], 0.0], loads=weight + pulls)
+        assert kinds(run) == told
 
     def test_of_constant_limits_or_on_another_belt_is_determined(self):
         assert self.pads(None).warnings == self.pads(1.5, 2.0).warnings == ()

@@ -294,11 +294,13 @@ def test_of_two_feet_of_a_rigid_body_one_sticks_for_both(amplitude):
     assert_allclose(*found, rtol=0, atol=1e-12)
 
 
-def sled(arms, height, stiffness, friction=0.37):
+def sled(arms, height, stiffness, friction=0.37, **given):
     """A body that only its feet hold along x; weak springs hold how deep it sinks, and how it tips."""
     along = np.array([1.0, 0.0, height])
     feet = [
-        mp.UnilateralContact(name, np.array([0.0, 1.0, x]), 0.0, stiffness, friction=friction, tangential=along)
+        mp.UnilateralContact(
+            name, [0.0, 1.0, x], 0.0, stiffness, friction=friction, tangential=along if friction else None, **given
+        )
         for name, x in zip(("rear", "front"), arms, strict=True)
     ]
     structure = mp.LinearStructure(np.diag([1.0, 1.0, 0.5]), np.diag([0.0, 0.1, 0.1]))
@@ -329,3 +331,28 @@ def test_a_sled_on_elastic_feet_begins_at_rest():
     run = mp.simulate(model, 1.0, [0.0, -G / 2e3, 0.0], np.zeros(3), weight)
     assert run.status == "ok"
     assert_allclose(run.displacement(1.0)[0] + 0.3 * run.displacement(1.0)[2], 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("sunk", [0.0, 0.01])
+@pytest.mark.parametrize("height", [0.0, 0.3, 0.7])
+def test_a_sled_on_two_equal_elastic_feet_bounces_straight_up_and_down(height, sunk):
+    """Their friction is idle: one sticks for both, the other one does not push, and no pressure makes it slip."""
+    model, weight = sled((-1.0, 1.0), height, 1e3)
+    run, t = mp.simulate(model, 1.0, [0.0, -sunk, 0.0], np.zeros(3), weight), np.linspace(0, 1, 41)
+    smooth = mp.simulate(sled((-1.0, 1.0), height, 1e3, friction=0.0)[0], 1.0, [0.0, -sunk, 0.0], np.zeros(3), weight)
+    assert run.status == "ok"
+    assert_allclose(run.displacement(t), smooth.displacement(t), rtol=0, atol=1e-13)
+    assert np.max(np.abs(run.friction_force("rear", t) + run.friction_force("front", t))) < 1e-10
+    assert run.ledger.friction == pytest.approx(0.0, abs=1e-15)
+    assert len(run.events) < 50
+
+
+@pytest.mark.parametrize(("arms", "speed"), [((-1.0, 1.0), 0.5), ((-0.8, 1.3), 0.0)])
+def test_a_sled_that_bounces_and_tips_is_the_limit_of_stiff_friction(arms, speed):
+    """Idle friction takes over when the one that sticks for it slips or lifts off."""
+    t, found = np.linspace(0, 1, 41), []
+    for spring in (math.inf, 1e6, 1e8):
+        model, weight = sled(arms, 0.7, 1e3, tangential_stiffness=spring)
+        found.append(mp.simulate(model, 1.0, np.zeros(3), [speed, 0.0, 0.0], weight).displacement(t))
+    errors = [np.max(np.abs(other - found[0])) / np.max(np.abs(found[0])) for other in found[1:]]
+    assert errors[1] < 0.2 * errors[0] < 2e-3

@@ -189,6 +189,24 @@ def test_redundant_ones_let_go_where_none_can_take_over(given):
     assert runs[1].ledger.residual == pytest.approx(0.0, abs=1e-13)
 
 
+@pytest.mark.parametrize("levers", [(1.0, 1.0, 1.0), (1.0, -3.0, 0.5)])
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+@pytest.mark.parametrize(("force", "speed"), [(1.6, 1.0), (2.45, 1.0), (2.45, 0.0), (2.55, 1.0)])
+def test_what_comes_to_rest_stays_while_static_limits_hold_it(force, speed, order, levers):
+    """Limits 0.2, 0.3 and 1 of one motion, the last one 2 at rest: at rest 2.5, whichever is named first."""
+    limits = [(0.2, 0.2), (0.3, 0.3), (1.0, 2.0)]
+    several = [
+        mp.Friction(f"f{k}", {"m": lever}, limit / abs(lever), static_limit=static / abs(lever))
+        for k, lever, (limit, static) in ((k, levers[k], limits[k]) for k in order)
+    ]
+    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"m": 0})
+    model, load = mp.MultiPhiModel(structure, several, modes="all"), mp.ConstantLoad("m", -force)
+    run, stops = mp.simulate(model, 2.0, velocity=[speed], loads=[load]), speed / (force + 1.5)
+    later = max(2.0 - stops, 0.0) if force > 2.5 else 0.0
+    assert_allclose(run.velocity(2.0), [-(force - 1.5) * later], rtol=1e-13, atol=1e-15)
+    assert run.warnings == ()
+
+
 @pytest.mark.parametrize(
     ("stiffness", "force", "hertz", "limits", "spring", "speed"),
     [
@@ -212,3 +230,36 @@ def test_a_spring_held_at_its_limit_does_not_ask_with_the_block_that_holds_it(
     assert [run.status for run in runs] == ["ok", "ok"]
     assert [(e.contact, e.kind) for e in runs[0].events] == [(e.contact, e.kind) for e in runs[1].events]
     assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("spring", [2e4, 1e5])
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_a_block_lets_go_beside_a_stiff_spring_that_holds_it_too(weight, spring):
+    """Its speed begins with round-off of what the spring's mode makes of the displacement: the slip does not end."""
+    along = np.array([1.574501, -0.226633])
+    structure = mp.LinearStructure(
+        [[1.249432, 0.496701], [0.496701, 2.013816]], [[7.222403, 2.48364], [2.48364, 11.515575]]
+    )
+    pair = [mp.Friction("b", along, 1.0), mp.Friction("j", -along, 1.9, stiffness=spring)]
+    loads = [mp.HarmonicLoad([1.68, 0.9927], 5.56, 0.268), mp.ConstantLoad([1.7, 2.5], -weight)]
+    run = mp.simulate(mp.MultiPhiModel(structure, pair, modes="all"), 6.3, loads=loads)
+    assert run.status == "ok"
+    assert len(run.events) < 40
+    assert abs(run.ledger.residual) < 1e-12 * run.ledger.friction
+
+
+@pytest.mark.parametrize("speed", [0.565, 0.3])
+@pytest.mark.parametrize("mass", [1.0, 1.3, 1.6, 2.0])
+def test_two_that_stick_to_each_other_come_to_rest_on_a_belt_as_one_body(mass, speed):
+    """No unknown is left there: the round-off of the belt's speed is no speed that something could take away."""
+    pull, runs = mp.HarmonicLoad("a", 2.05, 1.23), []
+    for masses, stiffness in ((np.diag([1.26, mass]), [[40.0, -40.0], [-40.0, 40.0]]), ([[1.26 + mass]], [[0.0]])):
+        structure = mp.LinearStructure(masses, stiffness, points={"a": 0})
+        belt = mp.Friction("belt", {"a": -1.0}, 1.05, velocity=speed)
+        joint = [mp.Friction("joint", [-1.0, 1.0], 8.8)] if len(stiffness) > 1 else []
+        start = np.full(len(stiffness), 0.3)
+        runs.append(mp.simulate(mp.MultiPhiModel(structure, [belt, *joint], modes="all"), 6.0, None, start, [pull]))
+    t = np.linspace(0, 6, 61)
+    assert [run.status for run in runs] == ["ok"] * 2
+    assert_allclose(runs[0].at("a", t), runs[1].at("a", t), rtol=0, atol=1e-12)
+    assert np.any(np.diff(runs[0].stick_intervals("belt")) > 0)

@@ -166,9 +166,16 @@ class Sliding:
         """States of sliders at rest whose accelerations and forces, within ``most``, agree; None where none do.
 
         falls: states of those that slip with their limits. free: x'' (n,) without these sliders and these contacts.
+        Where forces are not unique, those that would fall bear less than they may: they stay.
         """
         inverse, size = self.levels.inverse, np.max(np.abs(free), initial=0.0)
-        for states in itertools.product(*([falls[e]] if e in falls else ["stick", *SIGNS] for e in rests)):
+
+        def dropped(states):
+            loose = [e for e, state in zip(rests, states, strict=True) if state != "stick" and e not in falls]
+            return sum(most[e] * (1 - self.all[e].limit / self.all[e].static_limit) for e in loose)
+
+        every = itertools.product(*([falls[e]] if e in falls else ["stick", *SIGNS] for e in rests))
+        for states in sorted(every, key=dropped):
             slides = dict(zip(rests, states, strict=True))
             moved = free.copy()
             for e, state in slides.items():
