@@ -110,12 +110,13 @@ RUN_INTS = 216
 # ---------------------------------------------------------------------- run record, numbers
 
 TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
-INDEPENDENCE = 7  # of directions of length one: what is left beside others, below which one follows from them
+GIVEN_SPRINGS = 7  # strain energy [J] of the links that hold at the start, all in one
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-GIVEN_SPRINGS = 44  # strain energy [J] of the links that hold at the start, all in one
+OF_A_RUN = 44  # so many of them, the first ones, are a run's own: it takes them along when another has the arrays
+INDEPENDENCE = 44  # of directions of length one: what is left beside others, below which one follows from them
 RUN_NUMBERS = 45
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 

@@ -102,7 +102,7 @@ class LevelArrays:
         self._offsets: dict[int, int] = {}  # of levels in the ints, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by key
         self._maps: dict[tuple[int, int], int] = {}  # records by their levels
-        self._ring: int | None = None
+        self._ring = 0  # where that of a chatter check begins
         self._recorded = 0, 0  # coordinates and exits for which the record has room
         self._base = 0  # where the base stands among the levels, in the ints
         describe_elements(self.buffers, self.levels.model)
@@ -120,11 +120,20 @@ class LevelArrays:
         """The numbers."""
         return self.buffers.numbers
 
-    def ring(self, count: int) -> int:
-        """Where the ring of a chatter check begins, so many numbers."""
-        if self._ring is None:
-            self._ring = self.ints[a.RING] = self.buffers.take("numbers", count)
-        return self._ring
+    def set_chatter(self, window: int, decisions: int, ring: np.ndarray) -> None:
+        """The chatter check of a run: the size of its window, the decisions so far, and its ring as it stands."""
+        ints = self.buffers.ints
+        if not self._ring:
+            self._ring = ints[a.RING] = self.buffers.take("numbers", 2 * (window + 1))
+        ints[a.WINDOW], ints[a.DECISIONS] = window, decisions
+        if len(ring):
+            self.buffers.numbers[self._ring : self._ring + len(ring)] = ring
+
+    @property
+    def chatter(self) -> tuple[int, np.ndarray]:
+        """The decisions so far, and what stands in the ring."""
+        decisions, window = self.buffers.ints[a.DECISIONS], self.buffers.ints[a.WINDOW]
+        return int(decisions), self.buffers.numbers[self._ring :][: 2 * min(decisions, window + 1)].copy()
 
     def set_start(self, displacement: np.ndarray, velocity: np.ndarray, key: Sequence[int], held: np.ndarray) -> None:
         """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
@@ -144,7 +153,8 @@ class LevelArrays:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
             if len(held):
                 numbers[start + m + q : start + m + q + len(held)] = placed
-        numbers[a.GIVEN_SPRINGS] = self._springs(key)
+        if any(key):
+            numbers[a.GIVEN_SPRINGS] = self._springs(key)
 
     def _springs(self, key: Sequence[int]) -> float:
         """Strain energy [J] that the links have in the place of GIVEN which hold in these states."""
