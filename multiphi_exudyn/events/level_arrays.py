@@ -132,8 +132,8 @@ class LevelArrays:
     @property
     def chatter(self) -> tuple[int, np.ndarray]:
         """The decisions so far, and what stands in the ring."""
-        decisions, window = self.buffers.ints[a.DECISIONS], self.buffers.ints[a.WINDOW]
-        return int(decisions), self.buffers.numbers[self._ring :][: 2 * min(decisions, window + 1)].copy()
+        decisions, window = int(self.buffers.ints[a.DECISIONS]), int(self.buffers.ints[a.WINDOW])
+        return decisions, self.buffers.numbers[self._ring : self._ring + 2 * min(decisions, window + 1)].copy()
 
     def set_start(self, displacement: np.ndarray, velocity: np.ndarray, key: Sequence[int], held: np.ndarray) -> None:
         """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
@@ -141,13 +141,12 @@ class LevelArrays:
         held: places (h,) that links hold.
         """
         self._base = self._base or self._add_base()
-        m, q = len(displacement), int(self.ints[a.PRESCRIBED])
-        states = int(self.ints[self._base + a.STATES])
-        self.ints[states : states + len(key)] = key
-        self.ints[a.GIVEN + a.LEVEL], self.ints[a.STARTING] = self._base, a.FRESH
-        numbers, drive = self.numbers, int(self.ints[a.DRIVE])
-        for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
-            start = int(self.ints[a.GIVEN + part])
+        ints, numbers, _ = self.buffers.all
+        m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[self._base + a.STATES])
+        ints[states : states + len(key)] = key
+        ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = self._base, a.FRESH
+        drive, *starts = ints[[a.DRIVE, a.GIVEN + a.PLACE, a.GIVEN + a.SPEED]].tolist()
+        for k, (start, values, placed) in enumerate(zip(starts, (displacement, velocity), (held, 0.0), strict=True)):
             numbers[start : start + m] = values
             if q:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
@@ -186,9 +185,9 @@ class LevelArrays:
 
     def begin_record(self) -> None:
         """An empty record to write to."""
-        n, exits = self.scratch.coordinates, self.scratch.exits
-        room, events = self.room, max(self.room, self.scratch.changes)
         if self.outgrown:
+            n, exits = self._recorded = self.scratch.coordinates, self.scratch.exits
+            room, events = self.room, max(self.room, self.scratch.changes)
             wanted = {
                 a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * room),
                 a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * room),
@@ -199,11 +198,10 @@ class LevelArrays:
             }
             for slot, (name, count) in wanted.items():
                 self.ints[slot] = self.buffers.take(name, count)
+            self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
             self._let_others_go()
-        self._recorded = n, exits
-        self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
-        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
-            self.ints[slot] = 0
+        ints = self.buffers.ints
+        ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
 
     def level(self, states: Sequence[int]) -> int:
         """Where the level of elements in these states stands in the ints, packed if it was not."""

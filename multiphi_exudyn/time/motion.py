@@ -75,6 +75,7 @@ class Motion:
         self.record = Record(self.model.contacts, arrays)
         self._state: State | None = start.state
         self._starting = True
+        self._window, self._allowed = limits(self.model)
         self._kept = _Kept(self._at_first(start.time), 0, NO_RING, 0)
         self._evaluations = self._transitions = 0
         self._unavailable: Exception | None = None
@@ -83,7 +84,7 @@ class Motion:
         """The first numbers of the arrays for a run that sets out at a time [s]."""
         numbers = np.zeros(a.OF_A_RUN)
         numbers[a.TIME] = numbers[a.LAST_DECISION] = time
-        numbers[a.ALLOWED] = limits(self.model)[1]
+        numbers[a.ALLOWED] = self._allowed
         return numbers
 
     def begin(self) -> Motion:
@@ -220,16 +221,16 @@ class Motion:
 
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
-        ints = self.arrays.ints
-        self._kept = _Kept(self.arrays.numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
+        ints, numbers, _ = self.arrays.buffers.all
+        self._kept = _Kept(numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
         arrays, state, (kept, decisions, ring, piece) = self.arrays, self._state, self._kept
         level = 0 if state is None else arrays.level(state.level.states)
         arrays.begin_record()
-        arrays.set_chatter(limits(self.model)[0], decisions, ring)
-        arrays.numbers[: a.OF_A_RUN] = kept
+        arrays.set_chatter(self._window, decisions, ring)
+        arrays.buffers.numbers[: a.OF_A_RUN] = kept
         arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
@@ -238,7 +239,7 @@ class Motion:
             phases = [NUMBERS[phase] for phase in state.phases]
             arrays.set_state(level, state.displacement, state.velocity, phases, self._measured)
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
-        ints, numbers = arrays.ints, arrays.numbers
+        ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
         ints[a.TRANSITIONS] = ints[a.GIVEN_UP] = 0
         numbers[a.TIME] = self.time
         numbers[ints[a.FOUND] + 1] = 0.0
@@ -260,14 +261,10 @@ class Motion:
         ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
 
     def _state_reached(self) -> State:
-        ints, numbers = self.arrays.ints, self.arrays.numbers
-        record, x, v = ints[a.CURRENT + a.LEVEL : a.CURRENT + a.SPEED + 1].tolist()
-        level = self.arrays.loaded[int(ints[record + a.NUMBER])]
-        if ints[a.CURRENT + a.SETTLED]:
-            phases = (Phase.ARMED,) * int(ints[record + a.EXIT_COUNT])
-        else:
-            standing = ints[ints[a.CURRENT + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-            phases = tuple(PHASES[k] for k in standing.tolist())
+        ints, numbers, _ = self.arrays.buffers.all
+        record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
+        level, exits = self.arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
+        phases = (Phase.ARMED,) * exits if settled else tuple(PHASES[k] for k in ints[waits : waits + exits].tolist())
         n = level.level.modes
         return State(level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases)
 

@@ -191,11 +191,10 @@ class Record:
             return
         if self._last:
             self._add(self._last)
-        self._last, rows = part, part.get("rows", EMPTY["rows"])
-        packed = rows[:, 0].tolist()
-        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
-        rows[:, 0] = [known[number] for number in packed]
-        self.count += len(rows)
+        self._last = part
+        if "rows" in part:
+            self._renumber(part["rows"][:, 0])
+            self.count += len(part["rows"])
         vars(self).pop("places", None)
 
     @property
@@ -228,12 +227,15 @@ class Record:
         for name, given in part.items():
             parts[name].add(given)
 
-    def _number(self, level: LoadedLevel) -> int:
-        """The number of a level in this record; the arrays may have packed it twice."""
-        number = self._numbers.setdefault(level.states, len(self.levels))
-        if number == len(self.levels):
-            self.levels.append(level)
-        return number
+    def _renumber(self, numbers: np.ndarray) -> None:
+        """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
+        packed, known = numbers.tolist(), dict[int, int]()
+        for number in dict.fromkeys(packed):
+            level = self.arrays.loaded[number]
+            known[number] = self._numbers.setdefault(level.states, len(self.levels))
+            if known[number] == len(self.levels):
+                self.levels.append(level)
+        numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property
     def places(self) -> np.ndarray:

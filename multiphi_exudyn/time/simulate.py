@@ -159,7 +159,7 @@ def holding(
 
     rows: (k, n) of further places at which something acts.
     """
-    if isinstance(start, Trajectory):
+    if start is not None and isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
     if model.base.complete:
         return model
@@ -215,10 +215,14 @@ class Run:
         """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        before = self.start if isinstance(self.start, Trajectory) else None
-        levels = self._levels(finer)
+        before, levels = self._before, self._levels(finer)
         start = self._first(levels) if before is None else going_on(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
+
+    @property
+    def _before(self) -> Trajectory | None:
+        """The trajectory from whose end this goes on."""
+        return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
 
     def _first(self, levels: LoadedLevels) -> Start:
         """The start from the vectors that were given."""
@@ -231,8 +235,8 @@ class Run:
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
-        model, loads = self.model, unchanging(self.loads)
-        time = self.start.t_end if isinstance(self.start, Trajectory) and not self.rewound else 0.0
+        model, loads, before = self.model, unchanging(self.loads), self._before
+        time = 0.0 if before is None or self.rewound else before.t_end
 
         def made() -> LoadedLevels:
             return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)

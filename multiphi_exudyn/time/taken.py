@@ -28,7 +28,6 @@ PARTS = (  # where in the loop's arrays they begin, and how many rows there are
     ("kinds", a.EVENT_INTS, a.EVENT_COUNT),
     ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT),
 )
-COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
 EVENTS = PARTS[-2:]
 
 
@@ -42,6 +41,5 @@ def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int]]) -> dict[s
             width = empty.shape[-1] or 1
             part = (numbers if empty.dtype == float else ints)[start : start + slots[counted] * width].copy()
             parts[name] = part if empty.ndim == 1 else part.reshape(-1, width)
-    for counted in COUNTS:
-        ints[counted] = 0
+    ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
     return parts

@@ -188,7 +188,7 @@ class Trajectory(Histories):
         last = self.final
         assert last is not None, "a run with segments has a final state"
         return Ledger(
-            initial=self._initial_energy,
+            initial=self.initial_energy,
             work_of_loads=self._static_work(last) + losses.stop_work + varying + self.final_work,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
@@ -204,8 +204,8 @@ class Trajectory(Histories):
             return 0.0
         return float(self.load @ (last.level.configuration(last.displacement) - self.start.displacement))
 
-    @property
-    def _initial_energy(self) -> float:
+    @functools.cached_property
+    def initial_energy(self) -> float:
         """Kinetic and strain energy [J] at the start."""
         start = self.start
         if start.state is not None:
