@@ -145,8 +145,9 @@ class LevelArrays:
         m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[self._base + a.STATES])
         ints[states : states + len(key)] = key
         ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = self._base, a.FRESH
-        drive, *starts = ints[[a.DRIVE, a.GIVEN + a.PLACE, a.GIVEN + a.SPEED]].tolist()
-        for k, (start, values, placed) in enumerate(zip(starts, (displacement, velocity), (held, 0.0), strict=True)):
+        drive = int(ints[a.DRIVE])
+        for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
+            start = int(ints[a.GIVEN + part])
             numbers[start : start + m] = values
             if q:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]

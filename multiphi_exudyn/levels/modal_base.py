@@ -68,7 +68,7 @@ class ModalBase(Shown):
         """
         if self.complete:
             onto, sizes = self._projection
-            return drop_round_off(onto @ x, sizes @ np.abs(x))
+            return drop_round_off(onto.dot(x), sizes.dot(np.abs(x)))
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
@@ -188,7 +188,7 @@ class ModalBase(Shown):
 
         gaps: (c,) of all contacts, None for their own.
         """
-        constant = float(self.squares @ (configuration * configuration)) / 2 + self.energy_offset
+        constant = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
         if self.laws:
             constant -= float(self.preload @ configuration)
         if not len(closed):

@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "drop_round_off", "sign_of"]
+__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors from which on those near each other are one cluster; at a double root 1e8
 WORST_CONDITION = 1e7  # of eigenvectors of which no clusters are found; times round-off it is the motion's error
 BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of their directions and of modes
 CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
+
+
+def all_finite(values: np.ndarray) -> bool:
+    """Whether no value (k,) is NaN or infinite."""
+    return bool(np.count_nonzero(np.isfinite(values)) == values.size)
 
 
 def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:

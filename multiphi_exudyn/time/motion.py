@@ -18,6 +18,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
 from multiphi_exudyn.events.state import Loss, Phase, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mathematics.round_off import all_finite
 from multiphi_exudyn.time.balance import Statistics
 from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.failures import NOT_FINITE, failure
@@ -164,7 +165,7 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if self._state is not None and not np.isfinite(self._state.displacement).all():
+            if self._state is not None and not all_finite(self._state.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "

@@ -91,7 +91,7 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``."""
         return self._record.rows[: self._count, 0]
 
-    @functools.cached_property
+    @property
     def levels(self) -> Sequence[LoadedLevel]:
         """See ``Segments``."""
         return self._record.levels
@@ -130,7 +130,7 @@ class Events(Made[Event]):
     """The events of a record."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record.event, len(record.places), {})
+        super().__init__(record.event, 0 if record.eventless else len(record.places), {})
         self._record = record
 
     @property
@@ -229,18 +229,19 @@ class Record:
 
     def _renumber(self, numbers: np.ndarray) -> None:
         """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
-        packed, known = numbers.tolist(), dict[int, int]()
+        packed, known = numbers.tolist(), {}
         for number in dict.fromkeys(packed):
             level = self.arrays.loaded[number]
             known[number] = self._numbers.setdefault(level.states, len(self.levels))
             if known[number] == len(self.levels):
                 self.levels.append(level)
-        numbers[:] = [known[number] for number in packed]
+        if any(number != other for number, other in known.items()):
+            numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return EMPTY["phases"] if self.eventless else np.flatnonzero(self.kinds[:, 1] != a.SHARED)
+        return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
 
     @functools.cached_property
     def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:

@@ -256,7 +256,7 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
     """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
     lost, least = total_defect(trajectory), min(INDICATOR, tolerance.error if tolerance else INDICATOR)
     y, defect = trajectory.start.displacement, math.sqrt(lost)
-    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(float(y @ y)) - defect):
+    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(y.dot(y)) - defect):
         return
     impulses, error = event_table(trajectory.events, trajectory.model.index)[:, 2], indicator(lost, samples)
     rigid = bool(np.any(impulses > 0))

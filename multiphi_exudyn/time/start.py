@@ -101,13 +101,13 @@ def first_start(
     """
     base = levels.model.base
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
-    gaps, length = y @ base.directions + scales.stops, math.sqrt(y @ y)
+    gaps, length = y.dot(base.directions) + scales.stops, math.sqrt(y.dot(y))
     if v is None:
         v = base.still
     else:
         moving = v * scales.times
-        length += math.sqrt(moving @ moving)
-    if scales.apart is not None and (gaps > scales.nearest(length)).all():
+        length += math.sqrt(moving.dot(moving))
+    if scales.apart is not None and all((gaps > scales.nearest(length)).tolist()):
         return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
     near = scales.near(np.abs(y) @ base.magnitudes[0], length)
     return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), stretches)

@@ -204,14 +204,14 @@ class Trajectory(Histories):
             return 0.0
         return float(self.load @ (last.level.configuration(last.displacement) - self.start.displacement))
 
-    @functools.cached_property
+    @property
     def initial_energy(self) -> float:
         """Kinetic and strain energy [J] at the start."""
         start = self.start
         if start.state is not None:
             return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
         strain = self.model.base.strain(start.displacement, start.penetrating, start.gaps)
-        return 0.5 * float(start.velocity @ start.velocity) + strain
+        return 0.5 * float(start.velocity.dot(start.velocity)) + strain
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
