@@ -132,8 +132,9 @@ class LevelArrays:
     @property
     def chatter(self) -> tuple[int, np.ndarray]:
         """The decisions so far, and what stands in the ring."""
-        decisions, window = int(self.buffers.ints[a.DECISIONS]), int(self.buffers.ints[a.WINDOW])
-        return decisions, self.buffers.numbers[self._ring : self._ring + 2 * min(decisions, window + 1)].copy()
+        decisions = int(self.buffers.ints[a.DECISIONS])
+        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
+        return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
     def set_start(self, displacement: np.ndarray, velocity: np.ndarray, key: Sequence[int], held: np.ndarray) -> None:
         """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.

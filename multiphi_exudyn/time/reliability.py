@@ -32,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
@@ -64,18 +65,25 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    model, segments = trajectory.model, listed(trajectory.segments)
-    known = _Known.of(model, segments)
-    found = [*_slow(trajectory, known.fastest), *known.always]
-    if not model.whole:
+    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.t_start
+    known, excitation = _Known.of(model, segments), segments.levels[0].excitation
+    found = list(known.always)
+    if 0 < known.fastest * trajectory.t_end < HARDLY:
+        found[:0] = _slow(trajectory, known.fastest)
+    if not known.whole:
         samples = Samples(segments, trajectory.t_end)
-        found += [*known.static, *_lost_energy(trajectory, segments, samples)]
+        found += known.static
+        found += _lost_energy(trajectory, segments, samples)
         found += _truncation(trajectory, samples, tolerance)
     found += known.clusters
     if model.validity is not None:
         found += model.validity(trajectory)
-    found += [*_slow_mode(trajectory, segments, known.slowest), *rubbing_warnings(segments, model)]
-    found += _load_pieces(trajectory, segments)
+    if known.slowest * span < SLOW:
+        found += _slow_mode(segments, known.slowest, span)
+    if model.general:
+        found += rubbing_warnings(segments, model)
+    if excitation.histories and excitation.effort(trajectory.t_end) > MANY_PIECES:
+        found.append(_load_pieces(excitation, trajectory.t_end))
     return tuple(found)
 
 
@@ -83,10 +91,11 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
 class _Known:
     """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    always, static, clusters: warnings. fastest: the highest frequency of the open level [Hz]. slowest: the lowest of
-    the levels that is not zero [rad/s].
+    whole: no level leaves out a mode. always, static, clusters: warnings. fastest: the highest frequency of the open
+    level [Hz]. slowest: the lowest of the levels that is not zero [rad/s].
     """
 
+    whole: bool
     always: tuple[str, ...]
     static: tuple[str, ...]
     clusters: tuple[str, ...]
@@ -106,6 +115,7 @@ class _Known:
         static = () if model.whole else static_warnings([level.level for level in segments.levels])
         omega = np.concatenate([level.omega for level in levels])
         return cls(
+            model.whole,
             (*damping_warnings(model), *_missing_modes(model)),
             tuple(static),
             tuple(_clusters(levels)),
@@ -173,11 +183,10 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
 
 def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
     """Not of runs that go on with one another, and not of a system that was reduced."""
-    lasts = trajectory.t_end
-    if 0 < fastest * lasts < HARDLY and not (trajectory.t_start > 0 or trajectory.model.validity is not None):
+    if not (trajectory.t_start > 0 or trajectory.model.validity is not None):
         yield (
-            f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts {lasts:.3g} "
-            "s; are mass and stiffness swapped, or in different units?"
+            f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts "
+            f"{trajectory.t_end:.3g} s; are mass and stiffness swapped, or in different units?"
         )
 
 
@@ -285,14 +294,11 @@ def _clusters(levels: Sequence[Level]) -> list[str]:
     ]
 
 
-def _slow_mode(trajectory: Trajectory, segments: Segments, slowest: float) -> Iterator[str]:
-    """Of a mode of which a run sees so little that where loads move it is a small difference of far places.
+def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]:
+    """Of a mode of which a run of ``span`` [s] sees so little that where loads move it is a difference of far places.
 
     p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    span = trajectory.t_end - trajectory.t_start
-    if slowest * span >= SLOW:
-        return
     if any(np.any(level.excitation.static) or level.excitation.histories for level in segments.levels):
         share = min(1.0, LEFT / (slowest * span)) ** 2
         yield (
@@ -301,15 +307,11 @@ def _slow_mode(trajectory: Trajectory, segments: Segments, slowest: float) -> It
         )
 
 
-def _load_pieces(trajectory: Trajectory, segments: Segments) -> Iterator[str]:
-    """Whether the loads have so many pieces that they set the time and memory of the run."""
-    excitation = segments.levels[0].excitation
-    if not excitation.histories or excitation.effort(trajectory.t_end) <= MANY_PIECES:
-        return
-    pieces = excitation.pieces(trajectory.t_end)
-    each = 1e3 * PIECE_SECONDS * excitation.effort(trajectory.t_end) / pieces
-    yield (
-        f"load pieces: the loads have {pieces} pieces in {trajectory.t_end:g} s, some {each:.1g} ms and "
-        f"{PIECE_BYTES / 1000:g} kB each; fewer samples, a larger tolerance or a lower highest frequency make the run "
-        "shorter"
+def _load_pieces(excitation: Excitation, end: float) -> str:
+    """Of loads that have so many pieces that they set the time and memory of a run to ``end`` [s]."""
+    pieces = excitation.pieces(end)
+    return (
+        f"load pieces: the loads have {pieces} pieces in {end:g} s, some "
+        f"{1e3 * PIECE_SECONDS * excitation.effort(end) / pieces:.1g} ms and {PIECE_BYTES / 1000:g} kB each; fewer "
+        "samples, a larger tolerance or a lower highest frequency make the run shorter"
     )

@@ -32,11 +32,10 @@ REMEDY = "give one element with the sum of their limits, or each a spring (stiff
 
 
 def rubbing_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
-    """One sentence of each kind at most."""
-    if model.general:
-        yield from _shared(segments)
-        if not model.whole:
-            yield from _backwards(segments)
+    """Of a model with friction, one sentence of each kind at most."""
+    yield from _shared(segments)
+    if not model.whole:
+        yield from _backwards(segments)
 
 
 def _shared(segments: Segments) -> Iterator[str]:

@@ -176,7 +176,7 @@ class Shared(Protocol):
         """A run in these levels on arrays that no other run has at that time."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Run:
     """What ``simulate`` is asked for, there is more about it there; t_end [s].
 

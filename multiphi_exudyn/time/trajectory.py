@@ -170,7 +170,7 @@ class Trajectory(Histories):
         """
         told = {"status": self.status, "message": self.message, "warnings": self.warnings}
         ledger = dataclasses.asdict(self.ledger) if self.segments else None
-        save(self, Path(path), **told, ledger=ledger, stats=dataclasses.asdict(self.stats))
+        save(self, Path(path), **told, ledger=ledger, stats=self.stats._asdict())
 
     @functools.cached_property
     def ledger(self) -> Ledger:
