@@ -144,7 +144,8 @@ class LevelArrays:
         self._base = self._base or self._add_base()
         ints, numbers, _ = self.buffers.all
         m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[self._base + a.STATES])
-        ints[states : states + len(key)] = key
+        for i, state in enumerate(key):
+            ints[states + i] = state
         ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = self._base, a.FRESH
         drive = int(ints[a.DRIVE])
         for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):

@@ -165,7 +165,7 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if self._state is not None and not all_finite(self._state.displacement):
+            if not all_finite(self.state.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "

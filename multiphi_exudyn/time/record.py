@@ -40,8 +40,9 @@ T = TypeVar("T")
 class Made(Sequence[T], Generic[T]):
     """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
 
-    def __init__(self, make: Callable[[int], T], count: int, known: dict[int, T]) -> None:
-        self._make, self._count, self._known = make, count, known
+    def __init__(self, make: Callable[[int], T], count: int) -> None:
+        self._make, self._count = make, count
+        self._known: dict[int, T] = {}
 
     def __len__(self) -> int:
         return self._count
@@ -72,7 +73,7 @@ class Recorded(Made[Segment], Segments):
     """The segments of a record, which is looked into when somebody asks."""
 
     def __init__(self, record: Record, defects: float, truncated: float) -> None:
-        super().__init__(record.segment, record.count, {})
+        super().__init__(record.segment, record.count)
         self._record, self.arrays = record, record.arrays
         self.defects, self.truncated = defects, truncated
 
@@ -130,7 +131,7 @@ class Events(Made[Event]):
     """The events of a record."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record.event, 0 if record.eventless else len(record.places), {})
+        super().__init__(record.event, 0 if record.eventless else len(record.places))
         self._record = record
 
     @property
@@ -200,8 +201,8 @@ class Record:
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        last = sum(part.nbytes for part in self._last.values())
-        return last + sum(part.bytes for part in self._parts.values())
+        last = sum([part.nbytes for part in self._last.values()])
+        return last + sum([part.bytes for part in self._parts.values()])
 
     @property
     def parts(self) -> dict[str, Growing]:
