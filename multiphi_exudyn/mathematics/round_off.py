@@ -28,7 +28,9 @@ def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndar
 
     The gap of a contact that another one holds does not move; what is left of it has no sign.
     """
-    return np.where(np.abs(sums) <= ZERO * sizes, 0.0, sums)
+    kept = sums.copy()
+    kept[np.abs(sums) <= ZERO * sizes] = 0.0
+    return kept
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:

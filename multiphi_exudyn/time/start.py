@@ -6,6 +6,7 @@ motion may take the structure: |y|, where y' takes the modes, and what the loads
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -70,6 +71,11 @@ class _Scales:
     times: np.ndarray
     apart: tuple[int, ...] | None
 
+    @functools.cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """a, b (l,): none touches where h.y > a |y| + b, as the terms of h.y are no more than |h| |y|."""
+        return 2 * TOUCHING * self.sizes, self.touching - self.stops
+
     @classmethod
     def of(cls, levels: LoadedLevels, end: float) -> _Scales:
         """Under the loads until the end [s] of a run."""
@@ -87,10 +93,6 @@ class _Scales:
         """Gaps (l,) [m] below which a contact is in touch: by the terms (l,) of h.y, by where the motion goes."""
         return TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching
 
-    def nearest(self, length: float) -> np.ndarray:
-        """No less than ``near``: |h|.|y| <= |h| |y|."""
-        return (2 * TOUCHING * length) * self.sizes + self.touching
-
 
 def first_start(
     levels: LoadedLevels, end: float, y: np.ndarray, v: np.ndarray | None, stretches: Mapping[str, float]
@@ -101,15 +103,16 @@ def first_start(
     """
     base = levels.model.base
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
-    gaps, length = y.dot(base.directions) + scales.stops, math.sqrt(y.dot(y))
+    moved, length = y.dot(base.directions), math.sqrt(y.dot(y))
     if v is None:
         v = base.still
     else:
         moving = v * scales.times
         length += math.sqrt(moving.dot(moving))
-    if scales.apart is not None and all((gaps > scales.nearest(length)).tolist()):
+    slope, constant = scales.bounds
+    if scales.apart is not None and all((moved > slope * length + constant).tolist()):
         return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
-    near = scales.near(np.abs(y) @ base.magnitudes[0], length)
+    gaps, near = moved + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
     return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), stretches)
 
 
