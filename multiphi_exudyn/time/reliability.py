@@ -267,8 +267,8 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
     y, defect = trajectory.start.displacement, math.sqrt(lost)
     if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(y.dot(y)) - defect):
         return
-    impulses, error = event_table(trajectory.events, trajectory.model.index)[:, 2], indicator(lost, samples)
-    rigid = bool(np.any(impulses > 0))
+    error = indicator(lost, samples)
+    rigid = bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
     if tolerance is not None and error > tolerance.error:
         kept = trajectory.model.level_at(()).modes
         yield (
