@@ -137,7 +137,8 @@ DISSIPATED = 26  # form of what damping takes from the free response, -1 where t
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
 FREE_SIZES = 28  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
 STRUCK_DEFECTS = 29  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
-LEVEL_INTS = 30
+SIZES = 30  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
+LEVEL_INTS = 31
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

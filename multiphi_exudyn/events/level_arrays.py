@@ -15,7 +15,7 @@ from multiphi_exudyn.events.element_arrays import describe_elements
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
-from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal
+from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal, put_sizes
 from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -260,6 +260,11 @@ class LevelArrays:
         """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
+
+    def add_sizes(self, level: int) -> None:
+        """Pack what |y| is read from in a level that stands in the ints."""
+        if not self.ints[level + a.SIZES]:
+            put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """The signal that an exit's element would have in the level entered alone."""

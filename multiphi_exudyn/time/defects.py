@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.defect_forms import allowed, defect_form, factor, held_rigidly, over_omega
+from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigidly, over_omega
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time.segment import Segments, listed
@@ -32,7 +32,6 @@ from multiphi_exudyn.time.trajectory import Trajectory
 __all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
 
 SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
-FRACTIONS = np.linspace(0.0, 1.0, SAMPLES)
 
 
 @dataclass(frozen=True)
@@ -98,12 +97,12 @@ class Samples:
 
     def amplitude_exceeds(self, limit: float, first: float) -> bool:
         """Whether the amplitude is larger, which |y| at the first time, or less than it, may tell already."""
-        return (first > 0 and first**2 > SAMPLES * limit**2) or self.amplitude > limit
+        return (first > 0 and first**2 > 2 * SAMPLES * limit**2) or self.amplitude > limit
 
     @functools.cached_property
     def amplitude(self) -> float:
         """Root of the mean of |y|^2 [m sqrt(kg)]."""
-        return math.sqrt(sum(_square(level, eta) for level, eta, _ in self._by_level()) / SAMPLES)
+        return math.sqrt(self._segments.mean_square(self._end, SAMPLES))
 
     @functools.cached_property
     def largest_energy(self) -> float:
@@ -114,8 +113,8 @@ class Samples:
     @functools.cached_property
     def _states(self) -> tuple[np.ndarray, np.ndarray]:
         """Numbers (k,) of the levels at the times, and the states there (2, k, n)."""
-        segments, first = self._segments, self._segments.starts[0]
-        times = first + (self._end - first) * FRACTIONS
+        segments = self._segments
+        times = np.linspace(segments.starts[0], self._end, SAMPLES)
         owners = segments.owners(times)
         return segments.numbers[owners], segments.states(owners, times - segments.starts[owners])
 
@@ -139,15 +138,6 @@ def total_defect(trajectory: Trajectory) -> float:
     """Sum of |defect|^2 [m2 kg] over a run, which the loop has added up where it could."""
     known = listed(trajectory.segments).defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(known) else known
-
-
-def _square(level: LoadedLevel, eta: np.ndarray) -> float:
-    """Sum of |y|^2 over the rows of eta (k, r), by a factor that the level keeps."""
-    if "place" not in level.entries:
-        level.entries["place"] = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
-    rows: np.ndarray = level.entries["place"]
-    y = (eta @ rows[:, :-1].T + rows[:, -1]).ravel()
-    return float(y @ y)
 
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:

@@ -19,7 +19,7 @@ from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
-from multiphi_exudyn.time.sampling import sample_rows, sample_states
+from multiphi_exudyn.time.sampling import sample_rows, sample_squares, sample_states
 from multiphi_exudyn.time.segment import Segment, Segments, owners
 from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
@@ -28,7 +28,8 @@ __all__ = ["PHASES", "Record"]
 
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
-states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
+states_of, values_of, squares_of = entry(sample_states), entry(sample_rows), entry(sample_squares)
+works_of = entry(integrate_works)
 
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
 
@@ -104,6 +105,10 @@ class Recorded(Made[Segment], Segments):
     def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
         """See ``Segments``."""
         return self._record.values(times, side, row)
+
+    def mean_square(self, end: float, count: int) -> float:
+        """See ``Segments``."""
+        return self._record.mean_square(end, count)
 
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
@@ -299,6 +304,17 @@ class Record:
             while self._supply(values_of(*self._given(offsets), len(self.rows), *given)):
                 pass
         return result
+
+    def mean_square(self, end: float, count: int) -> float:
+        """Mean of |y|^2 up to ``end`` [s], see ``Segments``."""
+        total = 0.0
+        for offsets in self._packed(list(range(len(self.levels)))):
+            for level in offsets[offsets > 0].tolist():
+                self.arrays.add_sizes(level)
+            while (found := squares_of(*self._given(offsets), len(self.rows), end, count)) < 0:
+                self.arrays.supply()
+            total += found
+        return total
 
     def works(self) -> np.ndarray:
         """Work [J] (3,) of damping, of what varies and of friction in all segments, less what jumps at their starts."""

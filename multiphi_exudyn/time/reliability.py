@@ -268,7 +268,8 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
     if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(y.dot(y)) - defect):
         return
     error = indicator(lost, samples)
-    rigid = bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
+    rigid = any(contact.rigid for contact in trajectory.model.contacts)
+    rigid = rigid and bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
     if tolerance is not None and error > tolerance.error:
         kept = trajectory.model.level_at(()).modes
         yield (
