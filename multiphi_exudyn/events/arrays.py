@@ -110,12 +110,13 @@ RUN_INTS = 216
 # ---------------------------------------------------------------------- run record, numbers
 
 TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
-INDEPENDENCE = 7  # of directions of length one: what is left beside others, below which one follows from them
+GIVEN_SPRINGS = 7  # strain energy [J] of the links that hold at the start, all in one
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-GIVEN_SPRINGS = 44  # strain energy [J] of the links that hold at the start, all in one
+OF_A_RUN = 44  # so many of them, the first ones, are a run's own: it takes them along when another has the arrays
+INDEPENDENCE = 44  # of directions of length one: what is left beside others, below which one follows from them
 RUN_NUMBERS = 45
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -136,7 +137,8 @@ DISSIPATED = 26  # form of what damping takes from the free response, -1 where t
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
 FREE_SIZES = 28  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
 STRUCK_DEFECTS = 29  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
-LEVEL_INTS = 30
+SIZES = 30  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
+LEVEL_INTS = 31
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

@@ -15,7 +15,7 @@ from multiphi_exudyn.events.element_arrays import describe_elements
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
-from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal
+from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal, put_sizes
 from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -102,7 +102,7 @@ class LevelArrays:
         self._offsets: dict[int, int] = {}  # of levels in the ints, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by key
         self._maps: dict[tuple[int, int], int] = {}  # records by their levels
-        self._ring: int | None = None
+        self._ring = 0  # where that of a chatter check begins
         self._recorded = 0, 0  # coordinates and exits for which the record has room
         self._base = 0  # where the base stands among the levels, in the ints
         describe_elements(self.buffers, self.levels.model)
@@ -120,11 +120,21 @@ class LevelArrays:
         """The numbers."""
         return self.buffers.numbers
 
-    def ring(self, count: int) -> int:
-        """Where the ring of a chatter check begins, so many numbers."""
-        if self._ring is None:
-            self._ring = self.ints[a.RING] = self.buffers.take("numbers", count)
-        return self._ring
+    def set_chatter(self, window: int, decisions: int, ring: np.ndarray) -> None:
+        """The chatter check of a run: the size of its window, the decisions so far, and its ring as it stands."""
+        ints = self.buffers.ints
+        if not self._ring:
+            self._ring = ints[a.RING] = self.buffers.take("numbers", 2 * (window + 1))
+        ints[a.WINDOW], ints[a.DECISIONS] = window, decisions
+        if len(ring):
+            self.buffers.numbers[self._ring : self._ring + len(ring)] = ring
+
+    @property
+    def chatter(self) -> tuple[int, np.ndarray]:
+        """The decisions so far, and what stands in the ring."""
+        decisions = int(self.buffers.ints[a.DECISIONS])
+        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
+        return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
     def set_start(self, displacement: np.ndarray, velocity: np.ndarray, key: Sequence[int], held: np.ndarray) -> None:
         """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
@@ -132,19 +142,21 @@ class LevelArrays:
         held: places (h,) that links hold.
         """
         self._base = self._base or self._add_base()
-        m, q = len(displacement), int(self.ints[a.PRESCRIBED])
-        states = int(self.ints[self._base + a.STATES])
-        self.ints[states : states + len(key)] = key
-        self.ints[a.GIVEN + a.LEVEL], self.ints[a.STARTING] = self._base, a.FRESH
-        numbers, drive = self.numbers, int(self.ints[a.DRIVE])
+        ints, numbers, _ = self.buffers.all
+        m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[self._base + a.STATES])
+        for i, state in enumerate(key):
+            ints[states + i] = state
+        ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = self._base, a.FRESH
+        drive = int(ints[a.DRIVE])
         for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
-            start = int(self.ints[a.GIVEN + part])
+            start = int(ints[a.GIVEN + part])
             numbers[start : start + m] = values
             if q:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
             if len(held):
                 numbers[start + m + q : start + m + q + len(held)] = placed
-        numbers[a.GIVEN_SPRINGS] = self._springs(key)
+        if any(key):
+            numbers[a.GIVEN_SPRINGS] = self._springs(key)
 
     def _springs(self, key: Sequence[int]) -> float:
         """Strain energy [J] that the links have in the place of GIVEN which hold in these states."""
@@ -176,9 +188,9 @@ class LevelArrays:
 
     def begin_record(self) -> None:
         """An empty record to write to."""
-        n, exits = self.scratch.coordinates, self.scratch.exits
-        room, events = self.room, max(self.room, self.scratch.changes)
         if self.outgrown:
+            n, exits = self._recorded = self.scratch.coordinates, self.scratch.exits
+            room, events = self.room, max(self.room, self.scratch.changes)
             wanted = {
                 a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * room),
                 a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * room),
@@ -189,11 +201,10 @@ class LevelArrays:
             }
             for slot, (name, count) in wanted.items():
                 self.ints[slot] = self.buffers.take(name, count)
+            self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
             self._let_others_go()
-        self._recorded = n, exits
-        self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
-        for slot in (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT):
-            self.ints[slot] = 0
+        ints = self.buffers.ints
+        ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
 
     def level(self, states: Sequence[int]) -> int:
         """Where the level of elements in these states stands in the ints, packed if it was not."""
@@ -249,6 +260,11 @@ class LevelArrays:
         """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
+
+    def add_sizes(self, level: int) -> None:
+        """Pack what |y| is read from in a level that stands in the ints."""
+        if not self.ints[level + a.SIZES]:
+            put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """The signal that an exit's element would have in the level entered alone."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Batch, Buffers
-from multiphi_exudyn.events.defect_forms import struck_defects
+from multiphi_exudyn.events.defect_forms import factor, struck_defects
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import asked_state, signal_row, signals_of
@@ -22,7 +22,7 @@ from multiphi_exudyn.mathematics import basis_arrays, response_arrays
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.element import Exit, Share
 
-__all__ = ["put_base", "put_level", "put_powers", "put_signal"]
+__all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes"]
 
 Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
 
@@ -87,6 +87,14 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     }
     for slot, value in given.items():
         buffers.ints[record + slot] = value
+
+
+def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
+    """Give the record of a level what |y| is read from."""
+    rows = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
+    square = np.zeros((rows.shape[1], rows.shape[1]))
+    square[: len(rows)] = rows
+    buffers.ints[record + a.SIZES] = buffers.put("numbers", square)
 
 
 def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:

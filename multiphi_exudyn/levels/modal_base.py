@@ -68,7 +68,7 @@ class ModalBase(ElementTable, Shown):
         """
         if self.complete:
             onto, sizes = self._projection
-            return drop_round_off(onto @ x, sizes @ np.abs(x))
+            return drop_round_off(onto.dot(x), sizes.dot(np.abs(x)))
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
@@ -83,6 +83,13 @@ class ModalBase(ElementTable, Shown):
         """Phi^T f (m,) of a load (n,), zero where it is round-off: a weight bends no body that falls freely."""
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
+
+    @functools.cached_property
+    def still(self) -> np.ndarray:
+        """No displacement, or no velocity (m,); not to be written to."""
+        zeros = np.zeros(self.modes.count)
+        zeros.setflags(write=False)
+        return zeros
 
     @functools.cached_property
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +146,7 @@ class ModalBase(ElementTable, Shown):
 
         gaps: (c,) of all contacts, None for their own.
         """
-        constant = float(self.squares @ (configuration * configuration)) / 2 + self.energy_offset
+        constant = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
         if self.laws:
             constant -= float(self.preload @ configuration)
         if not len(closed):

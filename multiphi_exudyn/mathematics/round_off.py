@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "drop_round_off", "sign_of"]
+__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors from which on those near each other are one cluster; at a double root 1e8
@@ -18,12 +18,19 @@ BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of 
 CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
 
 
+def all_finite(values: np.ndarray) -> bool:
+    """Whether no value (k,) is NaN or infinite."""
+    return bool(np.count_nonzero(np.isfinite(values)) == values.size)
+
+
 def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:
     """Sums with zero where they are round-off of their terms, which add up to ``sizes`` without their signs.
 
     The gap of a contact that another one holds does not move; what is left of it has no sign.
     """
-    return np.where(np.abs(sums) <= ZERO * sizes, 0.0, sums)
+    kept = sums.copy()
+    kept[np.abs(sums) <= ZERO * sizes] = 0.0
+    return kept
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:

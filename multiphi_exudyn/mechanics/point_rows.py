@@ -9,6 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.display import names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.round_off import all_finite
 from multiphi_exudyn.mechanics.arguments import real_array
 from multiphi_exudyn.mechanics.dofs import DofTable, known
 
@@ -83,6 +84,6 @@ def checked_vector(name: str, given: Any, n: int) -> np.ndarray:
     vector = real_array(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
-    if not np.isfinite(vector).all():
+    if not all_finite(vector):
         raise MultiPhiValueError(f"{name}: got a value that is NaN or infinite, need finite numbers")
     return vector

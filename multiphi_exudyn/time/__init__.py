@@ -5,6 +5,6 @@ constant or vary in time. A record keeps what the loop has done; a trajectory sa
 loop's own flow. What its truncated modes could not hold, and what to distrust in it, is read off it.
 
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, sampling,
-work, growing, taken, record, saved, trajectory, defects, truncation, chatter, loop_record, loop, going_on, motion,
-refinement, rubbing, reliability, simulate, many.
+work, growing, taken, record, saved, start, trajectory, defects, truncation, chatter, loop_record, loop, going_on,
+failures, motion, refinement, rubbing, reliability, simulate, many.
 """

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 from multiphi_exudyn.display import Shown
 
 __all__ = ["Ledger", "Statistics"]
 
 
-@dataclass(frozen=True)
-class Statistics:
+class Statistics(NamedTuple):
     """Work of a run; function_evaluations counts samples of event signals.
 
     record_bytes: what its segments and events take; array_bytes: the levels, maps and loads of the loop, which runs of

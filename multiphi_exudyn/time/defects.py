@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.defect_forms import allowed, defect_form, factor, held_rigidly, over_omega
+from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigidly, over_omega
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time.segment import Segments, listed
@@ -31,9 +31,7 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
 
-SAMPLES = 100  # of the motion, for its mean square
-FRACTIONS = np.linspace(0.0, 1.0, SAMPLES)
-FEWER = 9  # from one sample to the next of those that may be enough, 12 of them
+SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
 
 
 @dataclass(frozen=True)
@@ -97,57 +95,35 @@ class Samples:
     def __init__(self, segments: Segments, end: float) -> None:
         self._segments, self._end = segments, end
 
-    @property
+    def amplitude_exceeds(self, limit: float, first: float) -> bool:
+        """Whether the amplitude is larger, which |y| at the first time, or less than it, may tell already."""
+        return (first > 0 and first**2 > 2 * SAMPLES * limit**2) or self.amplitude > limit
+
+    @functools.cached_property
     def amplitude(self) -> float:
         """Root of the mean of |y|^2 [m sqrt(kg)]."""
-        return math.sqrt(self._sum(*self._all) / SAMPLES)
+        return math.sqrt(self._segments.mean_square(self._end, SAMPLES))
 
-    def amplitude_exceeds(self, limit: float, first: float = 0.0) -> bool:
-        """Whether the amplitude is larger, which a few samples may tell already: none of |y|^2 is negative.
-
-        first: what |y| is at the first of them, or less; where even as much at a few would not tell, all are looked at.
-        """
-        least = SAMPLES * limit**2
-        if first > 0 and first**2 > least:
-            return True
-        few = self._times[::FEWER]
-        likely = "_all" not in vars(self) and not 0 < len(few) * first**2 <= least
-        if likely and self._sum(*self._states(few)) > least:
-            return True
-        return self.amplitude > limit
-
-    @property
+    @functools.cached_property
     def largest_energy(self) -> float:
         """The largest kinetic + strain energy [J], without its sign."""
-        largest = 0.0
-        for level, own in self._by_level(self._all[0]):
-            eta, eta_t = self._all[1][:, own, : level.width]
-            largest = max(largest, float(np.max(np.abs(level.kinetic(eta_t.T) + level.strain(eta.T)))))
-        return largest
+        energies = [level.kinetic(eta_t.T) + level.strain(eta.T) for level, eta, eta_t in self._by_level()]
+        return float(np.max(np.abs(np.concatenate(energies))))
 
     @functools.cached_property
-    def _all(self) -> tuple[np.ndarray, np.ndarray]:
-        return self._states(self._times)
+    def _states(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers (k,) of the levels at the times, and the states there (2, k, n)."""
+        segments = self._segments
+        times = np.linspace(segments.starts[0], self._end, SAMPLES)
+        owners = segments.owners(times)
+        return segments.numbers[owners], segments.states(owners, times - segments.starts[owners])
 
-    @functools.cached_property
-    def _times(self) -> np.ndarray:
-        first = self._segments.starts[0]
-        return np.asarray(first + (self._end - first) * FRACTIONS)
-
-    def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers (k,) of the levels at times (k,), and the states there (2, k, n)."""
-        owners = self._segments.owners(times)
-        states = self._segments.states(owners, times - self._segments.starts[owners])
-        return self._segments.numbers[owners], states
-
-    def _by_level(self, numbers: np.ndarray) -> Iterator[tuple[LoadedLevel, np.ndarray]]:
-        """The levels among numbers (k,), and which of these are theirs (k,)."""
+    def _by_level(self) -> Iterator[tuple[LoadedLevel, np.ndarray, np.ndarray]]:
+        """The levels at the times, with eta and eta' (k, r) there."""
+        numbers, states = self._states
         for number in dict.fromkeys(numbers.tolist()):
-            yield self._segments.levels[number], numbers == number
-
-    def _sum(self, numbers: np.ndarray, states: np.ndarray) -> float:
-        """Of |y|^2."""
-        return sum(_square(level, states[0, own, : level.width]) for level, own in self._by_level(numbers))
+            level, own = self._segments.levels[number], numbers == number
+            yield level, *states[:, own, : level.width]
 
 
 def indicator(lost: float, samples: Samples) -> float:
@@ -162,15 +138,6 @@ def total_defect(trajectory: Trajectory) -> float:
     """Sum of |defect|^2 [m2 kg] over a run, which the loop has added up where it could."""
     known = listed(trajectory.segments).defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(known) else known
-
-
-def _square(level: LoadedLevel, eta: np.ndarray) -> float:
-    """Sum of |y|^2 over the rows of eta (k, r), by a factor that the level keeps."""
-    if "place" not in level.entries:
-        level.entries["place"] = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
-    rows: np.ndarray = level.entries["place"]
-    y = (eta @ rows[:, :-1].T + rows[:, -1]).ravel()
-    return float(y @ y)
 
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:

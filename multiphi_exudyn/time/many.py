@@ -32,7 +32,8 @@ from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
 from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.simulate import Run, checked_end, holding, warned
-from multiphi_exudyn.time.trajectory import Start, Trajectory
+from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue
 
 __all__ = ["ManyRuns", "simulate_many"]

@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +18,14 @@ from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
 from multiphi_exudyn.events.state import Loss, Phase, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mathematics.round_off import all_finite
 from multiphi_exudyn.time.balance import Statistics
-from multiphi_exudyn.time.chatter import allowed, window
+from multiphi_exudyn.time.chatter import limits
+from multiphi_exudyn.time.failures import NOT_FINITE, failure
 from multiphi_exudyn.time.loop import advance
-from multiphi_exudyn.time.loop_record import ACCUMULATED
 from multiphi_exudyn.time.record import PHASES, Record
-from multiphi_exudyn.time.trajectory import Again, Start, Trajectory
+from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.trajectory import Again, Trajectory
 
 __all__ = ["NUMBERS", "Motion", "carry", "measured"]
 
@@ -33,29 +34,22 @@ NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
 RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
 NOTHING = Loss()
-SUMS = (a.WORK, a.DEFECTS, a.TRUNCATED)
-NOT_FINITE = "the motion is not finite"
+NO_RING = np.zeros(0)
 
 carry, measured = entry(advance), entry(measure)
+quiet = np.errstate(all="ignore")  # as compiled: what is not finite is found, and told
 
 
-@dataclass
-class _Kept:
-    """What a run keeps while another one has the arrays.
+class _Kept(NamedTuple):
+    """What a run keeps while another one has the arrays: its own of their first numbers, and the chatter check's.
 
-    last_decision [s], decisions, ring: of the chatter check, the last ones. piece, age: which of the channels, and
-    since when [s] it lasts. work [J]: of what varies in time since the last segment ended. defects, truncated: sums so
-    far, see Segments.
+    piece: which of the channels.
     """
 
-    last_decision: float
-    decisions: int = 0
-    ring: list[float] = field(default_factory=list)
-    piece: int = 0
-    age: float = 0.0
-    work: float = 0.0
-    defects: float = 0.0
-    truncated: float = 0.0
+    numbers: np.ndarray
+    decisions: int
+    ring: np.ndarray
+    piece: int
 
 
 class Motion:
@@ -74,17 +68,25 @@ class Motion:
         loop: Callable[..., Any] | None = None,
     ) -> None:
         self.arrays, self.start = arrays, start
-        self._loop: Callable[..., Any] = loop or (advance if compiled is False else carry)
+        self._loop: Callable[..., Any] = loop or (quiet(advance) if compiled is False else carry)
         self._measured: Measure = measure if compiled is False else measured
-        self.model, self.levels = arrays.levels.model, arrays.levels
+        self.levels = arrays.levels
+        self.model = self.levels.model
         self.time, self.message, self.start_loss = start.time, "", NOTHING
-        self.record = Record(self.model.contacts, self.arrays)
+        self.record = Record(self.model.contacts, arrays)
         self._state: State | None = start.state
         self._starting = True
-        self._window, self._allowed = window(self.model), allowed(self.model)
-        self._kept = _Kept(start.time)
+        self._window, self._allowed = limits(self.model)
+        self._kept = _Kept(self._at_first(start.time), 0, NO_RING, 0)
         self._evaluations = self._transitions = 0
         self._unavailable: Exception | None = None
+
+    def _at_first(self, time: float) -> np.ndarray:
+        """The first numbers of the arrays for a run that sets out at a time [s]."""
+        numbers = np.zeros(a.OF_A_RUN)
+        numbers[a.TIME] = numbers[a.LAST_DECISION] = time
+        numbers[a.ALLOWED] = self._allowed
+        return numbers
 
     def begin(self) -> Motion:
         """Itself, after whatever happens at the start."""
@@ -102,7 +104,9 @@ class Motion:
         self._state, self.time, self.message, self.start_loss = state, time, "", NOTHING
         self._starting = False
         self.record = Record(self.model.contacts, self.arrays)
-        self._kept = replace(self._kept, last_decision=time, decisions=0, ring=[], defects=math.nan)
+        numbers, piece = self._at_first(time), self._kept.piece
+        numbers[a.AGE], numbers[a.DEFECTS] = self._kept.numbers[a.AGE], math.nan
+        self._kept = _Kept(numbers, 0, NO_RING, piece)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
@@ -122,7 +126,9 @@ class Motion:
 
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
-        segments, events = self.record.segments(self._kept.defects, self._kept.truncated), self.record.events()
+        numbers = self._kept.numbers
+        segments = self.record.segments(float(numbers[a.DEFECTS]), float(numbers[a.TRUNCATED]))
+        events = self.record.events()
         return Trajectory(
             model=self.model,
             segments=segments,
@@ -133,7 +139,7 @@ class Motion:
             start=self.start,
             start_loss=self.start_loss,
             final=self._state if segments else None,
-            final_work=self._kept.work,
+            final_work=float(numbers[a.WORK]),
             load=self.levels.load,
             stats=Statistics(
                 levels_built=self.model.levels_built,
@@ -155,16 +161,15 @@ class Motion:
         try:
             self._take_over()
             self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
-            with np.errstate(all="ignore"):  # as compiled: what is not finite is found, and told
-                answer = self._run(end)
+            answer = self._run(end)
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if self._state is not None and not np.all(np.isfinite(self._state.displacement)):
+            if not all_finite(self.state.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
-        except (MultiPhiError, np.linalg.LinAlgError) as failure:
-            singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
-            self.message = f"at t = {self.time:.9g} s: {singular}{failure}"
+        except (MultiPhiError, np.linalg.LinAlgError) as error:
+            singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
+            self.message = f"at t = {self.time:.9g} s: {singular}{error}"
 
     def _run(self, end: float) -> int:
         """The loop until it ends, with all that it needs."""
@@ -188,6 +193,7 @@ class Motion:
                 "a shorter run, from whose end others go on (start=), or fewer events or samples of loads"
             )
 
+    @quiet
     def _supply(self) -> None:
         """Pack what the loop needs, in arrays that begin anew where they have become too large."""
         try:
@@ -216,32 +222,17 @@ class Motion:
 
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
-        self._keep(self.arrays.numbers[: a.RUN_NUMBERS].tolist())
-
-    def _keep(self, given: list[float]) -> None:
-        """What the first numbers of the arrays say."""
-        ints, numbers = self.arrays.ints, self.arrays.numbers
-        decisions, start = int(ints[a.DECISIONS]), int(ints[a.RING])
-        ring = numbers[start : start + 2 * min(decisions, self._window + 1)].tolist() if decisions else []
-        sums = (given[place] for place in SUMS)
-        self._kept = _Kept(given[a.LAST_DECISION], decisions, ring, int(ints[a.PIECE]), given[a.AGE], *sums)
+        ints, numbers, _ = self.arrays.buffers.all
+        self._kept = _Kept(numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
-        arrays, kept, state = self.arrays, self._kept, self._state
-        arrays.channels.set(arrays.buffers, kept.piece, kept.age, self.time)
+        arrays, state, (kept, decisions, ring, piece) = self.arrays, self._state, self._kept
         level = 0 if state is None else arrays.level(state.level.states)
         arrays.begin_record()
-        ring = arrays.ring(2 * (self._window + 1))
-        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = self._window, kept.decisions
-        for slot in (a.TRANSITIONS, a.GIVEN_UP):
-            arrays.ints[slot] = 0
-        numbers = arrays.numbers
-        if kept.ring:
-            numbers[ring : ring + len(kept.ring)] = kept.ring
-        numbers[a.TIME], numbers[a.LAST_DECISION], numbers[a.WORK] = self.time, kept.last_decision, kept.work
-        numbers[a.DEFECTS], numbers[a.TRUNCATED] = kept.defects, kept.truncated
-        numbers[a.ALLOWED], numbers[int(arrays.ints[a.FOUND]) + 1] = self._allowed, 0.0
+        arrays.set_chatter(self._window, decisions, ring)
+        arrays.buffers.numbers[: a.OF_A_RUN] = kept
+        arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
             arrays.set_start(start.displacement, start.velocity, start.states, start.held)
@@ -249,58 +240,37 @@ class Motion:
             phases = [NUMBERS[phase] for phase in state.phases]
             arrays.set_state(level, state.displacement, state.velocity, phases, self._measured)
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
+        ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
+        ints[a.TRANSITIONS] = ints[a.GIVEN_UP] = 0
+        numbers[a.TIME] = self.time
+        numbers[ints[a.FOUND] + 1] = 0.0
 
     def _leave(self) -> None:
         """The state that the loop has come to, and what it has recorded."""
-        ints, numbers = self.arrays.ints, self.arrays.numbers
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         self.record.take()
-        given = numbers[: a.RUN_NUMBERS].tolist()
-        self._keep(given)
-        self.time = given[a.TIME]
+        self.give_up_arrays()
+        self.time = float(numbers[a.TIME])
         if not ints[a.STARTING]:
             if self._starting:
-                lost = given[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES]
+                lost = numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist()
                 self.start_loss = Loss(*lost) if any(lost) else NOTHING
             self._state, self._starting = self._state_reached(), False
-        samples = int(ints[a.FOUND]) + 1
+        samples = ints[a.FOUND] + 1
         self._evaluations += int(numbers[samples])
         self._transitions += int(ints[a.TRANSITIONS])
         ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
 
     def _state_reached(self) -> State:
-        ints, numbers = self.arrays.ints, self.arrays.numbers
-        record, x, v = ints[a.CURRENT + a.LEVEL : a.CURRENT + a.SPEED + 1].tolist()
-        level = self.arrays.loaded[int(ints[record + a.NUMBER])]
-        if ints[a.CURRENT + a.SETTLED]:
-            phases = (Phase.ARMED,) * int(ints[record + a.EXIT_COUNT])
-        else:
-            standing = ints[ints[a.CURRENT + a.PHASES] :][: ints[record + a.EXIT_COUNT]]
-            phases = tuple(PHASES[k] for k in standing.tolist())
+        ints, numbers, _ = self.arrays.buffers.all
+        record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
+        level, exits = self.arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
+        phases = (Phase.ARMED,) * exits if settled else tuple(PHASES[k] for k in ints[waits : waits + exits].tolist())
         n = level.level.modes
         return State(level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases)
 
     def failure(self) -> Exception:
         """What has stopped the loop."""
-        ints, told = self.arrays.ints, self.arrays.numbers[a.TOLD : a.TOLD + 3].tolist()
-        cause, flags = int(ints[a.CAUSE]), ints[ints[a.CAUSED_BY] :][: ints[a.ELEMENTS]]
-        names = ", ".join(self.model.contacts[i].name for i in np.flatnonzero(flags).tolist())
-        if cause == a.UNAVAILABLE and self._unavailable is not None:
+        if self.arrays.ints[a.CAUSE] == a.UNAVAILABLE and self._unavailable is not None:
             return self._unavailable
-        complete = self.model.level_at(()).modes == self.model.base.modes.count
-        sentences = {
-            a.NOT_FINITE: NOT_FINITE,
-            a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
-            f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
-            "need fewer modes or a shorter run",
-            a.CHATTER: f"chatter: {self._window} events in {told[0]:g} s, more than {self._allowed} in a period of the "
-            f"highest kept mode or load ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
-            a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
-            a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
-            + ("" if complete else " in the kept modes, need more of them"),
-            a.UNSETTLED: "no forces were found that agree with what moves: round-off decides which contacts push, or "
-            "friction is so high that they are not unique, need a smaller coefficient",
-            a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
-            a.GAINING: f"rigid contacts {names}: an impact with restitution and friction would make energy, need one "
-            "of them alone",
-        }
-        return NumericalFailure(sentences[cause])
+        return failure(self.arrays)

@@ -19,7 +19,7 @@ from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
-from multiphi_exudyn.time.sampling import sample_rows, sample_states
+from multiphi_exudyn.time.sampling import sample_rows, sample_squares, sample_states
 from multiphi_exudyn.time.segment import Segment, Segments, owners
 from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
@@ -28,7 +28,8 @@ __all__ = ["PHASES", "Record"]
 
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
-states_of, values_of, works_of = entry(sample_states), entry(sample_rows), entry(integrate_works)
+states_of, values_of, squares_of = entry(sample_states), entry(sample_rows), entry(sample_squares)
+works_of = entry(integrate_works)
 
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
 
@@ -40,8 +41,9 @@ T = TypeVar("T")
 class Made(Sequence[T], Generic[T]):
     """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
 
-    def __init__(self, make: Callable[[int], T], count: int, known: dict[int, T]) -> None:
-        self._make, self._count, self._known = make, count, known
+    def __init__(self, make: Callable[[int], T], count: int) -> None:
+        self._make, self._count = make, count
+        self._known: dict[int, T] = {}
 
     def __len__(self) -> int:
         return self._count
@@ -72,7 +74,7 @@ class Recorded(Made[Segment], Segments):
     """The segments of a record, which is looked into when somebody asks."""
 
     def __init__(self, record: Record, defects: float, truncated: float) -> None:
-        super().__init__(record.segment, record.count, {})
+        super().__init__(record.segment, record.count)
         self._record, self.arrays = record, record.arrays
         self.defects, self.truncated = defects, truncated
 
@@ -91,7 +93,7 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``."""
         return self._record.rows[: self._count, 0]
 
-    @functools.cached_property
+    @property
     def levels(self) -> Sequence[LoadedLevel]:
         """See ``Segments``."""
         return self._record.levels
@@ -103,6 +105,10 @@ class Recorded(Made[Segment], Segments):
     def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
         """See ``Segments``."""
         return self._record.values(times, side, row)
+
+    def mean_square(self, end: float, count: int) -> float:
+        """See ``Segments``."""
+        return self._record.mean_square(end, count)
 
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
@@ -130,7 +136,7 @@ class Events(Made[Event]):
     """The events of a record."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record.event, len(record.places), {})
+        super().__init__(record.event, 0 if record.eventless else len(record.places))
         self._record = record
 
     @property
@@ -191,18 +197,17 @@ class Record:
             return
         if self._last:
             self._add(self._last)
-        self._last, rows = part, part.get("rows", EMPTY["rows"])
-        packed = rows[:, 0].tolist()
-        known = {number: self._number(self.arrays.loaded[number]) for number in set(packed)}
-        rows[:, 0] = [known[number] for number in packed]
-        self.count += len(rows)
+        self._last = part
+        if "rows" in part:
+            self._renumber(part["rows"][:, 0])
+            self.count += len(part["rows"])
         vars(self).pop("places", None)
 
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        last = sum(part.nbytes for part in self._last.values())
-        return last + sum(part.bytes for part in self._parts.values())
+        last = sum([part.nbytes for part in self._last.values()])
+        return last + sum([part.bytes for part in self._parts.values()])
 
     @property
     def parts(self) -> dict[str, Growing]:
@@ -228,17 +233,21 @@ class Record:
         for name, given in part.items():
             parts[name].add(given)
 
-    def _number(self, level: LoadedLevel) -> int:
-        """The number of a level in this record; the arrays may have packed it twice."""
-        number = self._numbers.setdefault(level.states, len(self.levels))
-        if number == len(self.levels):
-            self.levels.append(level)
-        return number
+    def _renumber(self, numbers: np.ndarray) -> None:
+        """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
+        packed, known = numbers.tolist(), {}
+        for number in dict.fromkeys(packed):
+            level = self.arrays.loaded[number]
+            known[number] = self._numbers.setdefault(level.states, len(self.levels))
+            if known[number] == len(self.levels):
+                self.levels.append(level)
+        if any(number != other for number, other in known.items()):
+            numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return EMPTY["phases"] if self.eventless else np.flatnonzero(self.kinds[:, 1] != a.SHARED)
+        return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
 
     @functools.cached_property
     def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
@@ -295,6 +304,17 @@ class Record:
             while self._supply(values_of(*self._given(offsets), len(self.rows), *given)):
                 pass
         return result
+
+    def mean_square(self, end: float, count: int) -> float:
+        """Mean of |y|^2 up to ``end`` [s], see ``Segments``."""
+        total = 0.0
+        for offsets in self._packed(list(range(len(self.levels)))):
+            for level in offsets[offsets > 0].tolist():
+                self.arrays.add_sizes(level)
+            while (found := squares_of(*self._given(offsets), len(self.rows), end, count)) < 0:
+                self.arrays.supply()
+            total += found
+        return total
 
     def works(self) -> np.ndarray:
         """Work [J] (3,) of damping, of what varies and of friction in all segments, less what jumps at their starts."""

@@ -27,6 +27,8 @@ SAMPLES = 257  # of the energy, for its largest value
 def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> Trajectory:
     """The run, with smooth courses fine enough: ``run`` takes them finer by a factor."""
     trajectory, finer = run(1.0), 1.0
+    if not loads:
+        return trajectory
     courses = [getattr(load, "course", None) for load in loads]
     wanted = [course.tolerance for course in courses if isinstance(course, (Smooth, Sweep))]
     for _ in range(REFINEMENTS if wanted else 0):

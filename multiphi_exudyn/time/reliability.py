@@ -33,6 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
@@ -65,34 +66,63 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    model, segments = trajectory.model, listed(trajectory.segments)
-    always, static, clusters = _known(model, segments)
-    found = [*_slow(trajectory), *always]
-    if not model.whole:
+    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.t_start
+    known, excitation = _Known.of(model, segments), segments.levels[0].excitation
+    found = list(known.always)
+    if 0 < known.fastest * trajectory.t_end < HARDLY:
+        found[:0] = _slow(trajectory, known.fastest)
+    if not known.whole:
         samples = Samples(segments, trajectory.t_end)
-        found.extend(static)
-        found.extend(_lost_energy(trajectory, segments, samples))
-        found.extend(_truncation(trajectory, samples, tolerance))
-    found.extend(clusters)
+        found += known.static
+        found += _lost_energy(trajectory, segments, samples)
+        found += _truncation(trajectory, samples, tolerance)
+    found += known.clusters
     if model.validity is not None:
-        found.extend(model.validity(trajectory))
-    found.extend(_slow_modes(trajectory))
-    found.extend(rubbing_warnings(trajectory.segments, model))
-    found.extend(_load_pieces(trajectory))
+        found += model.validity(trajectory)
+    if known.slowest * span < SLOW:
+        found += _slow_mode(segments, known.slowest, span)
+    if model.general:
+        found += rubbing_warnings(segments, model)
+    if excitation.histories and excitation.effort(trajectory.t_end) > MANY_PIECES:
+        found.append(_load_pieces(excitation, trajectory.t_end))
     return tuple(found)
 
 
-def _known(model: MultiPhiModel, segments: Segments) -> tuple[tuple[str, ...], ...]:
-    """What is known of a model before any run, and of the levels of a run before it comes there; kept by the model."""
-    visited = tuple(level.level.indices for level in segments.levels)
+@dataclass(frozen=True)
+class _Known:
+    """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    def made() -> tuple[tuple[str, ...], ...]:
+    whole: no level leaves out a mode. always, static, clusters: warnings. fastest: the highest frequency of the open
+    level [Hz]. slowest: the lowest of the levels that is not zero [rad/s].
+    """
+
+    whole: bool
+    always: tuple[str, ...]
+    static: tuple[str, ...]
+    clusters: tuple[str, ...]
+    fastest: float
+    slowest: float
+
+    @classmethod
+    def of(cls, model: MultiPhiModel, segments: Segments) -> _Known:
+        """Kept by the model."""
+        visited = tuple([level.level.indices for level in segments.levels])
+        found: _Known = model.entries.get_or_build(("warnings", visited), lambda: cls._of(model, segments))
+        return found
+
+    @classmethod
+    def _of(cls, model: MultiPhiModel, segments: Segments) -> _Known:
         levels = [level.modal for level in segments.levels]
         static = () if model.whole else static_warnings([level.level for level in segments.levels])
-        return (*damping_warnings(model), *_missing_modes(model)), tuple(static), tuple(_clusters(levels))
-
-    found: tuple[tuple[str, ...], ...] = model.entries.get_or_build(("warnings", visited), made)
-    return found
+        omega = np.concatenate([level.omega for level in levels])
+        return cls(
+            model.whole,
+            (*damping_warnings(model), *_missing_modes(model)),
+            tuple(static),
+            tuple(_clusters(levels)),
+            model.level_at(()).highest_frequency,
+            float(np.min(omega[omega > 0], initial=math.inf)),
+        )
 
 
 @dataclass(frozen=True)
@@ -152,15 +182,12 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
         )
 
 
-def _slow(trajectory: Trajectory) -> Iterator[str]:
+def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
     """Not of runs that go on with one another, and not of a system that was reduced."""
-    if trajectory.t_start > 0 or trajectory.model.validity is not None:
-        return
-    fastest, lasts = trajectory.model.level_at(()).highest_frequency, trajectory.t_end
-    if 0 < fastest * lasts < HARDLY:
+    if not (trajectory.t_start > 0 or trajectory.model.validity is not None):
         yield (
-            f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts {lasts:.3g} "
-            "s; are mass and stiffness swapped, or in different units?"
+            f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts "
+            f"{trajectory.t_end:.3g} s; are mass and stiffness swapped, or in different units?"
         )
 
 
@@ -211,24 +238,20 @@ def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> 
 
 def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -> Iterator[str]:
     """Of the energy that truncation took, whatever its sign at an instant."""
-    start, base = trajectory.start, trajectory.model.base
     at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
     at_events = segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
     lost = abs(at_start) + at_events
-    if lost == 0:
+    if lost == 0 or lost <= ENERGY_SHARE * abs(given := trajectory.initial_energy):
         return
-    given = 0.5 * float(start.velocity @ start.velocity)
-    given += base.strain(start.displacement, start.penetrating, start.gaps)
-    if lost <= ENERGY_SHARE * abs(given):
-        return
-    yield from _energy_warning(lost, abs(given) if _left_alone(trajectory) else max(samples.largest_energy, abs(given)))
+    alone = _left_alone(trajectory, segments)
+    yield from _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
 
 
-def _left_alone(trajectory: Trajectory) -> bool:
+def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
     """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
-    excitation, model = listed(trajectory.segments).levels[0].excitation, trajectory.model
+    excitation, model = segments.levels[0].excitation, trajectory.model
     return not (excitation.histories or np.any(excitation.static) or model.general or model.overrides)
 
 
@@ -243,10 +266,11 @@ def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance |
     """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
     lost, least = total_defect(trajectory), min(INDICATOR, tolerance.error if tolerance else INDICATOR)
     y, defect = trajectory.start.displacement, math.sqrt(lost)
-    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(float(y @ y)) - defect):
+    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(y.dot(y)) - defect):
         return
-    impulses, error = event_table(trajectory.events, trajectory.model.index)[:, 2], indicator(lost, samples)
-    rigid = bool(np.any(impulses > 0))
+    error = indicator(lost, samples)
+    rigid = any(contact.rigid for contact in trajectory.model.contacts)
+    rigid = rigid and bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
     if tolerance is not None and error > tolerance.error:
         kept = trajectory.model.level_at(()).modes
         yield (
@@ -272,15 +296,12 @@ def _clusters(levels: Sequence[Level]) -> list[str]:
     ]
 
 
-def _slow_modes(trajectory: Trajectory) -> Iterator[str]:
-    """Of a mode of which a run sees so little that where loads move it is a small difference of far places.
+def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]:
+    """Of a mode of which a run of ``span`` [s] sees so little that where loads move it is a difference of far places.
 
     p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    levels, span = listed(trajectory.segments).levels, trajectory.t_end - trajectory.t_start
-    omega = np.concatenate([level.level.omega for level in levels])
-    slowest = float(np.min(omega[omega > 0], initial=math.inf))
-    if slowest * span < SLOW and any(np.any(level.excitation.static) or level.excitation.histories for level in levels):
+    if any(np.any(level.excitation.static) or level.excitation.histories for level in segments.levels):
         share = min(1.0, LEFT / (slowest * span)) ** 2
         yield (
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
@@ -288,15 +309,11 @@ def _slow_modes(trajectory: Trajectory) -> Iterator[str]:
         )
 
 
-def _load_pieces(trajectory: Trajectory) -> list[str]:
-    """Whether the loads have so many pieces that they set the time and memory of the run."""
-    level = trajectory.final.level if trajectory.final is not None else None
-    if level is None or not level.excitation.histories or level.excitation.effort(trajectory.t_end) <= MANY_PIECES:
-        return []
-    pieces = level.excitation.pieces(trajectory.t_end)
-    each = 1e3 * PIECE_SECONDS * level.excitation.effort(trajectory.t_end) / pieces
-    return [
-        f"load pieces: the loads have {pieces} pieces in {trajectory.t_end:g} s, some {each:.1g} ms and "
-        f"{PIECE_BYTES / 1000:g} kB each; fewer samples, a larger tolerance or a lower highest frequency make the run "
-        "shorter"
-    ]
+def _load_pieces(excitation: Excitation, end: float) -> str:
+    """Of loads that have so many pieces that they set the time and memory of a run to ``end`` [s]."""
+    pieces = excitation.pieces(end)
+    return (
+        f"load pieces: the loads have {pieces} pieces in {end:g} s, some "
+        f"{1e3 * PIECE_SECONDS * excitation.effort(end) / pieces:.1g} ms and {PIECE_BYTES / 1000:g} kB each; fewer "
+        "samples, a larger tolerance or a lower highest frequency make the run shorter"
+    )

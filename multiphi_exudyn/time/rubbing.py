@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import CLEAR
 from multiphi_exudyn.mechanics.element import friction_spring
-from multiphi_exudyn.time.segment import Segment, Segments, listed
+from multiphi_exudyn.time.segment import Segments
 
 __all__ = ["rubbing_warnings"]
 
@@ -36,13 +36,12 @@ BACKWARDS = 0.01  # of the time that it slips: less of it against its slip is no
 REMEDY = "give one element with the sum of their limits, or each a spring (stiffness, tangential_stiffness)"
 
 
-def rubbing_warnings(segments: Sequence[Segment], model: MultiPhiModel) -> Iterator[str]:
-    """One sentence of each kind at most."""
-    if model.general and len(segments):
-        yield from _shared(listed(segments))
-        yield from _in_turn(listed(segments))
-        if not model.whole:
-            yield from _backwards(listed(segments))
+def rubbing_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
+    """Of a model with friction, one sentence of each kind at most."""
+    yield from _shared(segments)
+    yield from _in_turn(segments)
+    if not model.whole:
+        yield from _backwards(segments)
 
 
 def _shared(segments: Segments) -> Iterator[str]:

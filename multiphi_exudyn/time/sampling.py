@@ -38,6 +38,7 @@ from multiphi_exudyn.events.arrays import (
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
     SIGNALS,
+    SIZES,
     SPEED,
     TERM_INTS,
     WORK_WAVES,
@@ -49,7 +50,7 @@ from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.forced_response import NEAREST_FAR, PER_DEGREE
 from multiphi_exudyn.mathematics.response_arrays import FREE, SHAPES
 
-__all__ = ["sample_rows", "sample_states"]
+__all__ = ["sample_rows", "sample_squares", "sample_states"]
 
 RESTART = 32  # samples after which exponentials begin anew: as many round-offs
 EVEN = 4e-16  # of the last time, by which evenly spaced times may be off
@@ -190,6 +191,45 @@ def sample_rows(
             sample_flow(ints, numbers, waves, began, constant, times, k, last, step, values)
         k = last
     return OK
+
+
+@compiled
+def sample_squares(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    rows: Ints,
+    spans: Numbers,
+    coordinates: Numbers,
+    offsets: Ints,
+    segments: int,
+    end: float,
+    count: int,
+) -> float:
+    """Integral of |y|^2 from the first start to ``end`` [s] over that time, of a polygon through ``count`` instants.
+
+    Less than zero where there is no room for a response.
+    """
+    total, i, flowing, first = 0.0, -1, -1, spans[0]
+    for k in range(count):
+        t = first + (end - first) * k / (count - 1)
+        i = owner_of(spans, segments, t, 0, i)
+        level, x = offsets[rows[i * SEGMENT_WIDTH]], ints[AFTER + PLACE]
+        if level == 0:
+            continue
+        if flowing != i and resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
+            return -1.0
+        flowing, n, row = i, ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
+        state_at(ints, numbers, waves, level, t - spans[i * SEGMENT_WIDTH_NUMBERS], x, ints[AFTER + SPEED])
+        square = 0.0
+        for line in range(n + 1):
+            size = numbers[row + n]
+            for c in range(line, n):
+                size += numbers[row + c] * numbers[x + c]
+            square += size * size
+            row += n + 1
+        total += square / (count - 1) * (0.5 if k == 0 or k == count - 1 else 1.0)
+    return total
 
 
 @compiled

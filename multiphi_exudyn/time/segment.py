@@ -153,6 +153,10 @@ class Segments(Sequence[Segment], ABC):
         row: (2 n + 1,) of a level with n coordinates.
         """
 
+    @abstractmethod
+    def mean_square(self, end: float, count: int) -> float:
+        """Mean of |y|^2 [m2 kg] from the first start to ``end`` [s], of a polygon through ``count`` even instants."""
+
     @property
     @abstractmethod
     def works(self) -> tuple[float, float, float]:
@@ -233,6 +237,15 @@ class Listed(Segments):
             n, function = level.width, row(level)
             found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
         return found
+
+    def mean_square(self, end: float, count: int) -> float:
+        """See ``Segments``."""
+        times = np.linspace(self.starts[0], end, count)
+        places, squares = self.owners(times), np.empty(count)
+        x = self.states(places, times - self.starts[places])[0]
+        for k, number in enumerate(self.numbers[places].tolist()):
+            squares[k] = np.sum(self.levels[number].configuration(x[k, : self.levels[number].width]) ** 2)
+        return float((np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (count - 1))
 
     @property
     def works(self) -> tuple[float, float, float]:

@@ -14,7 +14,6 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -22,17 +21,15 @@ from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiled import available
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
 from multiphi_exudyn.time.base_share import base_warnings
 from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.refinement import to_tolerance
 from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.trajectory import Start, Trajectory
+from multiphi_exudyn.time.start import Start, first_start
+from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
 
@@ -48,9 +45,6 @@ __all__ = [
     "started",
     "warned",
 ]
-
-TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
-UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
 
 
 def simulate(
@@ -165,7 +159,7 @@ def holding(
 
     rows: (k, n) of further places at which something acts.
     """
-    if isinstance(start, Trajectory):
+    if start is not None and isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
     if model.base.complete:
         return model
@@ -182,7 +176,7 @@ class Shared(Protocol):
         """A run in these levels on arrays that no other run has at that time."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Run:
     """What ``simulate`` is asked for, there is more about it there; t_end [s].
 
@@ -221,15 +215,28 @@ class Run:
         """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        before = self.start if isinstance(self.start, Trajectory) else None
-        levels = self._levels(finer)
-        start = _start(self, levels) if before is None else going_on(before, levels, self.rewound)
+        before, levels = self._before, self._levels(finer)
+        start = self._first(levels) if before is None else going_on(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
+
+    @property
+    def _before(self) -> Trajectory | None:
+        """The trajectory from whose end this goes on."""
+        return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
+
+    def _first(self, levels: LoadedLevels) -> Start:
+        """The start from the vectors that were given."""
+        y, v = self._in_base("displacement", self.displacement), self._in_base("velocity", self.velocity)
+        return first_start(levels, self.t_end, self.model.base.still if y is None else y, v, self.stretches or {})
+
+    def _in_base(self, name: str, given: np.ndarray | None) -> np.ndarray | None:
+        """A given vector (n,) in base coordinates."""
+        return None if given is None else self.model.base.coordinates(self.model.structure.vector(name, given))
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
-        model, loads = self.model, unchanging(self.loads)
-        time = self.start.t_end if isinstance(self.start, Trajectory) and not self.rewound else 0.0
+        model, loads, before = self.model, unchanging(self.loads), self._before
+        time = 0.0 if before is None or self.rewound else before.t_end
 
         def made() -> LoadedLevels:
             return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
@@ -271,73 +278,6 @@ def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: fl
     return LoadedLevels(model, excitation, time, end, alone) if excitation.prescribed else alone
 
 
-@dataclass(frozen=True)
-class _Scales:
-    """What the gaps (c,) of a start are judged by; moved, speeds: of the stops.
-
-    touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
-    moves a mode at most, (m,) [s].
-    """
-
-    moved: np.ndarray
-    speeds: np.ndarray
-    touching: np.ndarray
-    sizes: np.ndarray
-    times: np.ndarray
-
-    @classmethod
-    def of(cls, levels: LoadedLevels, end: float) -> _Scales:
-        """Under the loads until the end [s] of a run."""
-        base, excitation = levels.model.base, levels.excitation
-        omega, sizes = base.modes.omega, np.linalg.norm(base.directions, axis=0)
-        times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
-        ways = base.magnitudes[1] + excitation.stop_ways
-        gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
-        lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + float(np.max(gaps, initial=0.0))
-        moved, speeds = map(excitation.moved, levels.drive.values[:2])
-        return cls(moved, speeds, TOUCHING * ways + UNSEEN * lengths * sizes, sizes, times)
-
-    def near(self, terms: np.ndarray, y: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Gaps (c,) [m] below which a contact is in touch: by the terms (c,) of h.y, by where y' takes the modes."""
-        moving = v * self.times
-        length = math.sqrt(y @ y) + math.sqrt(moving @ moving)
-        return np.asarray(TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching)
-
-
-def _start(run: Run, levels: LoadedLevels) -> Start:
-    """The start as the contacts see it."""
-    model, base = run.model, run.model.base
-    y, v = _base_vector("displacement", run.displacement, model), _base_vector("velocity", run.velocity, model)
-    scales: _Scales = levels.starts.get_or_build(run.t_end, lambda: _Scales.of(levels, run.t_end))
-    stops, directions = base.gaps - scales.moved, base.magnitudes[0]
-    judged = y @ base.directions + stops, scales.near(np.abs(y) @ directions, y, v)
-    if not (model.general or model.force_laws) and (judged[0] > judged[1]).all():
-        return Start(y, v, (), (), stops, (OPEN,) * len(model.contacts), np.zeros(0))
-    gaps, near = (judge.tolist() for judge in judged)
-    rates, terms = v @ base.directions - scales.speeds, np.abs(v) @ directions + np.abs(scales.speeds)
-    rates = drop_round_off(rates, terms)
-    states = np.zeros(len(model.contacts), int)
-    for i, contact in enumerate(model.contacts):
-        if contact.rigid and not contact.held and gaps[i] < -near[i]:
-            raise MultiPhiValueError(
-                f"displacement: lies {-gaps[i]:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
-                "(static_equilibrium gives an admissible start)"
-            )
-        depth = 0.0 if abs(gaps[i]) <= near[i] else gaps[i]
-        named = contact.first_state(depth, *rates[list(model.link_places[i])].tolist())
-        states[i] = [state.name for state in contact.states].index(named)
-        if contact.rigid and not contact.held and gaps[i] <= near[i]:
-            states[i] = CLOSE
-    states = _independent(model, states)
-    touching = tuple(i for i, c in enumerate(model.contacts) if c.rigid and not c.held and states[i] != OPEN)
-    stretches = run.stretches or {}
-    held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
-    left = stops.copy()
-    left[list(model.held)] -= held
-    sprung = tuple(k for k in model.links_held(states.tolist()) if k not in touching)
-    return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
-
-
 def started(run: Run) -> Run:
     """The run with its start looked into: an equilibrium is its displacement and its stretches."""
     start = run.start
@@ -346,24 +286,6 @@ def started(run: Run) -> Run:
     if isinstance(start, Equilibrium):
         return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
     return run
-
-
-def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
-    """States of which, of rigid links that would stick, an independent set does; the others wait till it is decided."""
-    found = np.zeros((0, len(model.base.directions)))
-    for i, element in enumerate(model.contacts):
-        sticks, number, spring, _ = friction_spring(element)
-        if states[i] == sticks and spring == 0 and (element.held or not element.rigid):
-            row = model.base.directions[:, model.link_places[i][number]]
-            left = row / np.linalg.norm(row)
-            for _ in range(2):
-                left = left - (found @ left) @ found
-            size = float(np.linalg.norm(left))
-            if size > INDEPENDENT:
-                found = np.vstack([found, left / size])
-            else:
-                states[i] = sticks + (SLIP_FORWARD if element.held else IDLE)
-    return states
 
 
 def _check_start(run: Run) -> None:
@@ -387,13 +309,6 @@ def _check_start(run: Run) -> None:
         raise MultiPhiValueError(f"start: got a run that failed ({start.message}), need one that is ok")
     if not run.rewound and not run.t_end > start.t_end:
         raise MultiPhiValueError(f"t_end: got {run.t_end:g} s, need a time after {start.t_end:g} s, the start's end")
-
-
-def _base_vector(name: str, given: np.ndarray | None, model: MultiPhiModel) -> np.ndarray:
-    """A given vector (n,) in base coordinates."""
-    if given is None:
-        return np.zeros(model.base.modes.count)
-    return model.base.coordinates(model.structure.vector(name, given))
 
 
 def _time(name: str, value: float) -> float:

@@ -20,28 +20,26 @@ EMPTY = {
     "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
 }
 
-PARTS = (  # where in the loop's arrays they begin, and how many rows there are
-    ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT),
-    ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT),
-    ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT),
-    ("phases", a.PHASE_INTS, a.PHASE_COUNT),
-    ("kinds", a.EVENT_INTS, a.EVENT_COUNT),
-    ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT),
+PARTS = (  # where in the loop's arrays they begin, how many rows there are, how wide: 0 for numbers alone
+    ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT, a.SEGMENT_WIDTH),
+    ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT, a.SEGMENT_WIDTH_NUMBERS),
+    ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT, 0),
+    ("phases", a.PHASE_INTS, a.PHASE_COUNT, 0),
+    ("kinds", a.EVENT_INTS, a.EVENT_COUNT, a.EVENT_WIDTH),
+    ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT, a.EVENT_WIDTH_NUMBERS),
 )
-COUNTS = (a.SEGMENT_COUNT, a.COORDINATE_COUNT, a.PHASE_COUNT, a.EVENT_COUNT)
 EVENTS = PARTS[-2:]
+OF_NUMBERS = ("spans", "coordinates", "amounts")
 
 
-def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int]]) -> dict[str, np.ndarray]:
+def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
     """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
     ints, numbers, _ = arrays.buffers.all
     slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
-    for name, slot, counted in wanted:
-        if slots[counted]:
-            empty, start = EMPTY[name], slots[slot]
-            width = empty.shape[-1] or 1
-            part = (numbers if empty.dtype == float else ints)[start : start + slots[counted] * width].copy()
-            parts[name] = part if empty.ndim == 1 else part.reshape(-1, width)
-    for counted in COUNTS:
-        ints[counted] = 0
+    for name, slot, counted, width in wanted:
+        if rows := slots[counted]:
+            start, buffer = slots[slot], numbers if name in OF_NUMBERS else ints
+            part = buffer[start : start + rows * (width or 1)].copy()
+            parts[name] = part.reshape(rows, width) if width else part
+    ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
     return parts

@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.display import Shown, kinds, names
+from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
@@ -33,9 +33,10 @@ from multiphi_exudyn.time.histories import INSTANTS, Histories
 from multiphi_exudyn.time.level_rows import force_row, gap_row, patch_row, point_row, pressing_row
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segment import Segment
+from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.warning_groups import issue
 
-__all__ = ["Again", "Start", "Trajectory"]
+__all__ = ["Again", "Trajectory"]
 
 NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
 ROWS = {  # of a level, for an element's position
@@ -47,31 +48,6 @@ ROWS = {  # of a level, for an element's position
 }
 
 Again: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
-
-
-@dataclass(frozen=True, repr=False)
-class Start(Shown):
-    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
-
-    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
-    held places, leave them.
-    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
-    time [s], state: when the run begins, and of one that goes on from another what that has come to.
-    """
-
-    displacement: np.ndarray
-    velocity: np.ndarray
-    penetrating: tuple[int, ...]
-    touching: tuple[int, ...]
-    gaps: np.ndarray
-    states: tuple[int, ...]
-    held: np.ndarray
-    time: float = 0.0
-    state: State | None = None
-
-    def _facts(self) -> Iterator[tuple[str, str]]:
-        yield "time", f"{self.time:g} s"
-        yield "states", str(self.states)
 
 
 @dataclass(frozen=True, repr=False)
@@ -194,7 +170,7 @@ class Trajectory(Histories):
         """
         told = {"status": self.status, "message": self.message, "warnings": self.warnings}
         ledger = dataclasses.asdict(self.ledger) if self.segments else None
-        save(self, Path(path), **told, ledger=ledger, stats=dataclasses.asdict(self.stats))
+        save(self, Path(path), **told, ledger=ledger, stats=self.stats._asdict())
 
     @functools.cached_property
     def ledger(self) -> Ledger:
@@ -212,7 +188,7 @@ class Trajectory(Histories):
         last = self.final
         assert last is not None, "a run with segments has a final state"
         return Ledger(
-            initial=self._initial_energy,
+            initial=self.initial_energy,
             work_of_loads=self._static_work(last) + losses.stop_work + varying + self.final_work,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
@@ -229,13 +205,13 @@ class Trajectory(Histories):
         return float(self.load @ (last.level.configuration(last.displacement) - self.start.displacement))
 
     @property
-    def _initial_energy(self) -> float:
+    def initial_energy(self) -> float:
         """Kinetic and strain energy [J] at the start."""
         start = self.start
         if start.state is not None:
             return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
         strain = self.model.base.strain(start.displacement, start.penetrating, start.gaps)
-        return 0.5 * float(start.velocity @ start.velocity) + strain
+        return 0.5 * float(start.velocity.dot(start.velocity)) + strain
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.

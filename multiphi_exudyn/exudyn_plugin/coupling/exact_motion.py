@@ -18,7 +18,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Event, State
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting, HeldForces, Inertia
-from multiphi_exudyn.time.chatter import allowed, window
+from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.motion import NUMBERS, Motion, carry, measured
 from multiphi_exudyn.time.record import PHASES, Record
 
@@ -50,14 +50,12 @@ class ExactMotion:
         self._motion, self._levels, self._name = motion, levels, name
         self._forces = motion.levels.held = motion.levels.held or _forces_in(motion.levels)
         self._arrays = motion.arrays = self._forces.arrays
-        self._window, self._allowed = window(motion.model), allowed(motion.model)
-        self._ring = np.zeros(2 * (self._window + 1))
+        self._window, self._allowed = limits(motion.model)
         self.begin(math.nan)
 
     def begin(self, time: float) -> None:
         """A run begins at a time [s]."""
-        self._ring[:] = 0.0
-        self._decisions, self._last_decision = 0, time
+        self._ring, self._decisions, self._last_decision = np.zeros(0), 0, time
         self._record = Record(self._motion.model.contacts, self._arrays)
 
     @property
@@ -96,19 +94,16 @@ class ExactMotion:
 
     def _put_ring(self) -> None:
         """The ring of the chatter check into the arrays, which other bodies use too."""
-        arrays, count = self._arrays, len(self._ring)
-        start = arrays.ring(count)
-        arrays.numbers[start : start + count] = self._ring
-        arrays.ints[a.WINDOW], arrays.ints[a.DECISIONS] = self._window, self._decisions
+        arrays = self._arrays
+        arrays.set_chatter(self._window, self._decisions, self._ring)
         arrays.numbers[a.ALLOWED], arrays.numbers[a.LAST_DECISION] = self._allowed, self._last_decision
 
     def _take_ring(self) -> None:
         """The same from the arrays."""
         arrays = self._arrays
-        if arrays.ints[a.DECISIONS] == self._decisions:
-            return
-        self._ring[:] = arrays.numbers[arrays.ints[a.RING] :][: len(self._ring)]
-        self._decisions, self._last_decision = int(arrays.ints[a.DECISIONS]), float(arrays.numbers[a.LAST_DECISION])
+        if arrays.ints[a.DECISIONS] != self._decisions:
+            self._decisions, self._ring = arrays.chatter
+            self._last_decision = float(arrays.numbers[a.LAST_DECISION])
 
     def _set_out(self, level: int, state: State, time: float) -> None:
         """A state at a time [s] into the arrays."""

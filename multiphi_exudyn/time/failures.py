@@ -1,0 +1,44 @@
+"""Failures: what has stopped the loop, said in a sentence that names the contacts and what is needed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.time.chatter import limits
+from multiphi_exudyn.time.loop_record import ACCUMULATED
+
+__all__ = ["NOT_FINITE", "failure"]
+
+NOT_FINITE = "the motion is not finite"
+
+
+def failure(arrays: LevelArrays) -> NumericalFailure:
+    """What the loop says in its arrays of why it has failed."""
+    ints, model = arrays.ints, arrays.levels.model
+    told = arrays.numbers[a.TOLD : a.TOLD + 3].tolist()
+    flags = ints[ints[a.CAUSED_BY] :][: ints[a.ELEMENTS]]
+    names = ", ".join(model.contacts[i].name for i in np.flatnonzero(flags).tolist())
+    complete = model.level_at(()).modes == model.base.modes.count
+    window, allowed = limits(model)
+    sentences = {
+        a.NOT_FINITE: NOT_FINITE,
+        a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
+        f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
+        "need fewer modes or a shorter run",
+        a.CHATTER: f"chatter: {window} events in {told[0]:g} s, more than {allowed} in a period of the "
+        f"highest kept mode or load ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
+        a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
+        a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
+        + ("" if complete else " in the kept modes, need more of them"),
+        a.UNSETTLED: "no forces were found that agree with what moves: round-off decides which contacts push, or "
+        "friction is so high that they are not unique, need a smaller coefficient",
+        a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
+        a.GAINING: f"rigid contacts {names}: an impact with restitution and friction would make energy, need one "
+        "of them alone",
+    }
+    return NumericalFailure(sentences[int(ints[a.CAUSE])])
