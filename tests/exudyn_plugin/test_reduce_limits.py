@@ -126,6 +126,15 @@ def test_the_directions_that_pushes_reach_are_found_in_any_coordinates(pushed, c
     assert others.T @ mass @ others == pytest.approx(np.eye(5 - count), abs=1e-12)
 
 
+def test_where_every_direction_is_moved_the_search_ends():
+    random = np.random.default_rng(3)
+    shapes = np.linalg.qr(random.normal(size=(80, 80)))[0]
+    stiffness, damping = ((shapes * np.geomspace(1.0, size, 80)) @ shapes.T for size in (1e10, 1e3))
+    damping += random.normal(size=(80, 80))
+    assert moved_directions(np.eye(80), stiffness, damping, random.normal(size=(3, 80))) is None
+    assert moved_directions(np.eye(80), stiffness, damping, np.zeros((3, 80))) is None
+
+
 def test_a_spin_about_every_axis_is_refused_with_the_items():
     with pytest.raises(mp.MultiPhiValueError, match=r"not symmetric .* ObjectRigidBody 'ball'.*; need a symmetric one"):
         reduce(spinning(about=(30.0, 20.0, 0.0)).mbs)

@@ -17,6 +17,7 @@ __all__ = ["moved_directions"]
 
 IDLE = 1e-7  # of a vector, or of the largest of C or of omega^2: what differentiating leaves of it where there is none
 RIGID = 1e-12  # of the largest omega^2: one that is round-off
+ROUND_OFF = 1e-12  # of a unit direction
 
 
 def moved_directions(
@@ -35,7 +36,7 @@ def moved_directions(
         _without(damped, IDLE * float(np.max(np.abs(damped), initial=0.0))),
     ]
     found, tried = np.zeros((len(mass), 0)), shapes.T @ pushes.T
-    while tried.shape[1]:
+    while tried.shape[1] and found.shape[1] < len(mass):
         new = _beside(found, tried)
         found, tried = np.hstack([found, new]), np.hstack([system @ new for system in systems])
     if found.shape[1] in (0, len(mass)):
@@ -51,10 +52,12 @@ def _without(values: np.ndarray, smallest: float) -> np.ndarray:
 def _beside(found: np.ndarray, tried: np.ndarray) -> np.ndarray:
     """Orthonormal directions (n, k) of the columns tried that those found, orthonormal too, lack."""
     new = found[:, :0]
-    for column in tried.T:
-        known, size = np.hstack([found, new]), float(np.linalg.norm(column))
+    for given in tried.T:
+        known, size = np.hstack([found, new]), float(np.linalg.norm(given))
+        column = _without(given, IDLE * size)
         left = column - known @ (known.T @ column)
-        left = _without(left - known @ (known.T @ left), IDLE * size)
-        if np.any(left):
-            new = np.hstack([new, (left / np.linalg.norm(left))[:, None]])
+        left -= known @ (known.T @ left)
+        rest = float(np.linalg.norm(left))
+        if rest > IDLE * size:
+            new = np.hstack([new, _without(left / rest, ROUND_OFF)[:, None]])
     return new
