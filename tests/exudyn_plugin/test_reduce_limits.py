@@ -11,6 +11,7 @@ from test_reduce import Mass
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+from multiphi_exudyn.exudyn_plugin.convert.moved import moved_directions
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -108,6 +109,30 @@ def test_gyroscopic_forces_in_directions_in_which_nothing_moves_are_left_out():
     assert reduction.structure.n == 1
     assert trajectory.warnings == ()
     assert off(system, reduction, trajectory) < 1e-3
+
+
+@pytest.mark.parametrize(("pushed", "count"), [([0], 1), ([0, 2], 2), ([3], 2), ([1], 1)])
+def test_the_directions_that_pushes_reach_are_found_in_any_coordinates(pushed, count):
+    """Of a free, an unstable, a stiff and two coupled directions; what round-off carries elsewhere is nothing."""
+    turned = np.linalg.qr(np.random.default_rng(7).normal(size=(5, 5)))[0]
+    stiffness = np.diag([0.0, -3.0, 1e6, 4.0, 5.0])
+    stiffness[3, 4] = stiffness[4, 3] = 1.0
+    given = (turned @ matrix @ turned.T for matrix in (np.diag([1.0, 2.0, 1.0, 3.0, 1.0]), stiffness, 0 * stiffness))
+    mass, stiffness, damping = given
+    kept, others = moved_directions(mass, stiffness, damping, np.eye(5)[pushed] @ turned.T)
+    assert kept.shape == (5, count)
+    assert kept.T @ mass @ others == pytest.approx(np.zeros((count, 5 - count)), abs=1e-8)
+    assert kept.T @ stiffness @ others == pytest.approx(np.zeros((count, 5 - count)), abs=1e-3)  # of 1e6
+    assert others.T @ mass @ others == pytest.approx(np.eye(5 - count), abs=1e-12)
+
+
+def test_where_every_direction_is_moved_the_search_ends():
+    random = np.random.default_rng(3)
+    shapes = np.linalg.qr(random.normal(size=(80, 80)))[0]
+    stiffness, damping = ((shapes * np.geomspace(1.0, size, 80)) @ shapes.T for size in (1e10, 1e3))
+    damping += random.normal(size=(80, 80))
+    assert moved_directions(np.eye(80), stiffness, damping, random.normal(size=(3, 80))) is None
+    assert moved_directions(np.eye(80), stiffness, damping, np.zeros((3, 80))) is None
 
 
 def test_a_spin_about_every_axis_is_refused_with_the_items():

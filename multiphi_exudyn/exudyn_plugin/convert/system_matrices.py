@@ -72,8 +72,9 @@ def projected_matrices(
             raise
         kept, others = directions
         idle = Idle(basis @ others, basis @ mass @ others, fault.of)
+        sizes = np.abs(kept).T @ np.abs(stiffness) @ np.abs(kept)
         mass, stiffness, damping = (kept.T @ matrix @ kept for matrix in (mass, stiffness, damping))
-        basis = basis @ kept
+        stiffness, basis = drop_round_off(stiffness, sizes), basis @ kept
         return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, idle
 
 
