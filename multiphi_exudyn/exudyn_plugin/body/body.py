@@ -354,7 +354,8 @@ class MultiPhiBody:
         here, step = self.coordinates, float(mbs.sys["dynamicSolver"].it.currentStepSize)
         self.check_matched(step)
         here.attach(mbs)
-        alone = nothing_acts_on(mbs, self.items["nGenericODE2"], self.items["oGenericODE2"])
+        nodes = self.items["nGenericODE2"], self.items["oGenericODE2"]
+        alone = here.interface is None and nothing_acts_on(mbs, *nodes)
         if here.rigid and not alone:
             self._check_start(mbs)
         self._run_ahead, self._test, self._most, self._time, self._told = None, None, 0.0, t, t
