@@ -220,7 +220,10 @@ class MultiPhiBody:
 
     def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """(p, f) of the same at the end of a step."""
-        return np.concatenate([self._own.force_at(states, time), np.zeros(self.coordinates.points)])
+        force = np.zeros(self._size + self.coordinates.points)
+        if self.varies:
+            force[: self._size] = self._own.force_at(states, time)
+        return force
 
     def shown(
         self, stepped: SteppedLevel, eta: np.ndarray, eta_t: np.ndarray, held: np.ndarray, time: np.ndarray
@@ -472,7 +475,7 @@ class MultiPhiBody:
 
     def _new_test(self) -> StepTest:
         here = self.coordinates
-        places = () if here.interface is None else here.interface.multipliers
+        places = [] if here.interface is None else here.interface.multipliers.tolist()
         conditions = self._own.conditions(here.stepped, self._step, here.direct(here.stepped))
         return StepTest(conditions, self._step, self._rounding, (*here.views, here.multipliers), places)
 

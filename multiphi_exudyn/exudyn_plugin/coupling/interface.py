@@ -146,7 +146,8 @@ class Interface:
         }
         self.turned = dict.fromkeys(self._angles, 0.0)
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
-        self.multipliers = [row for tie in self.ties for row in self._mbs.systemData.GetObjectLTGAE(tie)]
+        rows = [self._mbs.systemData.GetObjectLTGAE(tie) for tie in self.ties]
+        self.multipliers = np.concatenate(rows).astype(int)
         self._forces = state["AECoords"]
 
     @property
