@@ -35,7 +35,7 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
 
 
 def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable) -> int:
-    """The record of a level with a number, whose exits are all watched."""
+    """The record of a level with a number."""
     own, modal, put, parts, kept = level.level, level.modal, buffers.put, level_parts(level), exits.of(level.states)
     firsts = exits.firsts(kept).tolist()
     given = {
@@ -49,8 +49,6 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.EXITS: _put_exits(buffers, level, exits, kept),
         a.EXIT_COUNT: firsts[-1],
         a.FIRST_EXITS: put("ints", firsts),
-        a.WATCHED: put("ints", range(firsts[-1])),
-        a.WATCHED_COUNT: firsts[-1],
         **_frequencies(buffers, modal.omega),
         a.HIGHEST_FREQUENCY: put("numbers", [max(own.highest_frequency, level.excitation.highest_frequency)]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
