@@ -117,17 +117,20 @@ class HeldForces:
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
         """From now on these forces act, by the states of a level."""
-        arrays, before = self.arrays, self._inertia
+        if self._rigid and not (inertia is None and self._inertia is None):
+            self._hang(inertia)
         self._acting, self._inertia = acting, inertia
-        if self._rigid and not (inertia is None and before is None):
-            units = self._units if inertia is None else inertia.directions(self._units)
-            start = int(arrays.ints[a.DIRECTIONS])
-            arrays.numbers[start : start + units.size] = units.ravel()
-            arrays.numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
-            idle = int(arrays.ints[a.IDLE])
-            arrays.ints[idle : idle + arrays.ints[a.ELEMENTS]] = 0
-            arrays.ints[[idle + i for i in (() if inertia is None else inertia.held)]] = 1
-        arrays.hide()
+        self.arrays.hide()
+
+    def _hang(self, inertia: Inertia | None) -> None:
+        """Along which directions impacts go, and which elements nothing lets move."""
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
+        units = self._units if inertia is None else inertia.directions(self._units)
+        start, idle = int(ints[a.DIRECTIONS]), int(ints[a.IDLE])
+        numbers[start : start + units.size] = units.ravel()
+        numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
+        ints[idle : idle + ints[a.ELEMENTS]] = 0
+        ints[[idle + i for i in (() if inertia is None else inertia.held)]] = 1
 
     def forget(self) -> None:
         """Begin anew, without any level."""
