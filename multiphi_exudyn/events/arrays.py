@@ -105,7 +105,8 @@ LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction, mu of contacts that give 
 TOGETHER = 202  # whether these have been decided together
 FRICTIONS, STATIC_FRICTIONS = 212, 213  # of rigid contacts, zero of others
 PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; the state in which a contact closes
-RUN_INTS = 216
+IDLE = 216  # flags of elements that nothing lets move: nobody looks at their exits
+RUN_INTS = 217
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -128,17 +129,17 @@ OPEN, CLOSE = 0, 1  # states of a contact
 STICK, SLIP_FORWARD, SLIP_BACKWARD, IDLE = 0, 1, 2, 3  # of friction, the last one of contacts that give way
 ARMED, RECOVERING, REFUSED, HELD_BACK, LANDING = 0, 1, 2, 3, 4
 
-NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS, WATCHED, WATCHED_COUNT = range(10)
+NUMBER, MODES, STATES, RESPONSE, FORCE, EXITS, EXIT_COUNT, FIRST_EXITS = range(8)
 FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHEST_FREQUENCY, MOBILITY = range(10, 20)
 DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
 RUBBINGS = 23  # how many forces of friction go with others in the last of them
 FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
 DISSIPATED = 26  # form of what damping takes from the free response, -1 where there is none
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
-FREE_SIZES = 28  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
-STRUCK_DEFECTS = 29  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
-SIZES = 30  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
-LEVEL_INTS = 31
+FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
+STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
+SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
+LEVEL_INTS = 29
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

@@ -43,10 +43,10 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
 
 
 def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable) -> int:
-    """The record of a level with a number, whose exits are all watched."""
+    """The record of a level with a number."""
     own, modal, parts, kept = level.level, level.modal, level_parts(level), exits.of(level.states)
     batch, firsts = Batch(buffers), exits.firsts(kept)
-    put, count = batch.put, int(firsts[-1])
+    put = batch.put
     basis = _put_basis(batch, modal.response.basis)
     given = {
         a.NUMBER: number,
@@ -57,10 +57,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.STRUCK_DEFECTS: put("numbers", struck_defects(level)) if buffers.ints[a.JUDGED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(batch, level, exits, kept),
-        a.EXIT_COUNT: count,
+        a.EXIT_COUNT: int(firsts[-1]),
         a.FIRST_EXITS: put("ints", firsts),
-        a.WATCHED: put("ints", np.arange(count)),
-        a.WATCHED_COUNT: count,
         **_frequencies(batch, modal.omega),
         a.HIGHEST_FREQUENCY: put("numbers", [max(own.highest_frequency, level.excitation.highest_frequency)]),
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),

@@ -60,10 +60,13 @@ class PotentialForm:
     def __call__(self, xi: np.ndarray) -> float:
         r = len(self.squares)
         eta, w = xi[:r], xi[r:]
-        mixed = w @ (self.rows[:, :r] @ eta + 0.5 * self.rows[:, r:] @ w)
-        stretched = self.follows[:, :-1] @ xi + self.follows[:, -1]
-        own = self.linear @ xi + 0.5 * self.squares @ (eta * eta) + 0.5 * stretched @ stretched
-        return self.constant + float(own + mixed)
+        energy = self.linear @ xi + 0.5 * self.squares @ (eta * eta)
+        if len(w):
+            energy += w @ (self.rows[:, :r] @ eta + 0.5 * self.rows[:, r:] @ w)
+        if len(self.follows):
+            stretched = self.follows[:, :-1] @ xi + self.follows[:, -1]
+            energy += 0.5 * stretched @ stretched
+        return self.constant + float(energy)
 
 
 @dataclass(frozen=True, repr=False)

@@ -21,6 +21,7 @@ from multiphi_exudyn.events.arrays import (
     FLOW_COUNT,
     HEARD,
     HELD_BACK,
+    IDLE,
     KINDS,
     LEVEL,
     MODES,
@@ -41,8 +42,6 @@ from multiphi_exudyn.events.arrays import (
     SETTLED,
     SIGNAL,
     STATES,
-    WATCHED,
-    WATCHED_COUNT,
     WORK_WAVES,
     WORKED,
 )
@@ -103,10 +102,9 @@ def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refuse
     level, phases = ints[state + LEVEL], ints[state + PHASES]
     count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
     for k in range(count):
-        ints[phases + k] = ARMED
-    for e in range(ints[level + WATCHED_COUNT]):
-        k = ints[ints[level + WATCHED] + e]
-        ints[phases + k] = phase_of(ints, numbers, waves, state, exits + k * EXIT_INTS)
+        exit_, ints[phases + k] = exits + k * EXIT_INTS, ARMED
+        if ints[ints[IDLE] + ints[exit_ + ELEMENT]] == 0:
+            ints[phases + k] = phase_of(ints, numbers, waves, state, exit_)
         if ints[phases + k] != ARMED:
             settled = 0
     if refused >= 0:

@@ -49,12 +49,12 @@ class State(Shown):
         """The places (h,) that links hold [m]."""
         return self.displacement[self.level.modal.modes + self.level.excitation.prescribed :]
 
-    @property
+    @functools.cached_property
     def kinetic(self) -> float:
         """Kinetic energy [J]."""
         return float(self.level.kinetic(self.velocity))
 
-    @property
+    @functools.cached_property
     def potential(self) -> float:
         """Strain energy less the potential of the loads [J]; a transition can only lower it."""
         return self.level.potential(self.displacement)

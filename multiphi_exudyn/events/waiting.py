@@ -23,6 +23,7 @@ from multiphi_exudyn.events.arrays import (
     FALLEN,
     FLOW_BASIS,
     FLOW_COUNT,
+    IDLE,
     LANDING,
     LEVEL,
     MODES,
@@ -40,8 +41,6 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SWING,
     WAITING,
-    WATCHED,
-    WATCHED_COUNT,
     WORK_WAVES,
 )
 from multiphi_exudyn.events.changes import NOBODY
@@ -64,9 +63,10 @@ def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     Of each the exit, and whether that then asks or is armed, in WAITING. The phases are those of REACHED.
     """
     level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
-    for e in range(ints[level + WATCHED_COUNT]):
-        k = ints[ints[level + WATCHED] + e]
+    for k in range(ints[level + EXIT_COUNT]):
         exit_, phase = ints[level + EXITS] + k * EXIT_INTS, ints[phases + k]
+        if ints[ints[IDLE] + ints[exit_ + ELEMENT]] == 1:
+            continue
         if phase in (ARMED, LANDING):
             count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
             continue

@@ -58,8 +58,7 @@ def test_a_force_on_the_modes_of_every_level_is_a_load(case):
     velocity = np.linspace(-1.0, -0.5, structure.n)
     native = mp.simulate(model, T_END, velocity=velocity, loads=[mp.ConstantLoad(at, force)])
     motion = Run(model, T_END, None, velocity).begun()
-    exact = ExactMotion(motion, motion.levels, "body")
-    exact.begin(0.0)
+    exact = ExactMotion(motion, motion.levels, "body", 0.0)
     exact.hold(held(model, structure.row(at), force), None)
     found = exact.advance(motion.static_state, 0.0, T_END)
     assert len(native.events) >= 3
@@ -79,8 +78,7 @@ def test_forces_may_change_on_the_way_and_a_trial_leaves_no_trace(case):
     loads = [mp.SampledLoad(at, [0.0, 3.0, np.nextafter(3.0, 4.0), T_END], [force, force, -force / 2, -force / 2])]
     native = mp.simulate(model, T_END, velocity=velocity, loads=loads)
     motion = Run(model, T_END, None, velocity).begun()
-    exact, row = ExactMotion(motion, motion.levels, "body"), structure.row(at)
-    exact.begin(0.0)
+    exact, row = ExactMotion(motion, motion.levels, "body", 0.0), structure.row(at)
     exact.hold(held(model, row, force), None)
     exact.advance(motion.static_state, 0.0, 3.0, stop=True, trial=True)
     first = exact.advance(motion.static_state, 0.0, 3.0)
@@ -96,8 +94,7 @@ def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
     structure, contacts, force, at = CASES["rigid"]
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-    exact = ExactMotion(motion, motion.levels, "body")
-    exact.begin(0.0)
+    exact = ExactMotion(motion, motion.levels, "body", 0.0)
     exact.hold(held(model, structure.row(at), force), None)
     reached = exact.advance(motion.static_state, 0.0, T_END, stop=True)
     assert reached.changed
@@ -116,8 +113,7 @@ def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
         monkeypatch.setattr(level_arrays, "ARRAY_BYTES", limit)
         monkeypatch.setattr(level_arrays, "FEWEST_LEVELS", 0)
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-        exact, state = ExactMotion(motion, motion.levels, "body"), motion.static_state
-        exact.begin(0.0)
+        exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
         for k in range(6):
             exact.hold(held(model, structure.row(at), force), None)
             state = exact.advance(state, float(k), float(k + 1)).state
@@ -140,8 +136,7 @@ def test_bodies_that_take_turns_move_as_each_one_alone(case):
         attached = AttachedInertia(np.array([[0.7]]), np.eye(1))
         rows_in = lambda states: in_base @ model.level_at(model.links_held(states)).vectors  # noqa: E731
         inertia = PointInertia(attached, model.base, in_base, rows_in)
-        exact, state = ExactMotion(motion, motion.levels, "body"), motion.static_state
-        exact.begin(0.0)
+        exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
         for k in range(30):
             t = 0.2 * k
             exact.hold(held(model, row, size * force * (1 - t / T_END)), inertia if size > 1 else None)
@@ -174,8 +169,7 @@ def test_chatter_is_that_of_one_body_alone(monkeypatch):
     bodies = []
     for _ in range(3):
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-        bodies.append((ExactMotion(motion, motion.levels, "body"), motion.static_state))
-        bodies[-1][0].begin(0.0)
+        bodies.append((ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state))
     for exact, state in bodies:
         exact.hold(held(model, structure.row(at), force), None)
         exact.advance(state, 0.0, 2.0)
@@ -186,8 +180,7 @@ def test_a_failure_says_whose_it_is_and_when():
     structure, contacts, _, at = CASES["rigid"]
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-    exact = ExactMotion(motion, motion.levels, "body 'beam'")
-    exact.begin(0.0)
+    exact = ExactMotion(motion, motion.levels, "body 'beam'", 0.0)
     exact.hold(held(model, structure.row(at), math.nan), None)
     with pytest.raises(mp.MultiPhiError, match=r"body 'beam': at t = 0\.5 s: the motion is not finite"):
         exact.advance(motion.static_state, 0.5, T_END)
@@ -201,8 +194,7 @@ def test_plain_functions_do_the_same(monkeypatch):
         if plain:
             monkeypatch.setattr(exact_motion, "carry", advance)
         motion = Run(model, 2.0, None, np.full(structure.n, -1.0)).begun()
-        exact = ExactMotion(motion, motion.levels, "body")
-        exact.begin(0.0)
+        exact = ExactMotion(motion, motion.levels, "body", 0.0)
         exact.hold(held(model, structure.row(at), force), None)
         found.append((exact, exact.advance(motion.static_state, 0.0, 2.0).state))
     (one, ours), (other, theirs) = found

@@ -21,6 +21,7 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
+from multiphi_exudyn.exudyn_plugin.body.run_checks import check_matched
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
@@ -129,7 +130,7 @@ class RunAhead:
         step = (t - self.time) / count
         regular = abs(step - self._step) <= self._rounding
         if not regular:
-            self._body.check_matched(step)
+            check_matched(self._body, step)
             self._regular = False
             if count > 1:
                 return

@@ -18,6 +18,7 @@ import exudyn as exu
 import exudyn.solver
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.exudyn_plugin.body.run_checks import check_integration
 from multiphi_exudyn.exudyn_plugin.body.switching import BODIES, check_solver
 
 __all__ = ["install_checks"]
@@ -48,7 +49,7 @@ def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
             kind = settings.timeIntegration.solverType if solverType is None else solverType
             check_solver(kind in IMPLICIT, kind.name, bodies)
             for body in bodies.values():
-                body.check_integration(settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
+                check_integration(body, settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
         with _own_errors():
             return solve(mbs, simulationSettings, solverType, *given, **named)
 

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.known_motion import Stretch
+from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -35,20 +36,17 @@ class KnownBody(Protocol):
 
     name: str
     model: MultiPhiModel
+    items: dict[str, Any]
     coordinates: Coordinates
+    matched_step: float | None
+    own: OwnLoads
 
     @property
     def varies(self) -> bool:
         """Whether its loads vary in time."""
 
-    def check_matched(self, step: float) -> None:
-        """Raises where steps of this length [s] are not those to which its modes are matched."""
-
     def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
         """The level of elements in these states as the solver has it."""
-
-    def own_forces(self, states: tuple[int, ...], times: np.ndarray) -> np.ndarray:
-        """Modal forces (k, s) of its own varying loads at times (k,) [s], in a level."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +131,7 @@ def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[
     levels, states, data = [here] * count, np.empty((count, 3, here.size)), np.zeros((count, layout.width))
     for moments in stretch.at(times) if count else ():
         places, own = moments.places, moments.level.states
-        stepped, forces = body.stepped_level(own), body.own_forces(own, times[places])
+        stepped, forces = body.stepped_level(own), body.own.forces(own, times[places])
         states[places] = stepped.shown(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
         data[places] = layout.rows(own, moments.phases, moments.displacement[:, stepped.modes :])
         for place in places.tolist():

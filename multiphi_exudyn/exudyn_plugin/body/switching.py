@@ -58,9 +58,6 @@ class SwitchingBody(Protocol):
     def look_again(self) -> None:
         """Take the present state as the start of the next step."""
 
-    def check_integration(self, settings: Any, trapezoidal: bool) -> None:
-        """Raise for settings of an implicit solver that make it wrong."""
-
 
 class Clock:
     """The time of the last step [s], and when the bodies have something to do next; ``due`` is called then.

@@ -6,7 +6,6 @@ advance, the ring of the chatter check too.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -43,24 +42,20 @@ class Reached:
 class ExactMotion:
     """Motions in the levels of ``motion``; levels: those of its static loads. name: with which failures are told.
 
-    Nothing is asked of it before ``begin``.
+    A run begins at a time [s].
     """
 
-    def __init__(self, motion: Motion, levels: LoadedLevels, name: str) -> None:
+    def __init__(self, motion: Motion, levels: LoadedLevels, name: str, time: float) -> None:
         self._motion, self._levels, self._name = motion, levels, name
         self._forces = motion.levels.held = motion.levels.held or _forces_in(motion.levels)
         self._arrays = motion.arrays = self._forces.arrays
         self._window, self._allowed = limits(motion.model)
-        self.begin(math.nan)
-
-    def begin(self, time: float) -> None:
-        """A run begins at a time [s]."""
         self._ring, self._decisions, self._last_decision = np.zeros(0), 0, time
-        self._record = Record(self._motion.model.contacts, self._arrays)
+        self._record = Record(motion.model.contacts, self._arrays)
 
     @property
     def events(self) -> Sequence[Event]:
-        """What has happened in the run, but in trials."""
+        """What has happened in the run but for trials."""
         return self._record.events()
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:

@@ -59,7 +59,7 @@ class _Reading:
 
     def offset(self, held: np.ndarray) -> np.ndarray:
         """c (m,)."""
-        return self.constant + self.moved @ held
+        return self.constant + self.moved @ held if len(held) else self.constant
 
 
 class Interface:
@@ -146,7 +146,8 @@ class Interface:
         }
         self.turned = dict.fromkeys(self._angles, 0.0)
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
-        self.multipliers = [row for tie in self.ties for row in self._mbs.systemData.GetObjectLTGAE(tie)]
+        rows = [self._mbs.systemData.GetObjectLTGAE(tie) for tie in self.ties]
+        self.multipliers = np.concatenate(rows).astype(int)
         self._forces = state["AECoords"]
 
     @property
@@ -185,8 +186,9 @@ class Interface:
     def write(self, stepped: SteppedLevel, held: np.ndarray, coordinates: Iterable[np.ndarray]) -> None:
         """Write y, y', y'' of q, q', q'' (s,), with places that links hold (h,)."""
         found = self.of(stepped)
-        for view, values, constant in zip(self._views, coordinates, (found.offset(held), 0.0, 0.0), strict=True):
-            view[self.places] = found.rows @ values + constant
+        for view, values in zip(self._views, coordinates, strict=True):
+            view[self.places] = found.rows.dot(values)
+        self._views[0][self.places] += found.offset(held)
 
     def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
         """(p, f) (s + m,) of one level in another: f is the same, what else acts does so mode by mode."""

@@ -81,7 +81,7 @@ class _Level:
     """Constants of a level, and how forces change them: numbers[places] = constants + gains . (p, reactions).
 
     inverse: S^-1 (r, r). linear, squares: of its energy without forces, whose constant stands at
-    ``energy``. exits: their records; elements: theirs. watched: exits that are looked at; mobility: where F stands.
+    ``energy``. exits: their records. mobility: where F stands.
     """
 
     states: tuple[int, ...]
@@ -94,8 +94,6 @@ class _Level:
     linear: np.ndarray
     squares: np.ndarray
     exits: list[int]
-    elements: list[int]
-    watched: np.ndarray
     mobility: int
 
 
@@ -119,14 +117,20 @@ class HeldForces:
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
         """From now on these forces act, by the states of a level."""
-        arrays, before = self.arrays, self._inertia
+        if self._rigid and not (inertia is None and self._inertia is None):
+            self._hang(inertia)
         self._acting, self._inertia = acting, inertia
-        if self._rigid and not (inertia is None and before is None):
-            units = self._units if inertia is None else inertia.directions(self._units)
-            start = int(arrays.ints[a.DIRECTIONS])
-            arrays.numbers[start : start + units.size] = units.ravel()
-            arrays.numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
-        arrays.hide()
+        self.arrays.hide()
+
+    def _hang(self, inertia: Inertia | None) -> None:
+        """Along which directions impacts go, and which elements nothing lets move."""
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
+        units = self._units if inertia is None else inertia.directions(self._units)
+        start, idle = int(ints[a.DIRECTIONS]), int(ints[a.IDLE])
+        numbers[start : start + units.size] = units.ravel()
+        numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
+        ints[idle : idle + ints[a.ELEMENTS]] = 0
+        ints[[idle + i for i in (() if inertia is None else inertia.held)]] = 1
 
     def forget(self) -> None:
         """Begin anew, without any level."""
@@ -245,8 +249,6 @@ class HeldForces:
             linear=numbers[energy + 1 : energy + 1 + r].copy(),
             squares=numbers[energy + 1 + n :][:r].copy(),
             exits=exits.tolist(),
-            elements=[element for element, _ in ways],
-            watched=ints[ints[level + a.WATCHED] :][: ints[level + a.WATCHED_COUNT]].copy(),
             mobility=mobility,
         )
 
@@ -260,18 +262,13 @@ class HeldForces:
         return np.asarray(rows.reshape(n - r, n + 1)[:, :r])
 
     def _limit(self, level: int, plain: _Level) -> None:
-        """What hangs on the structure: the mobility that it leaves, and the contacts that still are looked at."""
+        """The mobility that is left by what hangs on the structure."""
         ints, r = self.arrays.ints, len(plain.inverse)
-        ints[level + a.MOBILITY], watched = -1, plain.watched
+        ints[level + a.MOBILITY] = -1
         if self._inertia is not None:
             ints[level + a.MOBILITY] = plain.mobility
             root = self._inertia.mobility(plain.states)
             self.arrays.numbers[plain.mobility : plain.mobility + r * r] = root.ravel()
-            held = self._inertia.held
-            watched = np.array([k for k in watched.tolist() if plain.elements[k] not in held], dtype=np.int64)
-        start = int(ints[level + a.WATCHED])
-        ints[start : start + len(watched)] = watched
-        ints[level + a.WATCHED_COUNT] = len(watched)
 
 
 def _nothing(states: tuple[int, ...]) -> Acting:

@@ -98,10 +98,11 @@ class SteppedLevel:
 
     def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,); behind eta may stand what links hold."""
-        q, v, acting, r = np.zeros(self.size), np.zeros(self.size), force + self.drive, self.modes
-        q[:r], v[:r] = eta[:r], eta_t[:r]
-        q_t = self.from_displacement.dot(q) + self.from_velocity.dot(v) + self.from_force.dot(acting)
-        return q, q_t, self._mass_inverse.dot(acting - self.damping.dot(q_t) - self.stiffness.dot(q))
+        r, s = self.modes, self.size
+        given = np.zeros(3 * s)
+        given[:r], given[s : s + r], given[2 * s :] = eta[:r], eta_t[:r], force + self.drive
+        moved = self._rates.dot(given)
+        return given[:s], moved[:s], moved[s:]
 
     def shown(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s); behind eta as in ``state``."""
@@ -128,6 +129,15 @@ class SteppedLevel:
         acceleration = self._total - self.own_damping @ velocity
         acceleration[:, : self.size] -= self.stiffness
         return np.vstack([np.hstack([identity, none, none]), velocity, acceleration])
+
+    @functools.cached_property
+    def _rates(self) -> np.ndarray:
+        """The matrix (2 s, 3 s) from eta, eta' and the whole modal force to (q', q'')."""
+        velocity = np.hstack([self.from_displacement, self.from_velocity, self.from_force])
+        resisting = self.damping @ velocity
+        resisting[:, : self.size] += self.stiffness
+        resisting[:, 2 * self.size :] -= np.eye(self.size)
+        return np.vstack([velocity, -self._mass_inverse @ resisting])
 
     @functools.cached_property
     def _total(self) -> np.ndarray:

@@ -79,8 +79,8 @@ class SystemMatrices:
     def _on_body(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> bool:
         first, last = int(self._own[0]), int(self._own[-1]) + 1  # a node's coordinates stand together
         own = mass[first:last]
-        alone = np.count_nonzero(own) == np.count_nonzero(inertia) and np.array_equal(own[:, first:last], inertia)
-        return not alone or bool(np.any(jacobian[:, first:last]))
+        alone = np.count_nonzero(own) == np.count_nonzero(inertia) and bool((own[:, first:last] == inertia).all())
+        return not alone or bool(jacobian[:, first:last].any())
 
     def present(self) -> np.ndarray:
         """A copy of q, v (2, n)."""
@@ -114,8 +114,8 @@ class SystemMatrices:
         others, free = self._others, self._free
         if not len(others):
             return
-        mass, jacobian, none = hanging.mass[np.ix_(others, others)], hanging.jacobian[:, others], np.zeros(len(free))
-        if np.any(jump[others]):
+        mass, jacobian, none = hanging.mass[others[:, None], others], hanging.jacobian[:, others], np.zeros(len(free))
+        if jump[others].any():
             change = _balanced(mass, jacobian, np.concatenate([jump[others], none]))
             self.coordinates[1][others] += elapsed * change[: len(others)]
         turning = self._along_the_motion(APART * step)[free] if len(free) else none
@@ -137,7 +137,7 @@ class SystemMatrices:
     def _hanging(self, inertia: np.ndarray, mass: np.ndarray, jacobian: np.ndarray) -> Hanging:
         """What hangs on the points at the current state; jacobian: C but for the ties."""
         given = mass, jacobian
-        if not (np.any(mass[self._points]) or np.any(jacobian[:, self._points])):
+        if not (mass[self._points].any() or jacobian[:, self._points].any()):
             return Hanging(*self._nothing, not self._on_body(inertia, mass, jacobian), *given)
         jacobian = jacobian.copy()
         jacobian[:, self._own] = 0.0

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 
+import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
