@@ -64,9 +64,8 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
     where contacts rub: their impulse has another direction.
     """
     own, base = level.level, level.level.base
-    found = np.full(len(base.contacts), np.nan)
-    rigid = np.array([i for i, contact in enumerate(base.contacts) if contact.rigid], int)
-    if not len(rigid) or any(contact.further or contact.held for contact in base.contacts):
+    found, rigid = np.full(len(base.contacts), np.nan), base.struck_alone
+    if not len(rigid):
         return found
     given = base.directions[:, rigid]
     moved, across = np.split(

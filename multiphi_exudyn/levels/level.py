@@ -12,6 +12,7 @@ the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ ex
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -148,7 +149,7 @@ class Level(Shown):
     @functools.cached_property
     def highest_frequency(self) -> float:
         """The highest of them [Hz], zero where there is none."""
-        return float(np.max(self.frequencies, initial=0.0))
+        return math.sqrt(self.squares.max(initial=0.0)) / (2 * math.pi)
 
     @property
     def ratios(self) -> np.ndarray:
@@ -213,9 +214,9 @@ class Level(Shown):
 
     def apart(self, modes: int) -> int | None:
         """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
-        steps = np.diff(self.squares[modes - 1 :])
-        clear = np.flatnonzero(steps > NEAR * np.abs(self.squares[modes:]))
-        return modes + int(clear[0]) if clear.size else None
+        squares = self.squares[modes - 1 :].tolist()
+        steps = enumerate(itertools.pairwise(squares), start=modes)
+        return next((count for count, (last, other) in steps if other - last > NEAR * abs(other)), None)
 
     def truncated(self, asked: int) -> Level:
         """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
@@ -282,7 +283,7 @@ class Level(Shown):
         return Asymptotic(
             configuration=configuration,
             forces=self._forces(closed_directions, along, configuration, gaps),
-            drive=np.where(self.squares != 0, 0.0, self.vectors.T @ pushing),
+            drive=np.zeros(self.modes) if self.squares.all() else np.where(self.squares, 0.0, self.vectors.T @ pushing),
             load=self.vectors.T @ load,
             strain=strain,
             potential=strain - float(load @ configuration),

@@ -347,10 +347,10 @@ class MultiPhiModel(ElementTable, Shown):
     def _with_modes(self, indices: tuple[int, ...], modes: int) -> Level:
         """A level with its lowest so many modes at least, or all that it has."""
         base = self._shared_base()
-        shared: BoundedCache[tuple[int, ...], Level] = self._shared.setdefault(
-            "levels", BoundedCache(self._most_kept(modes))
-        )
-        most = base.modes.count - int(np.sum(np.isinf(base.stiffnesses[list(indices)])))
+        if "levels" not in self._shared:
+            self._shared["levels"] = BoundedCache(self._most_kept(modes))
+        shared: BoundedCache[tuple[int, ...], Level] = self._shared["levels"]
+        most = base.modes.count - sum(base.links[i].rigid for i in indices)
         needed, found, further = min(modes, most), shared.find(indices), 1
         while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
             wanted = needed + further

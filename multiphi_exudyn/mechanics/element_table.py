@@ -107,6 +107,12 @@ class ElementTable:
         return bool(self.held) or any(any(pushes) for pushes in self.pushes_of_states)
 
     @functools.cached_property
+    def struck_alone(self) -> np.ndarray:
+        """Positions of the rigid contacts where nothing rubs: an impulse is along a contact's own direction then."""
+        rubs = any(element.further or element.held for element in self.contacts)
+        return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not rubs], int)
+
+    @functools.cached_property
     def levels_possible(self) -> int:
         """Number of levels: the product of the states of all elements."""
         return math.prod(len(contact.states) for contact in self.contacts)
