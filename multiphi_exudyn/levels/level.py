@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
-from multiphi_exudyn.levels.static_response import static_response
+from multiphi_exudyn.levels.static_response import Asymptotic, neutral_response, static_response
 from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.modes import NEAR
@@ -36,24 +36,7 @@ from multiphi_exudyn.mechanics.arguments import real_array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Asymptotic", "Level"]
-
-
-@dataclass(frozen=True)
-class Asymptotic:
-    """What a level's modes cannot represent: its state of rest under gaps and static loads.
-
-    configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
-    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
-    y_inf [J], and the same less f.y_inf.
-    """
-
-    configuration: np.ndarray
-    forces: np.ndarray
-    drive: np.ndarray
-    load: np.ndarray
-    strain: float
-    potential: float
+__all__ = ["Level"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -300,27 +283,9 @@ class Level(Shown):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(f, y, what drives zero-frequency modes) under a load (m,)."""
         if self.neutral.size:
-            return self._neutral_response(closed_directions, total)
+            return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
         return along, configuration, total + closed_directions.vectors @ along
-
-    def _neutral_response(
-        self, closed_directions: ClosedDirections, total: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of some mode exactly."""
-        if np.any(closed_directions.rigid):
-            raise NumericalFailure(
-                f"level {', '.join(self.closed)}: negative stiffness cancels that of a mode beside closed rigid "
-                "contacts, so there is no state of rest"
-            )
-        pushing = total - closed_directions.vectors @ closed_directions.constants
-        _, found = static_response(self.base, closed_directions, total - self.neutral @ (self.neutral.T @ pushing))
-        configuration = found - self.neutral @ (self.neutral.T @ found)
-        return (
-            -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
-            configuration,
-            pushing,
-        )
 
     def _forces(
         self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
