@@ -24,10 +24,11 @@ from multiphi_exudyn.mechanics.matrix_files import read_structure
 from multiphi_exudyn.mechanics.modal_structure import ModalStructure, structure_from_modes
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.settled_state import SteadyState
 from multiphi_exudyn.steady.steady_state import steady_state

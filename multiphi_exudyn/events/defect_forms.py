@@ -16,6 +16,7 @@ import scipy.linalg
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics.orthonormal import least_squares
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
 __all__ += ["struck_defects"]
@@ -51,7 +52,8 @@ def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...
         motion[:, : modes[0]], motion[:, modes[0] : -1] = source, -target
         motion[:, -1] = before.asymptotic.configuration - after.asymptotic.configuration
         displaced = allowed(base, held, motion)
-        moving = over_omega(base, allowed(base, held | set(stopped), motion[:, :-1]))
+        moved = displaced if held.issuperset(stopped) else allowed(base, held | set(stopped), motion)
+        moving = over_omega(base, moved[:, :-1])
         after.entries[key] = DefectForm(factor(displaced), factor(moving), modes)
     way: DefectForm = after.entries[key]
     return way
@@ -64,17 +66,15 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
     where contacts rub: their impulse has another direction.
     """
     own, base = level.level, level.level.base
-    found = np.full(len(base.contacts), np.nan)
-    rigid = np.array([i for i, contact in enumerate(base.contacts) if contact.rigid], int)
-    if not len(rigid) or any(contact.further or contact.held for contact in base.contacts):
+    found, rigid = np.full(len(base.contacts), np.nan), base.struck_alone
+    if not len(rigid):
         return found
-    given = base.directions[:, rigid]
-    moved, across = np.split(
-        allowed(base, held_rigidly(level), np.hstack([own.vectors @ (own.vectors.T @ given), given])), 2, axis=1
-    )
-    lengths = np.sum(across * across, axis=0)
-    along = np.divide(np.sum(across * moved, axis=0), lengths, out=np.zeros(len(rigid)), where=lengths > 0)
-    found[rigid] = np.sum(over_omega(base, moved - across * along) ** 2, axis=0)
+    held, given = held_rigidly(level), base.directions[:, rigid]
+    across, motions = allowed(base, held, given), allowed(base, held, own.vectors)
+    moved, lengths = motions @ (own.vectors.T @ given), np.einsum("ij,ij->j", across, across)
+    along = np.divide(np.einsum("ij,ij->j", across, moved), lengths, out=np.zeros(len(rigid)), where=lengths > 0)
+    left = over_omega(base, moved - across * along)
+    found[rigid] = np.einsum("ij,ij->j", left, left)
     return found
 
 
@@ -102,7 +102,7 @@ def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
     if not held:
         return motion
     directions = base.directions[:, sorted(held)]
-    return motion - directions @ np.linalg.lstsq(directions, motion, rcond=None)[0]
+    return motion - directions @ least_squares(directions, motion)
 
 
 def over_omega(base: ModalBase, motion: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from multiphi_exudyn.events.state_arrays import measure
 
 __all__ = ["LevelArrays"]
 
-ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (model.py)
+ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
 FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
 ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
 

@@ -18,8 +18,9 @@ from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponenti
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.loads import Load, VaryingLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.time_functions import Sampled, TimeFunction
+from multiphi_exudyn.mechanics.time_functions import TimeFunction
 
 __all__ = ["LoadChannels", "called", "columns", "static_load"]
 

@@ -17,7 +17,7 @@ from multiphi_exudyn.levels.level_modes import level_modes
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.modes import turned
-from multiphi_exudyn.mathematics.orthonormal import orthonormal
+from multiphi_exudyn.mathematics.orthonormal import least_squares, orthonormal
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 __all__ = ["build_level", "independent"]
@@ -26,6 +26,7 @@ ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
+ALMOST = 0.99  # of a direction's square: one of which others have less does not follow from them
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -104,8 +105,7 @@ def _force_rows(
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]
         forces[rigid] = _reaction_rows(base, pinned, squares, vectors, directions @ forces)
-        q, r = orthonormal(pinned)
-        rates[rigid] = np.linalg.solve(r, q.T @ damped)
+        rates[rigid] = least_squares(pinned, damped)
     return forces, rates
 
 
@@ -144,8 +144,11 @@ def _following(base: ModalBase, held: Sequence[int]) -> np.ndarray:
     if not _told_apart(base, triangle):
         names = ", ".join(base.links[i].name for i in held)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    left = units - q @ (q.T @ units)
-    return np.asarray(np.linalg.norm(left, axis=0) <= INDEPENDENT)
+    along = q.T @ units
+    following = np.sum(along * along, axis=0) > ALMOST
+    left = units[:, following] - q @ along[:, following]
+    following[following] = np.linalg.norm(left, axis=0) <= INDEPENDENT
+    return following | (base.lengths == 0)
 
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:
@@ -171,10 +174,12 @@ def _reaction_rows(
     if not total[0].all():
         smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
         total = np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
+    residuals = (squared - squares) * vectors - spring_forces
+    if pinned.shape[1] == 1:
+        return np.asarray(pinned.T @ (residuals / total) / ((pinned * pinned).T @ (1 / total)))
     roots = 1 / np.sqrt(total)
-    residuals = roots * ((squared - squares) * vectors - spring_forces)
-    q, r = orthonormal(roots.T[:, :, None] * pinned)
-    given = np.einsum("ijk,ji->ik", q, residuals)
+    q, r = np.linalg.qr(roots.T[:, :, None] * pinned)
+    given = np.einsum("ijk,ji->ik", q, roots * residuals)
     return np.asarray(np.linalg.solve(r, given[:, :, None])[:, :, 0].T)
 
 

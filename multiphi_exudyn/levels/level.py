@@ -12,6 +12,7 @@ the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ ex
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -20,12 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
-from multiphi_exudyn.levels.static_response import static_response
+from multiphi_exudyn.levels.static_response import Asymptotic, neutral_response, static_response
 from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.modes import NEAR
@@ -35,24 +36,7 @@ from multiphi_exudyn.mechanics.arguments import real_array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Asymptotic", "Level"]
-
-
-@dataclass(frozen=True)
-class Asymptotic:
-    """What a level's modes cannot represent: its state of rest under gaps and static loads.
-
-    configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
-    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
-    y_inf [J], and the same less f.y_inf.
-    """
-
-    configuration: np.ndarray
-    forces: np.ndarray
-    drive: np.ndarray
-    load: np.ndarray
-    strain: float
-    potential: float
+__all__ = ["Level"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -148,7 +132,7 @@ class Level(Shown):
     @functools.cached_property
     def highest_frequency(self) -> float:
         """The highest of them [Hz], zero where there is none."""
-        return float(np.max(self.frequencies, initial=0.0))
+        return math.sqrt(self.squares.max(initial=0.0)) / (2 * math.pi)
 
     @property
     def ratios(self) -> np.ndarray:
@@ -213,9 +197,9 @@ class Level(Shown):
 
     def apart(self, modes: int) -> int | None:
         """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
-        steps = np.diff(self.squares[modes - 1 :])
-        clear = np.flatnonzero(steps > NEAR * np.abs(self.squares[modes:]))
-        return modes + int(clear[0]) if clear.size else None
+        squares = self.squares[modes - 1 :].tolist()
+        steps = enumerate(itertools.pairwise(squares), start=modes)
+        return next((count for count, (last, other) in steps if other - last > NEAR * abs(other)), None)
 
     def truncated(self, asked: int) -> Level:
         """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
@@ -282,7 +266,7 @@ class Level(Shown):
         return Asymptotic(
             configuration=configuration,
             forces=self._forces(closed_directions, along, configuration, gaps),
-            drive=np.where(self.squares != 0, 0.0, self.vectors.T @ pushing),
+            drive=np.zeros(self.modes) if self.squares.all() else np.where(self.squares, 0.0, self.vectors.T @ pushing),
             load=self.vectors.T @ load,
             strain=strain,
             potential=strain - float(load @ configuration),
@@ -299,27 +283,9 @@ class Level(Shown):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(f, y, what drives zero-frequency modes) under a load (m,)."""
         if self.neutral.size:
-            return self._neutral_response(closed_directions, total)
+            return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
         return along, configuration, total + closed_directions.vectors @ along
-
-    def _neutral_response(
-        self, closed_directions: ClosedDirections, total: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of some mode exactly."""
-        if np.any(closed_directions.rigid):
-            raise NumericalFailure(
-                f"level {', '.join(self.closed)}: negative stiffness cancels that of a mode beside closed rigid "
-                "contacts, so there is no state of rest"
-            )
-        pushing = total - closed_directions.vectors @ closed_directions.constants
-        _, found = static_response(self.base, closed_directions, total - self.neutral @ (self.neutral.T @ pushing))
-        configuration = found - self.neutral @ (self.neutral.T @ found)
-        return (
-            -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
-            configuration,
-            pushing,
-        )
 
     def _forces(
         self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray

@@ -10,34 +10,29 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.levels.build_base import build_base
-from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_override import LevelOverride
-from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.levels.mode_choice import FIRST, SMALL, TRIED, Tolerance, UpTo, chosen_modes, is_count
+from multiphi_exudyn.levels.level_store import LevelStore
+from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.levels.model_arguments import check_directions, check_modes, check_overrides, checked_contacts
+from multiphi_exudyn.levels.rest_under_forces import at_rest
+from multiphi_exudyn.levels.shared_base import SharedBase
 from multiphi_exudyn.levels.sliding import sliding
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium, equilibrium, floating, pressing
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.lowest_modes import left_out
-from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.element import AnyLink, Element
-from multiphi_exudyn.mechanics.element_table import ElementTable
-from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
 
-CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
-FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
 WIDER = 2  # models with a base for other loads that a model keeps, each with n numbers for every coordinate
 ENTRIES = 64  # of what others have made of a model: sentences on its levels
 LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
 
 
 @dataclass(frozen=True, repr=False)
-class MultiPhiModel(ElementTable, Shown):
+class MultiPhiModel(SharedBase, Shown):
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
     With c contacts there are 2^c levels; every friction makes three times as many, every force law as many times as it
@@ -96,7 +91,7 @@ class MultiPhiModel(ElementTable, Shown):
     modes: int | str | UpTo | Tolerance | None = None
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
-    _shared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+    _store: LevelStore | None = field(default=None, repr=False, compare=False)
     loaded: BoundedCache[Any, Any] = field(
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
     )
@@ -111,89 +106,21 @@ class MultiPhiModel(ElementTable, Shown):
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
             raise MultiPhiTypeError(f"structure: got {type(self.structure).__name__}, need a LinearStructure")
-        object.__setattr__(self, "contacts", _contacts(self.contacts))
-        names = [contact.name for contact in self.contacts]
-        if len(set(names)) < len(names):
-            raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
-        for link in self.links:
-            if not np.any(_row(self.structure, link)):
-                raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
-        self._check_modes()
-        _check_overrides(self.overrides)
+        object.__setattr__(self, "contacts", checked_contacts(self.contacts))
+        check_directions(self.structure, self.links)
+        check_modes(self.modes)
+        check_overrides(self.overrides)
         ordered = {tuple(sorted(self.index(name) for name in key)): value for key, value in self.overrides.items()}
-        object.__setattr__(self, "overrides", {self._names(key): value for key, value in ordered.items()})
+        object.__setattr__(
+            self, "overrides", {tuple(self.contacts[i].name for i in key): value for key, value in ordered.items()}
+        )
         if not self._can_share():
-            object.__setattr__(self, "_shared", self._unbuilt)
-
-    @functools.cached_property
-    def base(self) -> ModalBase:
-        """Coordinates common to all levels, built on first use."""
-        _ = self._chosen if self.modes is None else None  # it may need a larger one
-        return self._shared_base()
-
-    def _shared_base(self) -> ModalBase:
-        """The base of all models that share levels with this one."""
-        if "base" not in self._shared:
-            given = self._shared.get("first", FIRST) if self.modes is None else self.most_modes
-            less, further = self._shared.pop("less", None), self._shared.get("further")
-            self._shared["base"] = build_base(self.structure, self.contacts, given or "all", less, further)
-        base: ModalBase = self._shared["base"]
-        return base
-
-    @property
-    def _unbuilt(self) -> dict[str, Any]:
-        """What is shared where levels begin anew: modes that are known of the same structure, and rows of loads."""
-        known = {"structure": self.structure, "contacts": self.contacts}
-        if self._shared.get("structure") is not self.structure:
-            return known
-        kept = {name: self._shared[name] for name in ("further", "narrow") if name in self._shared}
-        return {**known, **kept, "less": self._shared.get("base", self._shared.get("less"))}
-
-    @staticmethod
-    def _serves(base: ModalBase, modes: int | None) -> bool:
-        """Whether levels with so many modes may be taken from a base."""
-        return base.complete or (modes is not None and modes <= base.served)
+            self._begin_anew()
 
     def push(self, states: Sequence[int]) -> np.ndarray:
         """Load (m,) of the constant forces of elements in these states."""
         pushes = [pushed[state] for pushed, state in zip(self.pushes_of_states, states, strict=True)]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
-
-    @property
-    def most_modes(self) -> int | None:
-        """The largest number of modes that a level is asked for, chosen where none was given; None: it has all of them.
-
-        Of a Tolerance that has not decided yet it is the number that its runs begin with.
-        """
-        if self.modes is None:
-            return self._chosen
-        if self.decided is not None:
-            return self.decided.most_modes
-        if isinstance(self.modes, str):
-            return None
-        most = self.modes.most if isinstance(self.modes, (UpTo, Tolerance)) else int(self.modes)
-        most = min(most, TRIED) if isinstance(self.modes, Tolerance) else most
-        return most if most < self.structure.n else None
-
-    @property
-    def _chosen(self) -> int | None:
-        """The number of modes where none was given."""
-        if self.structure.n <= SMALL:
-            return None
-        while "chosen" not in self._shared:
-            base = self._shared_base()
-            found = chosen_modes(self.structure, base, self._with_modes)
-            if self._serves(base, found):
-                self._shared["chosen"] = found
-            else:
-                object.__setattr__(self, "_shared", {**self._unbuilt, "first": found})
-        chosen: int = self._shared["chosen"]
-        return chosen
-
-    @property
-    def whole(self) -> bool:
-        """Whether no level leaves out a mode of the structure."""
-        return self.most_modes is None and not isinstance(self.modes, UpTo) and self.base.complete
 
     @property
     def decided(self) -> MultiPhiModel | None:
@@ -212,34 +139,16 @@ class MultiPhiModel(ElementTable, Shown):
         further = np.vstack([self.base.further, *new])
         return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(further))
 
-    def lacking(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Those of some rows (k, n) for which an incomplete base has not been made, zero ones left out."""
-        if self.base.complete:
-            return []
-        links = [self.structure.row(link.direction) for link in self.links]
-        known = np.vstack([self.base.further, self.structure.point_rows, *links])
-        return [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
-
     def _widened(self, further: np.ndarray) -> MultiPhiModel:
         """This model with a base that holds further rows (k, n)."""
         wider = replace(self)
-        shared = {"further": further, "first": self.base.served, "narrow": self._shared.get("narrow", self)}
-        object.__setattr__(wider, "_shared", {**self._unbuilt, **shared})
+        store = wider._begin_anew()
+        store.further, store.first, store.narrow = further, self.base.served, self._shared.narrow or self
         return wider
 
     def widened_to(self, other: MultiPhiModel) -> bool:
         """Whether another model is this one, but for rows of loads that its base holds."""
-        return other._shared.get("narrow") is self
-
-    def outside(self, row: np.ndarray) -> float:
-        """Share of the static flexibility at a row (n,) that the base does not hold."""
-        if self.base.complete:
-            return 0.0
-        shares: dict[bytes, float] = self._shared.setdefault("outside", {})
-        if row.tobytes() not in shares:
-            given = self.structure.mass, self.structure.stiffness, self.base.modes
-            shares[row.tobytes()] = float(left_out(*given, row[None, :])[0])
-        return shares[row.tobytes()]
+        return other._shared.narrow is self
 
     @property
     def levels_built(self) -> int:
@@ -258,13 +167,10 @@ class MultiPhiModel(ElementTable, Shown):
 
     @functools.cached_property
     def most_levels(self) -> int:
-        """Number of levels that are kept: what ``CACHE_BYTES`` hold, with what is kept beside them."""
-        return self._most_kept(self.most_modes or self.base.modes.count)
-
-    def _most_kept(self, r: int) -> int:
-        """Number of levels with r modes that ``CACHE_BYTES`` hold."""
-        of_a_mode = self._shared_base().modes.count + 30 * r + 2 * len(self.links)
-        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
+        """Number of levels that are kept: those of its size that a store holds."""
+        modes = self.most_modes or self.base.modes.count
+        self._shared_base()
+        return self._shared.most_kept(modes)
 
     @functools.cached_property
     def _levels(self) -> BoundedCache[tuple[int, ...], Level]:
@@ -280,13 +186,6 @@ class MultiPhiModel(ElementTable, Shown):
         yield "contacts", names([contact.name for contact in self.contacts])
         yield "modes", "to be chosen" if self.modes is None else str(self.modes)
         yield "levels built", f"{self.levels_built} of {self.levels_possible}"
-
-    def index(self, name: str) -> int:
-        """Position of a contact."""
-        for i, contact in enumerate(self.contacts):
-            if contact.name == name:
-                return i
-        raise MultiPhiValueError(f"contact: got {name!r}, need {one_of(name, (c.name for c in self.contacts))}")
 
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
         """The level with these contacts closed, or with elements in these states, built on first use.
@@ -307,29 +206,10 @@ class MultiPhiModel(ElementTable, Shown):
             For a name or a state that there is not.
         """
         if isinstance(closed, Mapping):
-            return self.level_at(self.links_held(self._states(closed)))
+            return self.level_at(self.links_held(self.states_named(closed)))
         if isinstance(closed, str) or not isinstance(closed, Iterable):
             raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names, or {{name: state}}")
-        own = {i for i, element in enumerate(self.contacts) if isinstance(element, ForceLaw) and element.stiffness}
-        return self.level_at(tuple(sorted({self._closed(name) for name in closed} | own)))
-
-    def _closed(self, name: str) -> int:
-        """Position of a contact that is closed, or friction that sticks."""
-        i = self.index(name)
-        if isinstance(self.contacts[i], ForceLaw):
-            raise MultiPhiValueError(f"closed: got the force law {name!r}, need {{{name!r}: segment}}")
-        return i
-
-    def _states(self, given: Mapping[str, str]) -> tuple[int, ...]:
-        """Numbers of the states of all elements."""
-        states = [0] * len(self.contacts)
-        for name, state in given.items():
-            i = self.index(name)
-            known = [own.name for own in self.contacts[i].states]
-            if state not in known:
-                raise MultiPhiValueError(f"state of {name!r}: got {state!r}, need one of: {', '.join(known)}")
-            states[i] = known.index(state)
-        return tuple(states)
+        return self.level_at(self.links_named(closed))
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
         """The level of closed contacts given by ascending positions."""
@@ -343,21 +223,9 @@ class MultiPhiModel(ElementTable, Shown):
 
     def _full(self, indices: tuple[int, ...]) -> Level:
         """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
-        return self._with_modes(indices, self.most_modes or self.base.modes.count)
-
-    def _with_modes(self, indices: tuple[int, ...], modes: int) -> Level:
-        """A level with its lowest so many modes at least, or all that it has."""
-        base = self._shared_base()
-        shared: BoundedCache[tuple[int, ...], Level] = self._shared.setdefault(
-            "levels", BoundedCache(self._most_kept(modes))
-        )
-        most = base.modes.count - int(np.sum(np.isinf(base.stiffnesses[list(indices)])))
-        needed, found, further = min(modes, most), shared.find(indices), 1
-        while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
-            wanted = needed + further
-            found = shared.keep(indices, build_level(base, indices, wanted if wanted < most else None))
-            further *= 2
-        return found
+        modes = self.most_modes or self.base.modes.count
+        self._shared_base()
+        return self._shared.level(indices, modes)
 
     def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
         """Configuration x (n,) [m, rad] at rest under forces at points, with the right contacts closed.
@@ -403,30 +271,11 @@ class MultiPhiModel(ElementTable, Shown):
 
         The arguments and errors are those of ``static_equilibrium``.
         """
-        y, stretches = self._at_rest(forces, inertia_relief)
+        base, load = self.base, self._force_row(forces)
+        size = np.abs(base.modes.shapes.T) @ np.abs(load)
+        y, stretches = at_rest(base, base.modes.shapes.T @ load, size, inertia_relief)
         named = {self.links[k].name: float(stretches[k]) for k in self.held}
-        return Equilibrium(self.base.modes.shapes @ y, named)
-
-    def _at_rest(self, forces: Mapping[str, float], inertia_relief: bool) -> tuple[np.ndarray, np.ndarray]:
-        """y (m,) and stretches (l,) [m] of links at rest under forces [N] at points."""
-        base = self.base
-        load = self.base_load(forces)
-        if base.modes.rigid:
-            if self.force_laws or self.general:
-                raise MultiPhiValueError(
-                    f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes beside force laws "
-                    "or friction, need none"
-                )
-            size = np.abs(base.modes.shapes.T) @ np.abs(self._force_row(forces))
-            return floating(base, load, size, inertia_relief), np.zeros(len(base.contacts))
-        if self.force_laws or self.general:
-            return equilibrium(base, load)
-        compliance = base.modes.omega**-2.0
-        gaps = base.directions.T @ (compliance * load) + base.gaps
-        bending = base.directions.T / base.modes.omega
-        closed = pressing(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
-        level = build_level(base, tuple(int(i) for i in np.flatnonzero(closed)))
-        return level.asymptotic(load).configuration, np.zeros(len(base.contacts))
+        return Equilibrium(base.modes.shapes @ y, named)
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Forces [N] at points as a load (m,) in base coordinates."""
@@ -438,59 +287,9 @@ class MultiPhiModel(ElementTable, Shown):
             raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
         return self.structure.row(forces) if forces else np.zeros(self.structure.n)
 
-    def _can_share(self) -> bool:
-        """Whether the levels built for another number of modes serve this model too."""
-        if self._shared.get("structure") is not self.structure or self._shared["contacts"] != self.contacts:
-            return False
-        base = self._shared.get("base")
-        if base is None or self.modes is None:
-            return base is not None
-        return self._serves(base, self.most_modes)
-
-    def _names(self, indices: tuple[int, ...]) -> tuple[str, ...]:
-        return tuple(self.contacts[i].name for i in indices)
-
     def _modes_of(self, full: Level) -> int:
         """Number of modes that are asked for of a level that has been built with all it may have."""
         most = min(self.most_modes or full.modes, full.modes)
         if not isinstance(self.modes, UpTo):
             return most
         return min(max(1, int(np.searchsorted(full.frequencies, self.modes.frequency, side="right"))), most)
-
-    def _check_modes(self) -> None:
-        if self.modes is None or isinstance(self.modes, (UpTo, Tolerance)) or str(self.modes) == "all":
-            return
-        needed = "need an integer >= 1, 'all', UpTo, Tolerance or None"
-        if not is_count(self.modes):
-            raise MultiPhiTypeError(f"modes: got {self.modes!r}, {needed}")
-        if int(self.modes) < 1:
-            raise MultiPhiValueError(f"modes: got {self.modes}, {needed}")
-
-
-def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
-    """The row (n,) of a link's direction; an error names the link."""
-    try:
-        return structure.row(link.direction)
-    except (MultiPhiValueError, MultiPhiTypeError) as error:
-        raise type(error)(f"contact {link.name!r}: {error}") from error
-
-
-def _contacts(given: Any) -> tuple[Element, ...]:
-    """Contacts as they are given."""
-    needed = "UnilateralContact, Friction or ForceLaw"
-    if not isinstance(given, Iterable):
-        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
-    items = tuple(given)
-    for item in items:
-        if not isinstance(item, Element):
-            raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
-    return items
-
-
-def _check_overrides(given: Any) -> None:
-    needed = "need {(names of closed contacts, ...): LevelOverride}"
-    if not isinstance(given, Mapping):
-        raise MultiPhiTypeError(f"overrides: got {type(given).__name__}, {needed}")
-    for key, value in given.items():
-        if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
-            raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")

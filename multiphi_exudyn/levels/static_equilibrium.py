@@ -17,14 +17,6 @@ Friction at a contact goes with its pressure N, and changes it: where it slides,
 That has one answer where |W| < 1 for a contact alone, whichever way it slides, and for several together where all
 principal minors of 1 - W are positive. Otherwise it wedges, and is refused with its number.
 
-A structure that nothing holds has no place of rest, but a deformation: with forces that balance each other,
-
-    y_e = Omega_e^-2 f_e,   y_0 = 0,   f_0 = 0
-
-x is then M-orthogonal to the rigid-body modes. Forces that do not balance accelerate it, f - M Phi_0 f_0 is what
-deforms it (inertia relief), and y_e is the same. Its contacts have to stay open there: where it would lie on them is
-not said.
-
 Sources: A. Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact problems with
 friction, Ing. Archiv 60 (1990); R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, 1992, ch.
 4.5.
@@ -37,15 +29,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.rest_with_friction import rest_with_friction
-from multiphi_exudyn.mathematics.least_distance import Infeasible, least_distance
-from multiphi_exudyn.mathematics.round_off import BALANCED, drop_round_off
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
-__all__ = ["Equilibrium", "equilibrium", "floating", "pressing"]
+__all__ = ["Equilibrium", "equilibrium"]
 
 SLACK = 1e-11  # of the sizes of a function on the path: nearer to zero it has reached it
 CHANGES = 20  # for every link on the path: more is an exchange without end
@@ -163,31 +152,6 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
     )
 
 
-def floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief: bool) -> np.ndarray:
-    """y (m,) of a structure that nothing holds, as it is deformed by a load (m,) of terms that add up to ``size``.
-
-    Raises MultiPhiValueError for a load that does not balance itself, unless with inertia relief, and where a contact
-    would be pressed on.
-    """
-    free, elastic = slice(base.modes.rigid), slice(base.modes.rigid, None)
-    left = np.divide(np.abs(load[free]), size[free], out=np.zeros(base.modes.rigid), where=size[free] > 0)
-    name = f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes)"
-    if not inertia_relief and np.max(left) > BALANCED:
-        raise MultiPhiValueError(
-            f"{name} and {per_cent(float(np.max(left)))} of the forces are not balanced by others, need forces that "
-            "are, supports, or inertia_relief=True for the deformation of a structure that they accelerate"
-        )
-    y = np.zeros(base.modes.count)
-    y[elastic] = load[elastic] / base.modes.omega[elastic] ** 2
-    terms = np.abs(base.directions.T) @ np.abs(y) + np.abs(base.gaps)
-    pressed = np.flatnonzero(drop_round_off(base.directions.T @ y + base.gaps, terms) < 0)
-    if len(pressed):
-        raise MultiPhiValueError(
-            f"{name} and would press on {base.links[int(pressed[0])].name!r}, need a gap there, or supports"
-        )
-    return y
-
-
 def _first_state(base: ModalBase, element: int) -> int:
     """The state of an element where nothing has moved yet."""
     given, still = base.contacts[element], [0.0] * len(base.link_places[element])
@@ -296,17 +260,3 @@ def _path(base: ModalBase, standing: _Standing, loads: np.ndarray, lifts: np.nda
         places.append(base.directions.T @ configuration + initial)
         forces.append(pressing)
     return _Path(np.array(configurations), np.array(places), np.array(forces))
-
-
-def pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """Which of the constraints rows z >= least press on the shortest z; they are independent of each other.
-
-    Raises MultiPhiValueError where no z meets all of them.
-    """
-    try:
-        _, multipliers = least_distance(rows, least, np.abs(least))
-    except Infeasible as found:
-        raise MultiPhiValueError(
-            "static equilibrium: got rigid contacts that exclude each other, need a way between"
-        ) from found
-    return np.asarray(multipliers > 0)

@@ -7,17 +7,36 @@ P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
-__all__ = ["static_response"]
+__all__ = ["Asymptotic", "neutral_response", "static_response"]
+
+
+@dataclass(frozen=True)
+class Asymptotic:
+    """What a level's modes cannot represent: its state of rest under gaps and static loads.
+
+    configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
+    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
+    y_inf [J], and the same less f.y_inf.
+    """
+
+    configuration: np.ndarray
+    forces: np.ndarray
+    drive: np.ndarray
+    load: np.ndarray
+    strain: float
+    potential: float
 
 
 def static_response(
@@ -29,6 +48,28 @@ def static_response(
     if turned is not closed_directions:
         forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
     return forces, configuration
+
+
+def neutral_response(
+    base: ModalBase, closed_directions: ClosedDirections, neutral: np.ndarray, total: np.ndarray, closed: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of modes ``neutral`` (m, z) exactly.
+
+    closed: names of the closed contacts.
+    """
+    if np.any(closed_directions.rigid):
+        raise NumericalFailure(
+            f"level {', '.join(closed)}: negative stiffness cancels that of a mode beside closed rigid contacts, so "
+            "there is no state of rest"
+        )
+    pushing = total - closed_directions.vectors @ closed_directions.constants
+    _, found = static_response(base, closed_directions, total - neutral @ (neutral.T @ pushing))
+    configuration = found - neutral @ (neutral.T @ found)
+    return (
+        -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
+        configuration,
+        pushing,
+    )
 
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

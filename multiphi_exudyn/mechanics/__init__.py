@@ -5,5 +5,5 @@ assembled from others. Nothing is reduced or solved here.
 
 Order: arguments, dofs, damping, point_rows, structure, assembly, text_matrices, array_files, matrix_files,
 modal_structure, section, beam, planar_beam, element, contact, friction, law_lines, force_law, element_table,
-time_functions, static_loads, moving_supports, loads.
+samples, time_functions, static_loads, moving_supports, loads.
 """

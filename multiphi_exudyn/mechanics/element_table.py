@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 
@@ -18,6 +20,13 @@ class ElementTable:
     """What the elements ``contacts`` (c,) say of their l links, of which the first ones of all come first."""
 
     contacts: Sequence[Element]
+
+    def index(self, name: str) -> int:
+        """Position of a contact."""
+        for i, contact in enumerate(self.contacts):
+            if contact.name == name:
+                return i
+        raise MultiPhiValueError(f"contact: got {name!r}, need {one_of(name, (c.name for c in self.contacts))}")
 
     @functools.cached_property
     def links(self) -> tuple[AnyLink, ...]:
@@ -86,6 +95,29 @@ class ElementTable:
             return further
         return [own, *(k for k in further if k in self.oblique)]
 
+    def links_named(self, closed: Iterable[str]) -> tuple[int, ...]:
+        """Positions of the links that hold where these contacts are closed, all others open, laws in segment "0"."""
+        own = {i for i, law in self.laws.items() if law.stiffness}
+        return tuple(sorted({self._closed(name) for name in closed} | own))
+
+    def _closed(self, name: str) -> int:
+        """Position of a contact that is closed, or friction that sticks."""
+        i = self.index(name)
+        if i in self.laws:
+            raise MultiPhiValueError(f"closed: got the force law {name!r}, need {{{name!r}: segment}}")
+        return i
+
+    def states_named(self, given: Mapping[str, str]) -> tuple[int, ...]:
+        """Numbers of the states of all elements."""
+        states = [0] * len(self.contacts)
+        for name, state in given.items():
+            i = self.index(name)
+            known = [own.name for own in self.contacts[i].states]
+            if state not in known:
+                raise MultiPhiValueError(f"state of {name!r}: got {state!r}, need one of: {', '.join(known)}")
+            states[i] = known.index(state)
+        return tuple(states)
+
     def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
         """Positions of the links that hold where the elements are in these states: they name the modes."""
         return tuple(sorted(link for held, state in zip(self._holding, states, strict=True) for link in held[state]))
@@ -105,6 +137,12 @@ class ElementTable:
     def general(self) -> bool:
         """Whether there are elements that do more than their links: some have held places, or push."""
         return bool(self.held) or any(any(pushes) for pushes in self.pushes_of_states)
+
+    @functools.cached_property
+    def struck_alone(self) -> np.ndarray:
+        """Positions of the rigid contacts where nothing rubs: an impulse is along a contact's own direction then."""
+        rubs = any(element.further or element.held for element in self.contacts)
+        return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not rubs], int)
 
     @functools.cached_property
     def levels_possible(self) -> int:

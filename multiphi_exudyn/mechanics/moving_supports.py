@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep, TimeFunction, check_time_function
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep, TimeFunction, check_time_function
 
 __all__ = ["BaseMotion", "StopMotion"]
 

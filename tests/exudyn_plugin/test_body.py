@@ -22,7 +22,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.levels import model as model_module
+from multiphi_exudyn.levels import level_store
 from reference_models.body_alone import solve_body_alone
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 from reference_models.solver_settings import fixed_steps
@@ -205,8 +205,8 @@ def test_a_tiny_bound_on_what_is_kept_of_levels_changes_nothing(monkeypatch, loa
     histories = []
     for most in (None, 1):
         if most is not None:
-            monkeypatch.setattr(model_module, "CACHE_BYTES", 0)
-            monkeypatch.setattr(model_module, "FEWEST_LEVELS", most)
+            monkeypatch.setattr(level_store, "CACHE_BYTES", 0)
+            monkeypatch.setattr(level_store, "FEWEST_LEVELS", most)
         model = chain(contacts)
         histories.append(run(model, 1e-3, 0.4, **given))
         assert (model.levels_kept == 1) is (most == 1)

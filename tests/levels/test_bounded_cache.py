@@ -11,7 +11,7 @@ from small_structures import bed, chain, stop
 
 from multiphi_exudyn import ConstantLoad, HarmonicLoad, MultiPhiModel, simulate
 from multiphi_exudyn.events import level_arrays
-from multiphi_exudyn.levels import model as model_module
+from multiphi_exudyn.levels import level_store
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time import motion
 
@@ -38,8 +38,8 @@ class TestRecent:
 def run(monkeypatch, most, stiffness, loads):
     """A model that keeps so many levels, None for the usual bound, and its run."""
     if most is not None:
-        monkeypatch.setattr(model_module, "CACHE_BYTES", 0)
-        monkeypatch.setattr(model_module, "FEWEST_LEVELS", most)
+        monkeypatch.setattr(level_store, "CACHE_BYTES", 0)
+        monkeypatch.setattr(level_store, "FEWEST_LEVELS", most)
     model = bed(stiffness, n=60, stops=8, modes=8)
     velocity = model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
     return model, simulate(model, float(TIMES[-1]), velocity=velocity, loads=loads)
@@ -100,9 +100,9 @@ def test_a_record_that_becomes_too_large_ends_the_run(monkeypatch):
 def test_what_is_kept_takes_no_more_bytes_than_the_bound(monkeypatch):
     """Levels, the arrays of the loop, and the ways between them; a trajectory that is let go takes its own along."""
     bound, arrays = 400_000, 1_000_000
-    monkeypatch.setattr(model_module, "CACHE_BYTES", bound)
+    monkeypatch.setattr(level_store, "CACHE_BYTES", bound)
     monkeypatch.setattr(level_arrays, "ARRAY_BYTES", arrays)
-    monkeypatch.setattr(model_module, "FEWEST_LEVELS", 1)
+    monkeypatch.setattr(level_store, "FEWEST_LEVELS", 1)
     model = bed(1e7, n=100, stops=30, modes=8)
     velocity = model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
     gc.collect()

@@ -9,7 +9,7 @@ import scipy.sparse
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.levels import model as model_module
+from multiphi_exudyn.levels import level_store
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
 
@@ -85,8 +85,8 @@ class TestDefault:
 
     def test_a_large_base_is_extended_once_at_most(self, monkeypatch):
         built = []
-        build = model_module.build_base
-        monkeypatch.setattr(model_module, "build_base", lambda *given: built.append(given[2]) or build(*given))
+        build = level_store.build_base
+        monkeypatch.setattr(level_store, "build_base", lambda *given: built.append(given[2]) or build(*given))
         soft = mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1e-3)])
         assert soft.level(("stop",)).modes == soft.most_modes <= 22
         assert built == [22]
@@ -142,8 +142,8 @@ class TestTolerance:
 
     def test_its_base_is_extended_to_twice_as_many_modes_when_they_are_needed(self, monkeypatch):
         built = []
-        build = model_module.build_base
-        monkeypatch.setattr(model_module, "build_base", lambda *given: built.append(given[2]) or build(*given))
+        build = level_store.build_base
+        monkeypatch.setattr(level_store, "build_base", lambda *given: built.append(given[2]) or build(*given))
         model = mp.MultiPhiModel(large_chain(), [stop("m", 0.1, 1e-3)], modes=mp.Tolerance(1e-6))
         start = model.static_equilibrium({"m": -1e-3})
         mp.simulate(model, 5.0, displacement=start)

@@ -88,7 +88,7 @@ def test_a_failure_of_linear_algebra_ends_a_run_with_its_cause(monkeypatch):
     structure = LinearStructure(np.eye(2), np.eye(2))
     model = MultiPhiModel(structure, [UnilateralContact("c", [1.0, 0.0], 0.1)], modes="all")
     monkeypatch.setattr(
-        "multiphi_exudyn.levels.model.build_level", lambda *given: (singular if given[1] else build_level)(*given)
+        "multiphi_exudyn.levels.level_store.build_level", lambda *given: (singular if given[1] else build_level)(*given)
     )
     run = simulate(model, 5.0, loads=[ConstantLoad([1.0, 0.0], -1.0)])
     assert run.status == "failed"

@@ -14,9 +14,10 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Sweep, TimeFunction
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Sweep, TimeFunction
 from multiphi_exudyn.study.scene.fields import place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,

@@ -1,0 +1,67 @@
+"""What a model is made of, checked: contacts, their directions, the number of modes, and overrides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.level_override import LevelOverride
+from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo, is_count
+from multiphi_exudyn.mechanics.element import AnyLink, Element
+from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["check_directions", "check_modes", "check_overrides", "checked_contacts"]
+
+
+def checked_contacts(given: Any) -> tuple[Element, ...]:
+    """Contacts as they are given, each with a name of its own."""
+    needed = "UnilateralContact, Friction or ForceLaw"
+    if not isinstance(given, Iterable):
+        raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
+    items = tuple(given)
+    for item in items:
+        if not isinstance(item, Element):
+            raise MultiPhiTypeError(f"contacts: got {type(item).__name__}, need {needed}")
+    names = [contact.name for contact in items]
+    if len(set(names)) < len(names):
+        raise MultiPhiValueError(f"contacts: got the names {names}, need each name once")
+    return items
+
+
+def check_directions(structure: LinearStructure, links: Iterable[AnyLink]) -> None:
+    """Refuse a link along no degree of freedom."""
+    for link in links:
+        if not np.any(_row(structure, link)):
+            raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
+
+
+def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
+    """The row (n,) of a link's direction; an error names the link."""
+    try:
+        return structure.row(link.direction)
+    except (MultiPhiValueError, MultiPhiTypeError) as error:
+        raise type(error)(f"contact {link.name!r}: {error}") from error
+
+
+def check_modes(modes: Any) -> None:
+    """Refuse what is no choice of a number of modes."""
+    if modes is None or isinstance(modes, (UpTo, Tolerance)) or str(modes) == "all":
+        return
+    needed = "need an integer >= 1, 'all', UpTo, Tolerance or None"
+    if not is_count(modes):
+        raise MultiPhiTypeError(f"modes: got {modes!r}, {needed}")
+    if int(modes) < 1:
+        raise MultiPhiValueError(f"modes: got {modes}, {needed}")
+
+
+def check_overrides(given: Any) -> None:
+    """Refuse what are no overrides of levels."""
+    needed = "need {(names of closed contacts, ...): LevelOverride}"
+    if not isinstance(given, Mapping):
+        raise MultiPhiTypeError(f"overrides: got {type(given).__name__}, {needed}")
+    for key, value in given.items():
+        if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
+            raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")
