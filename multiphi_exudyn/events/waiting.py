@@ -95,7 +95,7 @@ def wait_for(
 ) -> int:
     """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
-    A reaction that begins below zero by the round-off of the transition before begins at zero: so it was judged.
+    What begins below zero by round-off, a reaction by that of the transition before, begins at zero: so it was judged.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
@@ -117,7 +117,7 @@ def wait_for(
         begins += sign * (numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i])
     if rate == 0 and entered == 0 and begins < 0.0:
         terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
-        constant -= begins if terms > 0.0 and abs(begins) <= ZERO * (size + terms) else 0.0
+        constant -= begins if abs(begins) <= ZERO * (size + terms) else 0.0
     if sign < 0.0:
         for j in range(p):
             waves[first + j] = -waves[first + j]

@@ -301,7 +301,7 @@ def sled(arms, height, stiffness, friction=0.37, **given):
         mp.UnilateralContact(
             name, [0.0, 1.0, x], 0.0, stiffness, friction=friction, tangential=along if friction else None, **given
         )
-        for name, x in zip(("rear", "front"), arms, strict=True)
+        for name, x in zip(("rear", "front"), arms, strict=False)
     ]
     structure = mp.LinearStructure(np.diag([1.0, 1.0, 0.5]), np.diag([0.0, 0.1, 0.1]))
     return mp.MultiPhiModel(structure, feet, modes="all"), [mp.ConstantLoad(np.array([0.0, -1.0, 0.0]), G)]
@@ -356,3 +356,15 @@ def test_a_sled_that_bounces_and_tips_is_the_limit_of_stiff_friction(arms, speed
         found.append(mp.simulate(model, 1.0, np.zeros(3), [speed, 0.0, 0.0], weight).displacement(t))
     errors = [np.max(np.abs(other - found[0])) / np.max(np.abs(found[0])) for other in found[1:]]
     assert errors[1] < 0.2 * errors[0] < 2e-3
+
+
+@pytest.mark.parametrize("spring", [1e5, 1e6, 1e7])
+def test_a_sled_that_hardly_leaves_the_floor_touches_it_again(spring):
+    """Two feet with springs along the floor, from where they touch: they come back there with a speed that is none."""
+    t, found = np.linspace(0, 1, 41), []
+    for arms, stiffness, along in (((-1.0, 1.0), 1e3, spring), ((0.0,), 2e3, 2 * spring)):
+        model, weight = sled(arms, 0.0, stiffness, tangential_stiffness=along)
+        run = mp.simulate(model, 1.0, np.zeros(3), [0.5, 0.0, 0.0], weight)
+        assert run.status == "ok"
+        found.append(run.displacement(t))
+    assert_allclose(*found, rtol=0, atol=1e-8)
