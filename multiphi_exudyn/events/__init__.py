@@ -20,6 +20,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     10      a contact with friction       changes.turn_wishes, phases.is_denied
     10      a rigid one that strikes      impact.rub, resting.sliding_level, rebounds.hear_touching
     11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
+    11      beside friction               rebounds.collide_and_rebound
     11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
     12      friction at rest              sticking.stick_together, sticking.decide_at_rest, sticking.choose
     12      beside rigid contacts         sticking.let_go, independence.follows

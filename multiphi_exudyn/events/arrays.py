@@ -105,8 +105,9 @@ LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction, mu of contacts that give 
 TOGETHER = 202  # whether these have been decided together
 FRICTIONS, STATIC_FRICTIONS = 212, 213  # of rigid contacts, zero of others
 PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; the state in which a contact closes
-IDLE = 216  # flags of elements that nothing lets move: nobody looks at their exits
-RUN_INTS = 217
+COMPRESSED = 216  # a state, in all modes too: where an impact with friction and restitution has spent its first half
+UNMOVED = 224  # flags of elements that nothing lets move: nobody looks at their exits
+RUN_INTS = 225
 
 # ---------------------------------------------------------------------- run record, numbers
 

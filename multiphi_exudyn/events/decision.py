@@ -52,9 +52,11 @@ bases of two levels need not agree, so the law says what happens then; each sent
    -> changes.turn_wishes, phases.is_denied, impact.rub, resting.sliding_level, rebounds.hear_touching
 11. A rigid contact with restitution e that strikes leaves its stop with -e times its speed, and so do all that touch
    and are struck with it, in one impact (Moreau); those that are coupled have one e. Who is driven back to its stop is
-   struck again at once. A bounce too low to be seen is the last: it takes as long as all that would follow, and where
-   it lands e is zero.
-   -> rebounds.hear_touching, rebounds.rebound, rebounds.bounce, rebounds.last_bounce, rebounds.keep_landing
+   struck again at once. Where one of them rubs e is that of impulses: an impact without restitution, then one of at
+   least e times its impulses (Poisson). A bounce too low to be seen is the last: it takes as long as all that would
+   follow, and where it lands e is zero.
+   -> rebounds.hear_touching, rebounds.rebound, rebounds.collide_and_rebound, rebounds.bounce, rebounds.last_bounce,
+   rebounds.keep_landing
 12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together, those at contacts that
    give way with their mu N of the instant: their forces within their limits, static ones until they slip, are
    complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:

@@ -45,7 +45,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.WHOLE: int(model.whole),
         a.JUDGED: int(not model.whole),
         a.KINDS: put("ints", kinds),
-        a.IDLE: buffers.take("ints", c),
+        a.UNMOVED: buffers.take("ints", c),
         a.SEGMENTS: put("ints", segments),
         a.KNOTS: sum(len(law.further) for law in base.laws.values()),
         a.STIFFNESSES: put("numbers", np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)[:c]),

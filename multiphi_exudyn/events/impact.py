@@ -1,6 +1,6 @@
 """Impact in flat arrays: rigid contacts strike, or their motion presses them to their stops.
 
-    v+ = v- + A^T p,   p >= 0,  A v+ >= wanted, complementary,   A = H^T Phi_l         (Moreau; restitution 0: wanted 0)
+    v+ = v- + A^T p,   p >= least,  A v+ >= wanted, complementary,   A = H^T Phi_l     (Moreau; without restitution: 0)
 
 A contact with friction has a second row, along h_t - v_t, and an impulse along it within mu times its first one.
 
@@ -27,7 +27,6 @@ from multiphi_exudyn.events.arrays import (
     ENTERS,
     FAILED,
     FRICTIONS,
-    GAINING,
     GAPS,
     HELD_LINKS,
     HIGHEST,
@@ -141,12 +140,14 @@ def nearest(
     vector: int,
     sizes: int,
     wanted: int,
+    least: int,
     multipliers: int,
 ) -> int:
     """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (rows,); OK or FAILED.
 
-    sizes: (rows,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero.
-    The first ``count`` rows are those of the contacts, the others of their friction.
+    sizes: (rows,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero. least:
+    (count,) of the contacts' multipliers, -1 for zero. The first ``count`` rows are those of the contacts, the others
+    of their friction.
     """
     r = ints[level + MODES]
     n = r + ints[CHANNELS]
@@ -155,10 +156,17 @@ def nearest(
         for i in range(n):
             value += numbers[row + i] * numbers[vector + i]
             terms += abs(numbers[row + i]) * abs(numbers[vector + i])
+        for j in range(count if least >= 0 else 0):
+            pushed = numbers[least + j] * product(numbers, row, ints[ROWS] + j * n, r)
+            value += pushed
+            terms += abs(pushed)
+        rubs = 0.0
+        if least >= 0 and k >= count:
+            rubs = numbers[ints[RATIOS] + k] * numbers[least + ints[ints[LEADERS] + k]]
         numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 and k < count else value
         numbers[ints[VALUE_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
-        numbers[ints[LOWEST] + k] = 0.0
-        numbers[ints[HIGHEST] + k] = math.inf if k < count else 0.0
+        numbers[ints[LOWEST] + k] = -rubs
+        numbers[ints[HIGHEST] + k] = math.inf if k < count else rubs
         ints[ints[LEADERS] + k] = -1 if k < count else ints[ints[LEADERS] + k]
     if ints[level + MOBILITY] >= 0:
         limit_rows(ints, numbers, level, count)
@@ -179,6 +187,10 @@ def nearest(
     if answer == UNDECIDED:
         ints[CAUSE] = UNSETTLED
         return FAILED
+    for j in range(count if least >= 0 else 0):
+        numbers[multipliers + j] += numbers[least + j]
+        for i in range(r):
+            numbers[ints[CHANGE] + i] += numbers[least + j] * numbers[ints[ROWS] + j * n + i]
     if ints[level + MOBILITY] >= 0:
         limit_change(ints, numbers, level)
     return OK
@@ -224,6 +236,7 @@ def collide(
     count: int,
     held: int,
     wanted: int,
+    least: int,
     result: int,
     impulses: int,
     losses: int,
@@ -231,36 +244,31 @@ def collide(
     """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
 
     held: the last so many contacts keep no speed away from their stop either. wanted: gap velocities (count + held,)
-    that they are to have at least, -1 for zero. impulses: (count + held,) [N s], those of friction behind them.
+    that they are to have at least, -1 for zero. least: impulses that they have at least, the same. impulses: (count +
+    held,) [N s], those of friction behind them.
     What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
     underflows, and what is left of a place where it has come to rest would swing, and strike again: both become zero.
     """
     level = ints[state + LEVEL]
     r, channels = ints[level + MODES], ints[CHANNELS]
-    n, both, plastic, size = r + channels, count + held, 0.0, 0.0
+    n, both, plastic = r + channels, count + held, 0.0
     fill_rows(ints, numbers, level, contacts, count, held)
     rows = rub(ints, numbers, state, contacts, count if held == 0 else 0, both, -1)
-    if nearest(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, impulses) < 0:
+    if nearest(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, least, impulses) < 0:
         return FAILED
-    for k in range(both):
+    for k in range(rows if least >= 0 else 0):
+        numbers[ints[VALUES] + k] = product(numbers, ints[ROWS] + k * n, ints[state + SPEED], n)
+    for k in range(both if least < 0 else 0):
         plastic -= 0.5 * numbers[impulses + k] * numbers[ints[VALUES] + k]
         if wanted >= 0:
             plastic -= numbers[impulses + k] * numbers[wanted + k]
-        size += numbers[impulses + k] * abs(numbers[ints[VALUES] + k])
     copy_state(ints, numbers, state, result)
     v, before, x, reach = ints[result + SPEED], ints[state + SPEED], ints[result + PLACE], ints[state + REACH]
     for i in range(r):
         numbers[v + i] += numbers[ints[CHANGE] + i]
-    for k in range(both, rows):
+    for k in range(both if least < 0 else 0, rows):
         after = product(numbers, ints[ROWS] + k * n, v, n)
         plastic -= 0.5 * numbers[impulses + k] * (numbers[ints[VALUES] + k] + after)
-    if rows > both and plastic < -RESTING * size:
-        ints[CAUSE] = GAINING
-        for i in range(ints[ELEMENTS]):
-            ints[ints[CAUSED_BY] + i] = 0
-        for k in range(count):
-            ints[ints[CAUSED_BY] + ints[contacts + k]] = 1
-        return FAILED
     rest = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
     for i in range(r):
         if rest or abs(numbers[v + i]) <= RESTING * abs(numbers[before + i]):

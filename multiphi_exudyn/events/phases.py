@@ -21,7 +21,6 @@ from multiphi_exudyn.events.arrays import (
     FLOW_COUNT,
     HEARD,
     HELD_BACK,
-    IDLE,
     KINDS,
     LEVEL,
     MODES,
@@ -42,6 +41,7 @@ from multiphi_exudyn.events.arrays import (
     SETTLED,
     SIGNAL,
     STATES,
+    UNMOVED,
     WORK_WAVES,
     WORKED,
 )
@@ -103,7 +103,7 @@ def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refuse
     count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
     for k in range(count):
         exit_, ints[phases + k] = exits + k * EXIT_INTS, ARMED
-        if ints[ints[IDLE] + ints[exit_ + ELEMENT]] == 0:
+        if ints[ints[UNMOVED] + ints[exit_ + ELEMENT]] == 0:
             ints[phases + k] = phase_of(ints, numbers, waves, state, exit_)
         if ints[phases + k] != ARMED:
             settled = 0

@@ -2,6 +2,10 @@
 
     H v+ + e H v- >= 0,  p >= 0, complementary;  WANTED = -e H v-                                            (Moreau)
 
+Beside friction that would make energy where sliding turns (T. R. Kane). There all are struck without restitution
+first, with impulses p, and then once more with at least e p (Poisson), H v+ >= 0, in Coulomb's cone both times. With
+W = H^T M^-1 H that takes (1 - e^2) p W p / 2 at least, as u+ q <= e u+ p of the second impulses q, e the same of all.
+
 A sequence of ever smaller bounces, s the speed of the present one and a the gap's acceleration back to the stop, takes
 2 s/(a (1 - e)) more: as long as one bounce of speed s/(1 - e).
 """
@@ -11,6 +15,7 @@ from __future__ import annotations
 from multiphi_exudyn.events.arrays import (
     ACCELERATION,
     ARMED,
+    BY_IMPACT,
     CAUSE,
     CAUSED_BY,
     CHANGE_COUNT,
@@ -18,12 +23,14 @@ from multiphi_exudyn.events.arrays import (
     CHANGE_WIDTH,
     CHANGES,
     CHANNELS,
+    COMPRESSED,
     ELEMENTS,
     EXIT_COUNT,
     FAILED,
     FIRST_CHANGE,
     FIRST_EXITS,
     FURTHER,
+    GAINING,
     GROUPS,
     HEARD,
     IMPULSES,
@@ -58,6 +65,7 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY
+from multiphi_exudyn.events.energies import kinetic
 from multiphi_exudyn.events.impact import RESTING, collide, fill_rows, speed_size, unseen_speed
 from multiphi_exudyn.events.phases import first_exit
 from multiphi_exudyn.events.signals import gap, rate_sign, row_sign
@@ -69,6 +77,7 @@ from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = [
     "bounce",
+    "collide_and_rebound",
     "forget_bounces",
     "has_rebounded",
     "hear_touching",
@@ -146,6 +155,43 @@ def rebound(ints: Ints, numbers: Numbers, state: int, count: int) -> int:
 
 
 @compiled
+def collide_and_rebound(
+    ints: Ints, numbers: Numbers, state: int, count: int, bouncing: int, result: int, losses: int
+) -> int:
+    """11. The state after an impact of those that touch, with its IMPULSES, and as many as are to leave their stops.
+
+    Where any of them rubs, by e times their impulses. Adds its losses; OK or FAILED.
+    """
+    touching, impulses, least, rubs = ints[TOUCHING], ints[IMPULSES], ints[WANTED], 0
+    for k in range(count if bouncing > 0 else 0):
+        rubs = 1 if numbers[ints[STATIC_FRICTIONS] + ints[touching + k]] > 0.0 else rubs
+    if rubs == 0:
+        wanted = ints[WANTED] if bouncing > 0 else -1
+        return collide(ints, numbers, state, touching, count, 0, wanted, -1, result, impulses, losses)
+    before = numbers[losses + BY_IMPACT]
+    if collide(ints, numbers, state, touching, count, 0, -1, -1, COMPRESSED, ints[FURTHER], losses) < 0:
+        return FAILED
+    taken = numbers[losses + BY_IMPACT] - before
+    for k in range(count):
+        landing = lands(ints, WORKED, ints[touching + k]) == 1
+        restitution = 0.0 if landing else numbers[ints[RESTITUTIONS] + ints[touching + k]]
+        numbers[ints[FURTHER] + k] = max(numbers[ints[FURTHER] + k], 0.0)
+        numbers[least + k] = restitution * numbers[ints[FURTHER] + k]
+    if collide(ints, numbers, COMPRESSED, touching, count, 0, -1, least, result, impulses, losses) < 0:
+        return FAILED
+    for k in range(count):
+        numbers[impulses + k] += numbers[ints[FURTHER] + k]
+    if numbers[losses + BY_IMPACT] - before >= -RESTING * (taken + kinetic(ints, numbers, state)):
+        return OK
+    ints[CAUSE] = GAINING
+    for i in range(ints[ELEMENTS]):
+        ints[ints[CAUSED_BY] + i] = 0
+    for k in range(count):
+        ints[ints[CAUSED_BY] + ints[touching + k]] = 1
+    return FAILED
+
+
+@compiled
 def same_restitution(ints: Ints, numbers: Numbers, state: int, count: int) -> int:
     """How many of those that touch are to leave their stops; FAILED where of coupled ones not all rebound alike."""
     level, groups, bouncing = ints[state + LEVEL], ints[GROUPS], 0
@@ -200,7 +246,7 @@ def bounce(ints: Ints, numbers: Numbers, count: int) -> int:
 def push_on(ints: Ints, numbers: Numbers, count: int) -> int:
     """STRUCK becomes the state after one more impact, to the speeds WANTED; OK or FAILED."""
     touching, further = ints[TOUCHING], ints[FURTHER]
-    if collide(ints, numbers, STRUCK, touching, count, 0, ints[WANTED], STILL, further, LOST_IN_IMPACT) < 0:
+    if collide(ints, numbers, STRUCK, touching, count, 0, ints[WANTED], -1, STILL, further, LOST_IN_IMPACT) < 0:
         return FAILED
     copy_state(ints, numbers, STILL, STRUCK)
     for k in range(count):

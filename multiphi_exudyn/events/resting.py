@@ -144,7 +144,7 @@ def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
         size = resting_size(numbers, ints[ACCELERATION_TERMS], ints[RELEASED_TERMS], ints[ROWS] + k * n, n)
         numbers[ints[RESTING_SIZES] + k] = size
     sizes, forces = ints[RESTING_SIZES], ints[FURTHER]
-    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, rows, ints[ACCELERATION], sizes, -1, forces) < 0:
+    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, rows, ints[ACCELERATION], sizes, -1, -1, forces) < 0:
         return sliding_level(ints, rest)
     for k in range(rest, rows):
         side, leader = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], ints[ints[LEADERS] + k]
@@ -227,7 +227,7 @@ def calm(ints: Ints, numbers: Numbers, count: int) -> int:
     if moving == 0:
         copy_state(ints, numbers, STRUCK, STILL)
         return OK
-    status = collide(ints, numbers, STRUCK, touching, count, held, -1, STILL, ints[FURTHER], LOST_STILLED)
+    status = collide(ints, numbers, STRUCK, touching, count, held, -1, -1, STILL, ints[FURTHER], LOST_STILLED)
     if status < 0:
         return status
     for h in range(held):

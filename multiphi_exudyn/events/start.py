@@ -27,7 +27,6 @@ from multiphi_exudyn.events.arrays import (
     FREED,
     GIVEN,
     GIVEN_SPRINGS,
-    IMPULSES,
     KINDS,
     LEVEL,
     LOSSES,
@@ -47,17 +46,14 @@ from multiphi_exudyn.events.arrays import (
     STICKS,
     STRAIN,
     STRIKING,
-    TOUCHING,
     TRANSITIONS_NOW,
-    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear
 from multiphi_exudyn.events.decision import decide
 from multiphi_exudyn.events.energies import lose
-from multiphi_exudyn.events.impact import collide
 from multiphi_exudyn.events.maps import find_level, find_map, move
-from multiphi_exudyn.events.rebounds import rebound
+from multiphi_exudyn.events.rebounds import collide_and_rebound, rebound
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.striking import impact, list_changes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -127,9 +123,8 @@ def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -
         return status
     strikes = 1 if ints[CHANGE_COUNT] > 0 else 0
     ints[CHANGE_COUNT] = 0
-    if rebound(ints, numbers, GIVEN, count) < 0:
-        return FAILED
-    if collide(ints, numbers, GIVEN, ints[TOUCHING], count, 0, ints[WANTED], SLOWED, ints[IMPULSES], LOST_AT_START) < 0:
+    bouncing = rebound(ints, numbers, GIVEN, count)
+    if bouncing < 0 or collide_and_rebound(ints, numbers, GIVEN, count, bouncing, SLOWED, LOST_AT_START) < 0:
         return FAILED
     list_changes(ints, numbers, count)
     return strikes

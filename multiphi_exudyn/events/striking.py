@@ -40,16 +40,15 @@ from multiphi_exudyn.events.arrays import (
     STRIKING,
     STRUCK,
     TOUCHING,
-    WANTED,
     WORKED,
 )
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, is_held, note, transfer
 from multiphi_exudyn.events.energies import kinetic, lose
-from multiphi_exudyn.events.impact import RESTING, collide, speed_size
+from multiphi_exudyn.events.impact import RESTING, speed_size
 from multiphi_exudyn.events.independence import follows, held_links, join
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
-from multiphi_exudyn.events.rebounds import bounce, last_bounce, rebound
+from multiphi_exudyn.events.rebounds import bounce, collide_and_rebound, last_bounce, rebound
 from multiphi_exudyn.events.resting import press, reaction_sign, same_speed, stay_closed
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
@@ -76,10 +75,9 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         return status
     clear(numbers, LOST_IN_IMPACT)
     bouncing = rebound(ints, numbers, RELEASED, count)
-    wanted = ints[WANTED] if bouncing > 0 else -1
     if bouncing < 0:
         return FAILED
-    if collide(ints, numbers, RELEASED, touching, count, 0, wanted, STRUCK, ints[IMPULSES], LOST_IN_IMPACT) < 0:
+    if collide_and_rebound(ints, numbers, RELEASED, count, bouncing, STRUCK, LOST_IN_IMPACT) < 0:
         return FAILED
     if bouncing > 0 and bounce(ints, numbers, count) < 0:
         return FAILED

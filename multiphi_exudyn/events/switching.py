@@ -140,7 +140,7 @@ def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
             opened += 1
     if opened > 0:
         touching = ints[TOUCHING]
-        status = collide(ints, numbers, ENTERED_STATE, touching, opened, 0, -1, STRUCK, ints[IMPULSES], LOST_NOW)
+        status = collide(ints, numbers, ENTERED_STATE, touching, opened, 0, -1, -1, STRUCK, ints[IMPULSES], LOST_NOW)
         if status < 0:
             return status
         if same_speed(ints, numbers, ENTERED_STATE, STRUCK) == 0:

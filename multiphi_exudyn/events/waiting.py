@@ -23,7 +23,6 @@ from multiphi_exudyn.events.arrays import (
     FALLEN,
     FLOW_BASIS,
     FLOW_COUNT,
-    IDLE,
     LANDING,
     LEVEL,
     MODES,
@@ -40,6 +39,7 @@ from multiphi_exudyn.events.arrays import (
     SIGNALS,
     SPEED,
     SWING,
+    UNMOVED,
     WAITING,
     WORK_WAVES,
 )
@@ -65,7 +65,7 @@ def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
     for k in range(ints[level + EXIT_COUNT]):
         exit_, phase = ints[level + EXITS] + k * EXIT_INTS, ints[phases + k]
-        if ints[ints[IDLE] + ints[exit_ + ELEMENT]] == 1:
+        if ints[ints[UNMOVED] + ints[exit_ + ELEMENT]] == 1:
             continue
         if phase in (ARMED, LANDING):
             count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
@@ -95,7 +95,7 @@ def wait_for(
 ) -> int:
     """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
-    A reaction that begins below zero by the round-off of the transition before begins at zero: so it was judged.
+    What begins below zero by round-off, a reaction by that of the transition before, begins at zero: so it was judged.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
@@ -117,7 +117,7 @@ def wait_for(
         begins += sign * (numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i])
     if rate == 0 and entered == 0 and begins < 0.0:
         terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
-        constant -= begins if terms > 0.0 and abs(begins) <= ZERO * (size + terms) else 0.0
+        constant -= begins if abs(begins) <= ZERO * (size + terms) else 0.0
     if sign < 0.0:
         for j in range(p):
             waves[first + j] = -waves[first + j]

@@ -23,21 +23,24 @@ A rigid contact that strikes has an impulse p along h, and q along -h_t, of all 
 
     |q| <= mu p,   h_t.x'+ = v_t where it is smaller,   s (h_t.x'+ - v_t) >= 0 where q = s mu p
 
-mu_s has no part in it. With e = 0 an impact only takes energy. With e > 0 and an impulse that makes a speed along the
-stop, Newton's e beside friction may make some (T. R. Kane): such an impact is refused by name. Where sliding has no
-unique motion the level is refused with its number (levels/sliding.py).
+mu_s has no part in it. With e = 0 an impact only takes energy. With e > 0 where one that touches rubs, g'+ >= -e g'-
+might make some (T. R. Kane). There e is Poisson's: an impact with e = 0, of impulses p, and then one of at least e p,
+g'+ >= 0, again with friction; with one e it takes energy, too. Where sliding has no unique motion the level is refused
+with its number (levels/sliding.py).
 
     normal            friction without a spring    with a spring k_t                     restitution beside friction
     compliant         works                        works                                 refused, as without friction
     viscous           works                        refused: slip ends by N', which has   refused, as without friction
                                                    an acceleration
-    rigid             works                        refused: so has N' of a reaction      works, an impact that would
-                                                                                         make energy is refused
+    rigid             works                        refused: so has N' of a reaction      works, by Poisson's law
     force law         has none: a law is no contact, and has no N
 
 What works does so in runs, steady states, frequency responses, static equilibria, and in the Exudyn body, alone and
 with an interface (there without a moving counter-surface). Where static friction is above the kinetic one, a spring
 that lets go while the pressure falls faster than it relaxes sticks again at once, at mu N.
+
+Sources: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988); Ch. Glocker,
+F. Pfeiffer, Multiple impacts with friction in rigid multibody systems, Nonlinear Dynamics 7 (1995).
 
 A stop 1.35 mm below a beam that bends along +z has h = +e_c and gap = 1.35e-3; a stop above it has
 h = -e_c; two bodies facing each other have one coefficient each.

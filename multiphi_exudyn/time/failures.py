@@ -38,7 +38,7 @@ def failure(arrays: LevelArrays) -> NumericalFailure:
         a.UNSETTLED: "no forces were found that agree with what moves: round-off decides which contacts push, or "
         "friction is so high that they are not unique, need a smaller coefficient",
         a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
-        a.GAINING: f"rigid contacts {names}: an impact with restitution and friction would make energy, need one "
-        "of them alone",
+        a.GAINING: f"rigid contacts {names}: an impact with friction and several restitutions would make energy, "
+        "need one restitution",
     }
     return NumericalFailure(sentences[int(ints[a.CAUSE])])

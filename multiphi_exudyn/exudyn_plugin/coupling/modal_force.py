@@ -126,7 +126,7 @@ class HeldForces:
         """Along which directions impacts go, and which elements nothing lets move."""
         ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         units = self._units if inertia is None else inertia.directions(self._units)
-        start, idle = int(ints[a.DIRECTIONS]), int(ints[a.IDLE])
+        start, idle = int(ints[a.DIRECTIONS]), int(ints[a.UNMOVED])
         numbers[start : start + units.size] = units.ravel()
         numbers[a.INDEPENDENCE] = INDEPENDENT if inertia is None else inertia.independence
         ints[idle : idle + ints[a.ELEMENTS]] = 0

@@ -112,17 +112,31 @@ class Instants:
     def _struck(self, y, w, touching, answer):
         """Moreau's impact: p >= 0, speeds u >= 0 (and e times those before), p u = 0, and |q| <= mu p of what rubs.
 
-        By trying every set of contacts that push, and whether each of them that rubs then sticks or slides, and where.
+        Where any rubs with restitution, Poisson's: all without it first, then p >= e times that impulse.
         """
         u = np.array([self._rate(i, y, w) for i in touching])
         if not len(u) or np.min(u) >= -ZERO * self.speed:
             return y
+        back = np.array([self.levels.system.stops[i].restitution for i in touching])
+        rough = any(self._rubs(e, touching) for e in range(len(self.levels.system.sliders)))
+        if not (rough and np.any(back)):
+            return self._pushed(y, w, touching, np.zeros(len(u)), -back * u, answer)[0]
+        y, first = self._pushed(y, w, touching, np.zeros(len(u)), np.zeros(len(u)), answer)
+        return self._pushed(y, w, touching, back * first, np.zeros(len(u)), answer)[0]
+
+    def _pushed(self, y, w, touching, least, wanted, answer):
+        """y after impulses, and those of the contacts that touch: at least ``least``, and ``wanted`` speeds after it.
+
+        By trying every set of contacts that push, and whether each of them that rubs then sticks or slides, and where.
+        """
         best = np.inf, None, None
-        for count in range(1, len(touching) + 1):
+        for count in range(len(touching) + 1):
             for pushed in itertools.combinations(touching, count):
-                rough = [e for e in range(len(self.levels.system.sliders)) if self._rubs(e, pushed)]
+                loaded = [i for i, p in zip(touching, least, strict=True) if i in pushed or p > 0]
+                rough = [e for e in range(len(self.levels.system.sliders)) if self._rubs(e, loaded)]
                 for slides in itertools.product(("stick", *SIGNS), repeat=len(rough)):
-                    violation, rows, p = self._impulses(y, w, touching, pushed, dict(zip(rough, slides, strict=True)))
+                    given = y, w, touching, pushed, dict(zip(rough, slides, strict=True)), least, wanted
+                    violation, rows, p = self._impulses(*given)
                     if violation < 0.1 * best[0]:
                         best = max(violation, ZERO / 10), rows, p
         if best[0] > 1e-8:
@@ -132,28 +146,31 @@ class Instants:
         for i, p in zip(touching, best[2][: len(touching)], strict=True):
             answer.impact -= 0.5 * p * (self._rate(i, before, w) + self._rate(i, y, w))
             y[2 * self.n + i] += p
-        return y
+        return y, best[2][: len(touching)]
 
     def _rubs(self, e, contacts):
         """Whether one of these rigid contacts rubs with the slider, which bears an impulse then."""
         return self.levels.system.sliders[e].contact in contacts and self.levels.sliding.rigid(e)
 
-    def _impulses(self, y, w, touching, pushed, slides):
+    def _impulses(self, y, w, touching, pushed, slides, least, wanted):
         """By how much an impact violates its law, of the scene's speed; rows, and impulses along them.
 
-        pushed: the contacts that push. slides: of their sliders. Rows are those of all that touch, then the sliders'.
+        pushed: the contacts that push with more than their least. slides: of the sliders of those with an impulse. Rows
+        are those of all that touch, then the sliders'.
         """
-        sliders, stops = self.levels.system.sliders, self.levels.system.stops
+        sliders = self.levels.system.sliders
         if not self._independent(pushed):
             return np.inf, None, None
         rows = np.array([self.rows[i] for i in touching] + [sliders[e].row for e in slides])
         speeds = np.array([self._rate(i, y, w) for i in touching] + [self._passing(e, y, w) for e in slides])
-        wanted = -speeds * [*(stops[i].restitution for i in touching), *(0.0 for _ in slides)]
+        wanted = np.append(wanted, np.zeros(len(slides)))
         flexibility, matrix = rows @ self.inverse @ rows.T, np.eye(len(rows))
         asked = np.zeros(len(rows))
         for k, i in enumerate(touching):
             if i in pushed:
                 matrix[k], asked[k] = flexibility[k], wanted[k] - speeds[k]
+            else:
+                asked[k] = least[k]
         for k, (e, state) in enumerate(slides.items(), start=len(touching)):
             if state == "stick":
                 matrix[k], asked[k] = flexibility[k], -speeds[k]
@@ -163,7 +180,7 @@ class Instants:
             return np.inf, None, None
         p = np.linalg.solve(matrix, asked)
         after, size, count = speeds + flexibility @ p, np.max(np.diag(flexibility)), len(touching)
-        wrong = [np.max(-p[:count]) * size, np.max(wanted - after, where=np.arange(len(p)) < count, initial=0.0)]
+        wrong = [np.max(least - p[:count]) * size, np.max(wanted - after, where=np.arange(len(p)) < count, initial=0.0)]
         for k, (e, state) in enumerate(slides.items(), start=count):
             limit = sliders[e].limit * p[touching.index(sliders[e].contact)]
             wrong.append((abs(p[k]) - limit) * size if state == "stick" else -SIGNS[state] * after[k])
