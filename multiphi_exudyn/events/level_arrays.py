@@ -58,6 +58,7 @@ class LevelArrays:
         self.room = ROOM
         self._count = 0  # of levels packed so far
         self._exits = ExitTable(levels.model.contacts)
+        self._memory = np.empty(0, complex)
         self._weighed: int = 0  # size of the buffers when others were last looked at
         self.channels = ChannelArrays(levels)
         self.forget()
@@ -73,6 +74,12 @@ class LevelArrays:
         self.channels.reserve_until(self.buffers, piece)
         self.owner = None
         return self.buffers.all
+
+    def memory(self, count: int) -> np.ndarray:
+        """Waves (count, or more) for questions, the same ones each time."""
+        if len(self._memory) < count:
+            self._memory = np.empty(count, complex)
+        return self._memory
 
     @property
     def full(self) -> bool:
