@@ -451,7 +451,15 @@ from multiphi_exudyn.mathematics import compiled
 print(*sorted(one.function.__name__ for one in compiled._entries))
 """
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert names == ["advance", "integrate_works", "measure", "sample_rows", "sample_states", "step_is_clear"]
+    assert names == [
+        "advance",
+        "integrate_works",
+        "measure",
+        "sample_rows",
+        "sample_squares",
+        "sample_states",
+        "step_is_clear",
+    ]
 
 
 def test_the_command_line_fails_where_nothing_is_kept(monkeypatch, capsys, tmp_path):

@@ -58,6 +58,7 @@ class LevelArrays:
         self.room = ROOM
         self._count = 0  # of levels packed so far
         self._exits = ExitTable(levels.model.contacts)
+        self._memory = np.empty(0, complex)
         self._weighed: int = 0  # size of the buffers when others were last looked at
         self.channels = ChannelArrays(levels)
         self.forget()
@@ -73,6 +74,12 @@ class LevelArrays:
         self.channels.reserve_until(self.buffers, piece)
         self.owner = None
         return self.buffers.all
+
+    def memory(self, count: int) -> np.ndarray:
+        """Waves (count, or more) for questions, the same ones each time."""
+        if len(self._memory) < count:
+            self._memory = np.empty(count, complex)
+        return self._memory
 
     @property
     def full(self) -> bool:
@@ -136,10 +143,17 @@ class LevelArrays:
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
-    def set_start(self, displacement: np.ndarray, velocity: np.ndarray, key: Sequence[int], held: np.ndarray) -> None:
+    def set_start(
+        self,
+        displacement: np.ndarray,
+        velocity: np.ndarray,
+        key: Sequence[int],
+        held: np.ndarray,
+        sprung: Sequence[int],
+    ) -> None:
         """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
 
-        held: places (h,) that links hold.
+        held: places (h,) that links hold. sprung: links that hold by their springs.
         """
         self._base = self._base or self._add_base()
         ints, numbers, _ = self.buffers.all
@@ -155,13 +169,12 @@ class LevelArrays:
                 numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
             if len(held):
                 numbers[start + m + q : start + m + q + len(held)] = placed
-        if any(key):
-            numbers[a.GIVEN_SPRINGS] = self._springs(key)
+        numbers[a.GIVEN_SPRINGS] = self._springs(sprung) if sprung else 0.0
 
-    def _springs(self, key: Sequence[int]) -> float:
-        """Strain energy [J] that the links have in the place of GIVEN which hold in these states."""
+    def _springs(self, sprung: Sequence[int]) -> float:
+        """Strain energy [J] that these links have in the place of GIVEN."""
         base, ints, n = self.levels.model.base, self.ints, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
-        links = [k for k in self.levels.model.links_held(key) if np.isfinite(base.stiffnesses[k])]
+        links = [k for k in sprung if np.isfinite(base.stiffnesses[k])]
         rows = self.numbers[ints[self._base + a.GAPS] :][: len(base.links) * (n + 1)].reshape(-1, n + 1)[links]
         gaps = rows[:, :-1] @ self.numbers[ints[a.GIVEN + a.PLACE] :][:n] + rows[:, -1]
         return 0.5 * float(base.stiffnesses[links] @ (gaps * gaps))

@@ -235,7 +235,7 @@ class Motion:
         arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
-            arrays.set_start(start.displacement, start.velocity, start.states, start.held)
+            arrays.set_start(start.displacement, start.velocity, start.states, start.held, start.penetrating)
         else:
             phases = [NUMBERS[phase] for phase in state.phases]
             arrays.set_state(level, state.displacement, state.velocity, phases, self._measured)

@@ -128,8 +128,7 @@ class Recorded(Made[Segment], Segments):
     @functools.cached_property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        damping, varying, friction = self._record.works().tolist()
-        return damping, varying + float(np.sum(self._record.spans[:, 4])), friction
+        return self._record.works()
 
 
 class Events(Made[Event]):
@@ -142,7 +141,8 @@ class Events(Made[Event]):
     @property
     def loss(self) -> Loss:
         """The energies [J] that left at all of them."""
-        return Loss(*self._record.amounts[:, 1:-1].sum(axis=0).tolist())
+        amounts = self._record.amounts
+        return Loss(*np.ones(len(amounts)).dot(amounts)[1:-1].tolist())
 
     def impulse(self, contact: str, first: float, last: float) -> float:
         """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
@@ -316,18 +316,18 @@ class Record:
             total += found
         return total
 
-    def works(self) -> np.ndarray:
-        """Work [J] (3,) of damping, of what varies and of friction in all segments, less what jumps at their starts."""
-        works = np.zeros((len(self.rows), 3))
+    def works(self) -> tuple[float, float, float]:
+        """Work [J] of damping, of what varies and of friction in all segments, and of what jumps at their starts."""
+        total = np.zeros(3)
         for offsets in self._packed(list(range(len(self.levels)))):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_powers(level)
-            scratch = self._scratch()
-            while self._supply(works_of(*self._given(offsets), len(works), scratch, works.ravel())):
-                scratch = self._scratch()
-        total: np.ndarray = works.sum(axis=0)
-        total[2] -= self._followed()
-        return total
+            works = np.zeros(3)
+            while self._supply(works_of(*self._given(offsets), len(self.rows), self._work_memory(), works)):
+                works[:] = 0.0
+            total += works
+        damping, varying, friction = total.tolist()
+        return damping, varying, friction - self._followed()
 
     def _followed(self) -> float:
         """What springs have taken up [J] in all segments in which their stretch goes with the force of a link."""
@@ -339,11 +339,11 @@ class Record:
                 total += sign * 0.5 * float(np.sum((x @ given[number][:, :-1].T + given[number][:, -1]) ** 2))
         return total
 
-    def _scratch(self) -> np.ndarray:
+    def _work_memory(self) -> np.ndarray:
         """Memory for the work of a segment."""
         pairs = sum(any(state.rubs for state in contact.states) for contact in self._contacts)
         room, q = self.arrays.scratch, int(self.arrays.ints[a.CHANNELS])
-        return np.empty(work_waves(room.coordinates, room.exponentials, q, pairs), complex)
+        return self.arrays.memory(work_waves(room.coordinates, room.exponentials, q, pairs))
 
     def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
         """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""

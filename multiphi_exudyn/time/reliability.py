@@ -72,10 +72,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if 0 < known.fastest * trajectory.t_end < HARDLY:
         found[:0] = _slow(trajectory, known.fastest)
     if not known.whole:
-        samples = Samples(segments, trajectory.t_end)
         found += known.static
-        found += _lost_energy(trajectory, segments, samples)
-        found += _truncation(trajectory, samples, tolerance)
+        found += _left_out(trajectory, segments, tolerance)
     found += known.clusters
     if model.validity is not None:
         found += model.validity(trajectory)
@@ -236,17 +234,23 @@ def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> 
     return f" (on {k[most]:g} N/m these modes swing at up to {swinging[most]:.3g} Hz, where others would as well)"
 
 
-def _lost_energy(trajectory: Trajectory, segments: Segments, samples: Samples) -> Iterator[str]:
-    """Of the energy that truncation took, whatever its sign at an instant."""
+def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance | None) -> list[str]:
+    """Of the energy that truncation took, whatever its sign at an instant, and of the motion that it did."""
+    samples, found = Samples(segments, trajectory.t_end), list[str]()
     at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
     at_events = segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost = abs(at_start) + at_events
-    if lost == 0 or lost <= ENERGY_SHARE * abs(given := trajectory.initial_energy):
-        return
-    alone = _left_alone(trajectory, segments)
-    yield from _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
+    lost, defects = abs(at_start) + at_events, total_defect(trajectory)
+    if lost > 0 and lost > ENERGY_SHARE * abs(given := trajectory.initial_energy):
+        alone = _left_alone(trajectory, segments)
+        found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
+    if defects != 0:
+        y, size = trajectory.start.displacement, math.sqrt(defects)
+        least = min(INDICATOR, tolerance.error if tolerance else INDICATOR)
+        if not samples.amplitude_exceeds(size / least, math.sqrt(y.dot(y)) - size):
+            found += _truncation(trajectory, indicator(defects, samples), tolerance)
+    return found
 
 
 def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
@@ -262,13 +266,8 @@ def _energy_warning(lost: float, largest: float) -> Iterator[str]:
         yield f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}"
 
 
-def _truncation(trajectory: Trajectory, samples: Samples, tolerance: Tolerance | None) -> Iterator[str]:
+def _truncation(trajectory: Trajectory, error: float, tolerance: Tolerance | None) -> Iterator[str]:
     """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
-    lost, least = total_defect(trajectory), min(INDICATOR, tolerance.error if tolerance else INDICATOR)
-    y, defect = trajectory.start.displacement, math.sqrt(lost)
-    if lost == 0 or samples.amplitude_exceeds(defect / least, math.sqrt(y.dot(y)) - defect):
-        return
-    error = indicator(lost, samples)
     rigid = any(contact.rigid for contact in trajectory.model.contacts)
     rigid = rigid and bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
     if tolerance is not None and error > tolerance.error:

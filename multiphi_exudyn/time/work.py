@@ -76,7 +76,10 @@ def integrate_works(
     scratch: Waves,
     works: Numbers,
 ) -> int:
-    """Work (segments, 3) [J] of damping, what varies and friction; OK or NEED. scratch: ``work_waves`` of them."""
+    """Adds the works (3,) [J] of damping, of what varies with what jumped at the starts, and of friction; OK or NEED.
+
+    scratch: ``work_waves`` of them.
+    """
     largest = 0.0
     for i in range(segments):
         level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
@@ -93,12 +96,11 @@ def integrate_works(
         n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
         place, sums = 0, 4 * n * p + 2 * q * p + 2 * ints[level + RUBBINGS] * p
         exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
-        for part in range(3):
-            works[3 * i + part] = 0.0
+        works[1] += spans[given + 4]
         apart = 0  # terms whose products need no integral
         if ints[level + DISSIPATED] >= 0:
             apart = ints[FLOW_FREE]
-            works[3 * i] = dissipated(ints, numbers, waves, scratch)
+            works[0] += dissipated(ints, numbers, waves, scratch)
         if apart == p and q == 0:
             continue
         list_terms(ints, numbers, waves, scratch, apart if ints[level + RUBBING] < 0 else 0)
@@ -107,9 +109,9 @@ def integrate_works(
         scratch[raised] = 1.0 + 0j
         for d in range(1, 2 * p):
             scratch[raised + d] = scratch[raised + d - 1] * (duration / numbers[ints[ints[FLOW_BASIS] + SCALES]])
-        add_constants(ints, numbers, waves, scratch, works, 3 * i + 1)
+        add_constants(ints, numbers, waves, scratch, works)
         if ints[level + RUBBING] >= 0:
-            add_friction(ints, numbers, waves, scratch, works, 3 * i + 2)
+            add_friction(ints, numbers, waves, scratch, works)
         while place < p:
             other, length = max(place, apart), chain(ints, place)
             while other < p:
@@ -117,7 +119,7 @@ def integrate_works(
                 for mirrored in range(multiply(ints, waves, scratch, apart, place, length, other, further, sums)):
                     integrate(
                         ints, numbers, waves, scratch, place, other, length + further - 1, mirrored, duration, sums,
-                        works, 3 * i,
+                        works,
                     )  # fmt: skip
                 other += further
             place += length
@@ -316,9 +318,8 @@ def integrate(
     duration: float,
     sums: int,
     works: Numbers,
-    result: int,
 ) -> None:
-    """Adds what the products of two chains make of the works (2,), in powers d < ``count`` of t / T.
+    """Adds what the products of two chains make of the works (3,), in powers d < ``count`` of t / T.
 
     I_d = (u^d exp(s t) - d / T I_d-1) / s, u = t / T, upwards while d is below |s t|; the others downwards from
 
@@ -337,7 +338,7 @@ def integrate(
             integral = scratch[raised + d] * end - d / unit * integral
         integral *= inverse
         for part in range(3):
-            works[result + part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
+            works[part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
     if upwards == count:
         return
     term, integral, n = duration / count * scratch[raised + count - 1] * end, 0j, count
@@ -348,13 +349,13 @@ def integrate(
         term *= x * (-1.0 / n)
     for d in range(count - 1, upwards - 1, -1):
         for part in range(3):
-            works[result + part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
+            works[part] += 0.5 * (scratch[first + 2 * p * part + d] * integral).real
         if d > 0:
             integral = (scratch[raised + d] * end - s * integral) * (unit / d)
 
 
 @compiled
-def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers, result: int) -> None:
+def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers) -> None:
     """Adds e_k, and b_k times what is held, times what w_k has changed by to the work of what varies."""
     level, p, q, basis = ints[AFTER + LEVEL], ints[FLOW_COUNT], ints[CHANNELS], ints[FLOW_BASIS]
     n = ints[level + MODES] + q
@@ -365,11 +366,11 @@ def add_constants(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, wo
             constant += numbers[row + n + held] * numbers[ints[AFTER + PLACE] + held]
         for j in range(ints[FLOW_FREE], p):
             began = 1.0 if ints[ints[basis + POWERS] + j] == 0 else 0.0
-            works[result] += constant * (scratch[j * n + n - q + k] * (waves[ints[WORK_WAVES] + j] - began)).real
+            works[1] += constant * (scratch[j * n + n - q + k] * (waves[ints[WORK_WAVES] + j] - began)).real
 
 
 @compiled
-def add_friction(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers, result: int) -> None:
+def add_friction(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, works: Numbers) -> None:
     """Adds the limits times the ways slipped, f times what xi has changed by, and what is constant of T_e likewise."""
     level, row = ints[AFTER + LEVEL], ints[ints[AFTER + LEVEL] + RUBBING]
     n = ints[level + MODES] + ints[CHANNELS]
@@ -386,4 +387,4 @@ def add_friction(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, wor
                 moved += numbers[pair + 3 * n + i] * scratch[j * n + i]
             pushed += constant * moved
         began = 1.0 if ints[ints[ints[FLOW_BASIS] + POWERS] + j] == 0 else 0.0
-        works[result] += (pushed * (waves[ints[WORK_WAVES] + j] - began)).real
+        works[2] += (pushed * (waves[ints[WORK_WAVES] + j] - began)).real

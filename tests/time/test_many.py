@@ -103,8 +103,7 @@ class TestARunThatFails:
         assert "NaN" in found.messages[3]
         assert np.all(np.isnan(found.samples[[1, 3]]))
         assert np.all(np.isfinite(found.samples[[0, 2, 4]]))
-        monkeypatch.setattr("multiphi_exudyn.time.motion.limits", lambda model: (200, 1e-3))
-        monkeypatch.setattr("multiphi_exudyn.time.motion.window", lambda model: 2)
+        monkeypatch.setattr("multiphi_exudyn.time.motion.limits", lambda model: (2, 1e-3))
         found = mp.simulate_many(model("all"), END, x[:1], points=["m5"], times=TIMES)
         assert found.status == ("failed",)
         assert "chatter" in found.messages[0]
