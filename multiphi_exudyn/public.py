@@ -29,7 +29,8 @@ from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sampled, Smooth, Sweep
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
-from multiphi_exudyn.steady.steady_state import SteadyState, steady_state
+from multiphi_exudyn.steady.settled_state import SteadyState
+from multiphi_exudyn.steady.steady_state import steady_state
 from multiphi_exudyn.time.balance import Ledger
 from multiphi_exudyn.time.many import ManyRuns, simulate_many
 from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory

@@ -13,13 +13,13 @@ A command's own module is loaded when the command is run, so that ``--help`` ans
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from multiphi_exudyn.cli.options import animate_options, scene_options, stability_options, study_options
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.version import __version__
 
@@ -106,7 +106,7 @@ def parser() -> argparse.ArgumentParser:
         "Writes report.html, summary.json and histories.npz.",
         "compare paper-rig --t-end 0.5 --modes 12 --out rig",
     )
-    _scene_options(compare, "for the models to which the scene gives none of their own")
+    scene_options(compare, "for the models to which the scene gives none of their own")
     animate = add(
         "animate",
         _animate,
@@ -114,7 +114,7 @@ def parser() -> argparse.ArgumentParser:
         "",
         "animate paper-rig --t-end 0.3 --slow 40",
     )
-    _animate_options(animate)
+    animate_options(animate)
     budget = add(
         "budget",
         _budget,
@@ -122,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
         "Writes budget.json and budget.png.",
         "budget paper-rig --t-end 0.3",
     )
-    _scene_options(budget, "of the truncated models")
+    scene_options(budget, "of the truncated models")
     needs = add(
         "needs",
         _needs,
@@ -138,7 +138,7 @@ def parser() -> argparse.ArgumentParser:
         "Writes report.html and runs.csv; runs.sqlite keeps every run: a second call does only what is missing.",
         "study pareto --quick",
     )
-    _study_options(study)
+    study_options(study)
     stability = add(
         "stability",
         _stability,
@@ -146,7 +146,7 @@ def parser() -> argparse.ArgumentParser:
         "",
         "stability --quick",
     )
-    _stability_options(stability)
+    stability_options(stability)
     new = add(
         "new",
         _new,
@@ -183,76 +183,6 @@ def parser() -> argparse.ArgumentParser:
     add("scenes", _scenes, "list the shipped scenes, which compare, animate, budget and needs take", "", "scenes")
     add("studies", _studies, "list the shipped studies, which study takes", "", "studies")
     return whole
-
-
-def _scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
-    _scene_option(parser)
-    parser.add_argument("--modes", type=_count, metavar="R", help=f"number of modes {whose} (default: the scene's)")
-    _folder_option(parser, "SCENE")
-
-
-def _animate_options(parser: argparse.ArgumentParser) -> None:
-    _scene_option(parser)
-    parser.add_argument("--model", metavar="NAME", help="the reduced model (default: the scene's first)")
-    parser.add_argument("--reference", metavar="NAME", help="what it is shown beside (default: the scene's reference)")
-    parser.add_argument(
-        "--slow", type=_factor, metavar="FACTOR", help="slow motion factor (default: chosen from the duration)"
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.gif", help="the animation (default: multiphi-SCENE/animation.gif)"
-    )
-
-
-def _scene_option(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", metavar="SCENE", help="a shipped scene (see: scenes) or a TOML file")
-    parser.add_argument("--t-end", type=_time, metavar="S", help="end of the run [s] (default: the scene's)")
-
-
-def _study_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("study", metavar="STUDY", help="a shipped study (see: studies) or a TOML file")
-    parser.add_argument("--quick", action="store_true", help="the short form of the study")
-    parser.add_argument(
-        "--on",
-        metavar="WHERE",
-        default="processes",
-        help="where runs are made: processes (default), serial, or a Dask scheduler's address tcp://host:port",
-    )
-    parser.add_argument("--workers", type=_count, metavar="N", help="number of processes (default: one per core)")
-    _folder_option(parser, "STUDY")
-
-
-def _stability_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--case", metavar="NAME", help="this case alone (default: all)")
-    parser.add_argument("--quick", action="store_true", help="fewer cases, shorter ones")
-    _folder_option(parser, "stability")
-
-
-def _folder_option(parser: argparse.ArgumentParser, default: str) -> None:
-    parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder of the results (default: multiphi-{default})")
-
-
-def _time(text: str) -> float:
-    return _positive(text, "a time > 0 in s")
-
-
-def _factor(text: str) -> float:
-    return _positive(text, "a factor > 0")
-
-
-def _positive(text: str, need: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"got {text!r}, need {need}")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"got {text!r}, need a whole number >= 1")
-    return int(text)
 
 
 def _compare(given: argparse.Namespace) -> bool:

@@ -12,7 +12,7 @@ import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Matrix", "is_real", "one_of", "real_array"]
+__all__ = ["Matrix", "is_real", "no_text", "one_of", "real_array"]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 
@@ -38,6 +38,12 @@ def real_array(name: str, given: Any, needed: str) -> Matrix:
     except (TypeError, ValueError, OverflowError) as error:
         raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need {needed}") from error
     raise MultiPhiTypeError(f"{name}: got {type(given).__name__} of {array.dtype}, need {needed}")
+
+
+def no_text(name: str, given: object) -> None:
+    """Refuses a name where several are needed: it would be taken letter by letter."""
+    if isinstance(given, str):
+        raise MultiPhiTypeError(f"{name}: got {given!r}, need a sequence, as [{given!r}]")
 
 
 def one_of(given: object, known: Iterable[object]) -> str:

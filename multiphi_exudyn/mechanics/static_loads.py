@@ -7,6 +7,7 @@ They belong to the asymptotic configuration of every level, so that they are exa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -69,16 +70,15 @@ class Gravity:
 
     Parameters
     ----------
-    direction : str, mapping or array (n,)
+    direction : array (n,) or mapping
         e (n,): 1 at every translation along gravity, -1 at those against it, 0 at the others; or {point: coefficient}.
-        A point's name alone is e = 1 at that point: its weight, without that of the rest of the structure.
     acceleration : float, default 9.81
         [m/s2].
 
     Raises
     ------
     MultiPhiTypeError
-        For an acceleration that is no number.
+        For a direction that is one point or one number, and an acceleration that is no number.
     MultiPhiValueError
         For an acceleration that is not finite.
 
@@ -92,14 +92,15 @@ class Gravity:
     [-9.81, -9.81, -9.81]
     """
 
-    direction: At
+    direction: Mapping[str, float] | np.ndarray
     acceleration: float = 9.81
 
     def __post_init__(self) -> None:
-        if np.isscalar(self.direction) and not isinstance(self.direction, str):
+        if np.isscalar(self.direction):
             raise MultiPhiTypeError(
                 f"gravity direction: got {self.direction!r}, need a row (n,): 1 at every degree of freedom that is a "
-                "translation along gravity, 0 at the others, as in Gravity(e, 9.81)"
+                "translation along gravity, 0 at the others, as in Gravity(e, 9.81); the weight of a mass at a point "
+                "is ConstantLoad(point, -m * 9.81)"
             )
         check_numbers("gravity", acceleration=self.acceleration)
 

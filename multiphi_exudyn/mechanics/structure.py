@@ -29,6 +29,7 @@ __all__ = ["At", "LinearStructure", "damping_matrix"]
 
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
 
+NAMED = 3  # degrees of freedom that an error names beside the first
 ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating point leaves of a zero
 
 
@@ -215,12 +216,13 @@ def _semidefinite_diagonal(name: str, given: Matrix, held: np.ndarray, moving: n
 
 
 def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | None) -> Matrix:
-    if np.any(mass.diagonal() <= 0):
-        worst = int(np.argmin(mass.diagonal()))
-        of = "" if dofs is None else " ({1} of node {0})".format(*dofs.rows[moving[worst]])
+    without = np.flatnonzero(mass.diagonal() <= 0)
+    if len(without):
+        also = f" and {len(without) - 1} more are 0 or less" if len(without) > 1 else ""
         raise MultiPhiValueError(
-            f"mass: diagonal entry {moving[worst]}{of} is {mass.diagonal()[worst]:g}, need values > 0: give it a small "
-            "mass, hold it (fixed=), or condense it statically before"
+            f"mass: diagonal entry {_entry(moving[without[0]], dofs)} is {mass.diagonal()[without[0]]:g}{also}"
+            f"{_first(moving[without[1:]], dofs)}, need values > 0: hold these (fixed=), give them a small mass, or "
+            "condense them statically before, u = R u_m with R.T @ M @ R and R.T @ K @ R"
         )
     if scipy.sparse.issparse(mass):
         return mass  # a factorisation would cost what the modes cost; they are checked when they are computed
@@ -229,6 +231,16 @@ def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | 
     except scipy.linalg.LinAlgError as error:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
     return mass
+
+
+def _first(rows: np.ndarray, dofs: DofTable | None) -> str:
+    """ " (6 (rx of node 10), 7 (ry of node 10), ...)", the first NAMED of them; nothing of none."""
+    named = [_entry(row, dofs) for row in rows[:NAMED]] + ["..."] * (len(rows) > NAMED)
+    return f" ({', '.join(named)})" if named else ""
+
+
+def _entry(row: int, dofs: DofTable | None) -> str:
+    return str(row) if dofs is None else "{2} ({1} of node {0})".format(*dofs.rows[row], row)
 
 
 def _coefficient(name: str, value: Any) -> float:

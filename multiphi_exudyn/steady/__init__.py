@@ -2,5 +2,5 @@
 
 A frequency response is made of many of them, one after the other.
 
-Order: shooting, steady_state, frequency_response.
+Order: settled_state, shooting, settling, steady_state, frequency_response.
 """

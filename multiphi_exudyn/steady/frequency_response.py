@@ -18,7 +18,8 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.static_loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settled
+from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState
+from multiphi_exudyn.steady.steady_state import at_frequency, settled
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 

@@ -17,6 +17,7 @@ import numpy as np
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.state import Event, total_impulse
+from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.history_figure import history_figure
 from multiphi_exudyn.time.segment import Segment, Segments, listed
@@ -40,6 +41,7 @@ class Histories(Shown, ABC):
     segments: Sequence[Segment]
     events: Sequence[Event]
     t_end: float
+    message: str
 
     @property
     @abstractmethod
@@ -266,6 +268,7 @@ class Histories(Shown, ABC):
 
     def _at_points(self, points: Sequence[str] | None, times: np.ndarray) -> dict[str, Any]:
         """Displacements (k,) [m] of points by name, of all of them for None."""
+        no_text("points", points)
         return {name: self.at(name, times) for name in (self.points if points is None else points)}
 
     def _intervals(self, holds: Callable[[Any], bool]) -> list[tuple[float, float]]:
@@ -327,10 +330,11 @@ class Histories(Shown, ABC):
             raise MultiPhiTypeError(f"t: got {type(t).__name__}, need {needed}") from error
         if times.ndim != 1 or len(times) == 0:
             raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
-        if not self.segments or not np.all((times >= self.t_start) & (times <= self.t_end)):
-            raise MultiPhiValueError(
-                f"t: got {np.min(times):g} to {np.max(times):g} s, need {self.t_start:g} <= t <= {self.t_end:g} s"
-            )
+        if not self.segments:
+            raise MultiPhiValueError(f"t: got a time of a run that has no motion ({self.message}), need one that began")
+        if not np.all((times >= self.t_start) & (times <= self.t_end)):
+            given = " to ".join(f"{t:g}" for t in sorted({np.min(times), np.max(times)}))
+            raise MultiPhiValueError(f"t: got {given} s, need {self.t_start:g} <= t <= {self.t_end:g} s")
         return times
 
     @functools.cached_property

@@ -24,7 +24,7 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance, is_count
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.arguments import no_text, real_array
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.base_share import row_warnings
@@ -148,6 +148,7 @@ def simulate_many(
     from tqdm import tqdm
 
     end, starts = checked_end(model, t_end), _starts(model, displacements, velocities)
+    no_text("points", points)
     wider = holding(model, loads)
     rows = [(isinstance(point, (str, Mapping)), model.structure.row(point)) for point in points]
     outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]

@@ -4,7 +4,8 @@
 
 A FOLDER is what a copy of Exudyn's own repository has as ``main/pythonDev/TestModels`` or ``Examples``. Every script
 runs in a process of its own, without windows, and ends after the comparison. NRMSE = |q_reduced - q| / |q - q_0| over
-all coordinates and instants of the run, of ``reduce(mbs)`` as it is called without further arguments. Verdicts:
+all coordinates and instants of the run, of ``reduce(mbs)`` as it is called without further arguments; a run of more
+than LONGEST steps of Exudyn's ends after so many. Beside it stands what the check of the linear range found. Verdicts:
 
     agrees     at most 1 %, without a warning      warned      a warning, whatever the error
     WRONG      more than 1 %, without a warning    refused     by an error of multiphi_exudyn, or no end of the run
@@ -35,8 +36,9 @@ import numpy as np
 
 AGREEMENT = 0.01
 SAMPLES = 200  # of a run
-FIELDS = ("script", "verdict", "error", "named", "told")
+FIELDS = ("script", "verdict", "error", "checked", "named", "told")
 NO_RUN = "no run"
+LONGEST = 5_000_000  # steps of a run of Exudyn: a minute of a small system
 FINER = (8, 64)  # times as many steps, where an error may be that of Exudyn's own run
 RENAMED = {"bodyOrNodeList": "itemNumbers", "bodyList": "bodyNumbers"}
 SHAPES = ("Rectangle", "OrthoCubePoint", "OrthoCubeLines", "CheckerBoard", "Cylinder", "Sphere", "Basis")
@@ -50,7 +52,7 @@ def main(arguments: list[str]) -> int:
         if given.only and script.stem not in given.only:
             continue
         rows.append({"script": script.stem, **_judged(script, given.seconds)})
-        print("{script:42} {verdict:10} {error:>9} {told}".format(**rows[-1])[:200], flush=True)
+        print("{script:42} {verdict:10} {error:>9} {checked:>18} {told}".format(**rows[-1])[:200], flush=True)
     if given.out:
         with Path(given.out).open("w", newline="") as file:
             table = csv.DictWriter(file, FIELDS)
@@ -81,7 +83,7 @@ def _judged(script: Path, seconds: float) -> dict[str, str]:
             told = f"not done within {seconds:g} s"
         if found.exists():
             return dict(json.loads(found.read_text()))
-    return {"verdict": NO_RUN, "error": "", "named": "", "told": told}
+    return {"verdict": NO_RUN, "error": "", "checked": "", "named": "", "told": told}
 
 
 # ---------------------------------------------------------------------- in the process of one script
@@ -178,17 +180,21 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     data.SetSystemState(data.GetSystemState(kinds.Initial), kinds.Current)
     start = data.GetODE2Coordinates()
     integration = settings.timeIntegration
-    began, until = integration.startTime, integration.endTime
+    began = integration.startTime
+    part = min(1.0, LONGEST / integration.numberOfSteps)
+    integration.numberOfSteps = round(part * integration.numberOfSteps)
+    integration.endTime = began + part * (integration.endTime - began)
     data.SetTime(began, kinds.Current)
     try:
-        shown, trajectory = _reduced(mbs, until - began)
+        shown, trajectory, checked = _reduced(mbs, integration.endTime - began)
     except MultiPhiError as refusal:
         return _verdict("refused", "", mbs, str(refusal))
     except Exception as failure:
         return _verdict("exception", "", mbs, f"{type(failure).__name__}: {failure}")
     if trajectory.status != "ok":
         return _verdict("refused", "", mbs, f"{trajectory.status}: {trajectory.message}")
-    told = "; ".join(trajectory.warnings)
+    told = "".join(f"{sentence}; " for sentence in trajectory.warnings)
+    told += f"of its run {part:.2g}; " if part < 1 else ""
     try:
         error = _error(settings, solve, start, shown, trajectory)
         for finer in () if trajectory.warnings else FINER:  # is it the error of Exudyn's own steps?
@@ -199,7 +205,7 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     except Exception as failure:  # whatever the script's own run raises
         return _verdict(NO_RUN, "", mbs, f"{type(failure).__name__}: {failure}")
     verdict = "warned" if trajectory.warnings else "agrees" if error <= AGREEMENT else "WRONG"
-    return _verdict(verdict, f"{error:.2g}", mbs, told)
+    return _verdict(verdict, f"{error:.2g}", mbs, told, checked)
 
 
 def _error(settings: Any, solve: Any, start: np.ndarray, shown: np.ndarray, trajectory: Any) -> float:
@@ -211,14 +217,15 @@ def _error(settings: Any, solve: Any, start: np.ndarray, shown: np.ndarray, traj
     return float(np.linalg.norm(away)) / size if size else float(np.any(away))
 
 
-def _reduced(mbs: Any, t_end: float) -> tuple[np.ndarray, Any]:
-    """S (n_full, n) and the reduced run of ``t_end`` [s]."""
+def _reduced(mbs: Any, t_end: float) -> tuple[np.ndarray, Any, str]:
+    """S (n_full, n), the reduced run of ``t_end`` [s], error and lag that its check found."""
     import multiphi_exudyn as mp
     from multiphi_exudyn.exudyn_plugin import reduce
 
     found = reduce(mbs)
     run = mp.simulate(found.model, t_end, velocity=found.velocity, loads=found.loads)
-    return found.structure.coordinates, run
+    check = found.check(run) if run.status == "ok" else None
+    return found.structure.coordinates, run, f"{check.error:.2g}, {check.lag:.2g} rad" if check else ""
 
 
 def _own_run(settings: Any, solve: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -238,8 +245,9 @@ def _own_run(settings: Any, solve: Any, count: int) -> tuple[np.ndarray, np.ndar
     return table[:, 0], table[:, 1 : 1 + count]
 
 
-def _verdict(verdict: str, error: str, mbs: Any, told: str) -> dict[str, str]:
-    return {"verdict": verdict, "error": error, "named": str(_names_an_item(mbs, told)), "told": " ".join(told.split())}
+def _verdict(verdict: str, error: str, mbs: Any, told: str, checked: str = "") -> dict[str, str]:
+    named = str(_names_an_item(mbs, told))
+    return {"verdict": verdict, "error": error, "checked": checked, "named": named, "told": " ".join(told.split())}
 
 
 def _names_an_item(mbs: Any, told: str) -> bool:

@@ -385,7 +385,7 @@ def closed_at(model, start):
     return round((begin + end) / 2, 4)
 
 
-def test_a_run_that_ended_closed_can_be_repeated_and_continued():
+def test_a_run_that_ended_closed_can_be_repeated_and_continued(refused):
     model, start = rig(COMPLIANT)
     half = closed_at(model, start)
     whole = run(model, 5e-5, 2 * half, displacement=start, matchedStepSize=5e-5)
@@ -395,6 +395,8 @@ def test_a_run_that_ended_closed_can_be_repeated_and_continued():
     chosen = settings(5e-5, half)
     mbs.SolveDynamic(chosen, solverType=TRAPEZOIDAL)
     first = body_histories(mbs, items)
+    refused(TypeError, "items: got 'beam', need the dict", body_histories, mbs, "beam")
+    refused(TypeError, "points: got 'node3', need a sequence", body_histories, mbs, items, "node3")
     assert first.closed["support"][-1]
     mbs.SolveDynamic(chosen, solverType=TRAPEZOIDAL, updateInitialValues=True)
     again = body_histories(mbs, items)

@@ -331,7 +331,7 @@ def test_a_linear_system_has_no_limits():
 
 
 def test_a_slender_beam_that_bends_is_not_said_to_be_stretched():
-    """A cantilever's tip moves by 2 % of its length: far less than its axial forces would have it, were it straight."""
+    """A cantilever's tip moves by 1 % of its length: far less than its axial forces would have it, were it straight."""
     _, mbs = new_system()
     nodes = [
         mbs.AddNode(eii.NodePoint2DSlope1(referenceCoordinates=[x, 0.0, 1.0, 0.0])) for x in np.linspace(0.0, 1.0, 5)
@@ -352,7 +352,7 @@ def test_a_slender_beam_that_bends_is_not_said_to_be_stretched():
         mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=[ground, held]))
     tip = mbs.AddMarker(eii.MarkerNodePosition(name="tip", nodeNumber=nodes[-1]))
     push = mbs.AddLoad(eii.LoadForceVector(markerNumber=tip, loadVector=[0.0, 0.03, 0.0]))
-    for force, holds in ((0.03, True), (3.0, False)):
+    for force, holds in ((0.02, True), (3.0, False)):
         mbs.SetLoadParameter(push, "loadVector", [0.0, force, 0.0])
         mbs.Assemble()
         reduction = reduce(mbs, modes="all")

@@ -11,6 +11,7 @@ from test_reduce import Mass
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+from multiphi_exudyn.exudyn_plugin.convert.moved import moved_directions
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -34,27 +35,116 @@ def off(system, reduction, trajectory, end=END, step=1e-4):
     return np.max(np.abs(found - theirs)) / np.max(np.abs(theirs))
 
 
-def compressed(aside=0.0, sideways=0.0):
-    """1.6 kg on a spring that is pressed by 8 cm, in space: unstable sideways, where a push may act or a speed be."""
+def compressed(aside=0.0, sideways=0.0, load=80.0):
+    """1.6 kg on a spring that is pressed by 8 cm, in space: unstable sideways, where a push may act or a speed be.
+
+    The load pulls the spring to 2 cm, in whose tension the mass is stable; without it the spring stays pressed as long
+    as it is."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     start = {"initialDisplacement": [-0.08, 0.0, 0.0], "initialVelocity": [1.0, sideways, 0.0]}
     mass = mbs.CreateMassPoint(name="mass", referencePosition=[0.5, 0.0, 0.0], mass=1.6, **start)
     mbs.CreateSpringDamper(itemNumbers=[mbs.CreateGround(), mass], stiffness=4000.0, damping=8.0)
-    mbs.CreateForce(itemNumber=mass, loadVector=[80.0, 0.0, aside])
+    mbs.CreateForce(itemNumber=mass, loadVector=[load, 0.0, aside])
     mbs.AddMarker(eii.MarkerNodeCoordinate(name="m1", nodeNumber=0, coordinate=0))
     mbs.Assemble()
     return PublishedSystem(container, mbs, "m1", END, 1e-4)
 
 
-def test_an_unstable_direction_in_which_nothing_moves_is_held_and_told():
+def test_directions_in_which_nothing_moves_are_left_out():
     system = compressed()
     reduction = reduce(system.mbs)
     trajectory = simulated(reduction)
-    (told,) = trajectory.warnings
-    assert told.startswith("left out: MainSystem 'mbs': an unstable direction (omega^2 = -464 1/s2), mainly of coord")
+    ((item, said),) = reduction.left_out
+    assert item.type == "MainSystem"
+    assert said.startswith("directions in which nothing moves it, one of them unstable (omega^2 = -464 1/s2), mainly")
     assert reduction.structure.n == 1
+    assert trajectory.warnings == ()
     assert off(system, reduction, trajectory) < 1e-3
+    with pytest.raises(mp.MultiPhiValueError, match="need strict=False"):
+        reduce(system.mbs, strict=True)
+
+
+def test_directions_that_are_unstable_in_the_mean_of_the_motion_are_told():
+    system = compressed(load=-320.0)
+    reduction = reduce(system.mbs)
+    trajectory = simulated(reduction)
+    (told,) = trajectory.warnings
+    assert told.startswith("left out: MainSystem 'mbs': directions in which nothing moves it, one of them unstable")
+    # pressed by 8 cm on average, to 42 cm: k (1 - 50 / 42) / m
+    assert reduction.check(trajectory).softest == pytest.approx(4000 * (1 - 50 / 42) / 1.6, rel=0.05)
+    assert off(system, reduction, trajectory) < 1e-3
+
+
+def spinning(about=(30.0, 0.0, 0.0), bent=0.0):
+    """A ball of 1 kg m2 that spins about x against a torsional spring: gyroscopic forces about y and z.
+
+    bent: a force [N] in z for each rad about x, which the linearisation has, or each rad2, which it does not."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    node = mbs.AddNode(eii.NodeRigidBodyRxyz(initialVelocities=[0.0, 0.0, 0.0, *about]))
+    ball = mbs.AddObject(eii.ObjectRigidBody(name="ball", mass=1.0, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=node))
+    ends = [
+        mbs.AddMarker(eii.MarkerBodyRigid(bodyNumber=body, localPosition=[0.0] * 3))
+        for body in (mbs.AddObject(eii.ObjectGround()), ball)
+    ]
+
+    def force(mbs, t, i, u, turned, v, w, stiffness, damping, rotation0, rotation1, offset):
+        return [*(1e3 * np.array(u) + [0, 0, bent * turned[0] ** 2]), *(5e3 * np.array(turned))]
+
+    law = {"stiffness": np.diag([1e3] * 3 + [5e3] * 3), "springForceTorqueUserFunction": force if bent else 0}
+    mbs.AddObject(eii.ObjectConnectorRigidBodySpringDamper(name="spring", markerNumbers=ends, **law))
+    mbs.AddMarker(eii.MarkerNodeCoordinate(name="m1", nodeNumber=node, coordinate=3))
+    mbs.Assemble()
+    return PublishedSystem(container, mbs, "m1", END, 1e-4)
+
+
+def test_gyroscopic_forces_in_directions_in_which_nothing_moves_are_left_out():
+    system = spinning()
+    reduction = reduce(system.mbs)
+    trajectory = simulated(reduction)
+    ((_, said),) = reduction.left_out
+    assert said.startswith("directions in which nothing moves it, with them its ")
+    assert "matrix is not symmetric between coordinate 4 of node" in said
+    assert reduction.structure.n == 1
+    assert trajectory.warnings == ()
+    assert off(system, reduction, trajectory) < 1e-3
+
+
+@pytest.mark.parametrize(("pushed", "count"), [([0], 1), ([0, 2], 2), ([3], 2), ([1], 1)])
+def test_the_directions_that_pushes_reach_are_found_in_any_coordinates(pushed, count):
+    """Of a free, an unstable, a stiff and two coupled directions; what round-off carries elsewhere is nothing."""
+    turned = np.linalg.qr(np.random.default_rng(7).normal(size=(5, 5)))[0]
+    stiffness = np.diag([0.0, -3.0, 1e6, 4.0, 5.0])
+    stiffness[3, 4] = stiffness[4, 3] = 1.0
+    given = (turned @ matrix @ turned.T for matrix in (np.diag([1.0, 2.0, 1.0, 3.0, 1.0]), stiffness, 0 * stiffness))
+    mass, stiffness, damping = given
+    kept, others = moved_directions(mass, stiffness, damping, np.eye(5)[pushed] @ turned.T)
+    assert kept.shape == (5, count)
+    assert kept.T @ mass @ others == pytest.approx(np.zeros((count, 5 - count)), abs=1e-8)
+    assert kept.T @ stiffness @ others == pytest.approx(np.zeros((count, 5 - count)), abs=1e-3)  # of 1e6
+    assert others.T @ mass @ others == pytest.approx(np.eye(5 - count), abs=1e-12)
+
+
+def test_where_every_direction_is_moved_the_search_ends():
+    random = np.random.default_rng(3)
+    shapes = np.linalg.qr(random.normal(size=(80, 80)))[0]
+    stiffness, damping = ((shapes * np.geomspace(1.0, size, 80)) @ shapes.T for size in (1e10, 1e3))
+    damping += random.normal(size=(80, 80))
+    assert moved_directions(np.eye(80), stiffness, damping, random.normal(size=(3, 80))) is None
+    assert moved_directions(np.eye(80), stiffness, damping, np.zeros((3, 80))) is None
+
+
+def test_a_spin_about_every_axis_is_refused_with_the_items():
+    with pytest.raises(mp.MultiPhiValueError, match=r"not symmetric .* ObjectRigidBody 'ball'.*; need a symmetric one"):
+        reduce(spinning(about=(30.0, 20.0, 0.0)).mbs)
+
+
+def test_a_push_out_of_the_directions_that_were_moved_at_first_is_told():
+    reduction = reduce(spinning(bent=1e4).mbs)
+    told = simulated(reduction).warnings
+    assert reduction.structure.n == 1
+    assert any(said.startswith("linear range: left by") for said in told)
 
 
 @pytest.mark.parametrize("pushed", [{"aside": 1e-3}, {"sideways": 1e-3}])
@@ -155,6 +245,23 @@ def test_negative_damping_that_is_round_off_is_none_and_more_is_refused():
         reduce(mbs)
 
 
+def test_damping_of_a_zero_frequency_mode_that_is_round_off_is_none():
+    """A rotor spins freely; differentiating its dampers leaves 1e-17 of them there, and more between it and others."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    zero = {"referenceCoordinates": [0.0, 0.0], "initialCoordinates": [0.0, 0.0], "initialCoordinates_t": [1.0, 0.0]}
+    node = mbs.AddNode(eii.NodeGenericODE2(numberOfODE2Coordinates=2, **zero))
+    given = {"stiffnessMatrix": np.diag([0.0, 1e6]), "dampingMatrix": np.array([[0.0, 1e-7], [1e-7, 100.0]])}
+    mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=[node], massMatrix=np.eye(2), **given))
+    mbs.AddMarker(eii.MarkerNodeCoordinate(name="m1", nodeNumber=node, coordinate=0))
+    mbs.Assemble()
+    reduction = reduce(mbs)
+    assert np.max(np.abs(reduction.structure.damping - np.diag([0.0, 100.0]))) < 1e-12
+    run = simulated(reduction)
+    assert run.status == "ok"
+    assert run.at("m1", END) == pytest.approx(END)
+
+
 def stepped(mbs, t, load):
     return load if t < 0.1 else -2 * load if t < 0.3 else 0.0
 
@@ -238,7 +345,25 @@ def test_small_errors_that_add_up_to_a_shift_are_told():
     assert found.lag == pytest.approx(3 / 8 * e * 20.0 * end, rel=0.3)
     assert not found.holds
     assert "oscillations are off by some" in found.sentences[0]
-    assert reduction.check(simulated(reduction, 1.0)).holds
+    assert reduction.check(simulated(reduction, 0.5)).holds
+
+
+def test_a_motion_that_has_come_to_rest_is_not_said_to_be_shifted():
+    """A step load: at the end the mass stands where it should, off by 8e-4 of the way."""
+
+    def force(mbs, t, i, u, v, k, d, offset):
+        return k * u * (1 + 8e-4 * (u / 0.01) ** 2) + d * v
+
+    system = Mass(data=1)
+    given = {"markerNumbers": system.markers, "stiffness": 200.0, "damping": 10.0, "springForceUserFunction": force}
+    system.mbs.AddObject(eii.CoordinateSpringDamper(name="spring", **given))
+    system.mbs.AddLoad(eii.LoadCoordinate(markerNumber=system.markers[1], load=2.0))
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    found = reduction.check(simulated(reduction, 300.0))
+    assert found.error == pytest.approx(8e-4, rel=0.05)
+    assert found.lag == 0.0
+    assert found.holds
 
 
 def test_a_damped_contact_that_opens_is_warned_of():

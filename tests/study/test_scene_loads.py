@@ -121,6 +121,9 @@ BROKEN = {
     "unknown kind": ([HARMONIC | {"kind": "random"}], {}, "loads[0]: got"),
     "unknown point": ([HARMONIC | {"at": "tap"}], {}, "loads[0].at: got 'tap', need one of the points"),
     "unknown coefficient": ([HARMONIC | {"at": {"tap": 1.0}}], {}, "loads[0].at: got 'tap', need one of the points"),
+    "weight along one point": (
+        [LOADS["gravity"] | {"direction": "tip"}], {}, "loads[0].direction: got 'tip', need a table"
+    ),
     "negative frequency": ([HARMONIC | {"frequency_hz": -1.0}], {}, "loads[0].frequency_hz: got -1.0, need greater"),
     "no amplitude": ([{k: v for k, v in HARMONIC.items() if k != "amplitude"}], {}, "loads[0].amplitude: got nothing"),
     "unknown field": ([HARMONIC | {"force": 1.0}], {}, "loads[0].force: got 1.0, need no field of this name"),

@@ -136,7 +136,7 @@ class TestRigidStopThatMoves:
     def test_a_mass_rides_on_it_and_leaves_it_where_its_acceleration_is_that_of_gravity(self):
         ball = mp.LinearStructure([[2.0]], [[0.0]], points={"m": 0})
         model, rate = mp.MultiPhiModel(ball, [mp.UnilateralContact("table", "m", 0.0)], modes="all"), 2 * math.pi
-        weight = mp.Gravity("m", -9.81)
+        weight = mp.Gravity({"m": 1.0}, -9.81)
         t = np.linspace(0, 3, 301)
 
         gentle = mp.StopMotion("table", mp.Harmonic(0.1, 1.0, -math.pi / 2))
@@ -331,7 +331,7 @@ class TestEquivalences:
 @pytest.mark.parametrize("resistance", [1e-9, 1e-6, 1e-4, 1.0])
 def test_little_damping_of_a_rigid_body_under_a_constant_load_costs_no_accuracy(resistance):
     ball = mp.LinearStructure([[2.0]], [[0.0]], damping=[[2.0 * resistance]], points={"m": 0})
-    run = mp.simulate(mp.MultiPhiModel(ball, [], modes="all"), 3.0, loads=[mp.Gravity("m", -10.0)])
+    run = mp.simulate(mp.MultiPhiModel(ball, [], modes="all"), 3.0, loads=[mp.Gravity({"m": 1.0}, -10.0)])
     for t in (1e-3, 0.1, 3.0):
         x = resistance * t
         fallen = -10 * t**2 * (0.5 - x / 6 + x**2 / 24 - x**3 / 120) if x < 1e-3 else None

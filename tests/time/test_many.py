@@ -154,6 +154,7 @@ def test_an_error_that_is_nobodys_ends_all(monkeypatch):
         (ValueError, {"displacements": np.zeros((0, 6))}, "displacements: got shape (0, 6)"),
         (ValueError, {"velocities": np.zeros((2, 6))}, "velocities: got shape (2, 6)"),
         (ValueError, {"points": ["m9"]}, "point: got 'm9'"),
+        (TypeError, {"points": "m0"}, "points: got 'm0', need a sequence"),
         (ValueError, {"loads": [mp.ConstantLoad("m9", 1.0)]}, "point: got 'm9'"),
         (TypeError, {"loads": mp.ConstantLoad("m1", 1.0)}, "loads: got ConstantLoad"),
         (ValueError, {"times": [0.0, 7.0], "points": ["m0"]}, "times: got"),

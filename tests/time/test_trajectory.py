@@ -94,6 +94,20 @@ class TestEvaluation:
         told = f"t: got str, need a time or (k,) times in s; a point's displacement: at({point!r}"
         refused(TypeError, told, run.displacement, point)
 
+    @pytest.mark.parametrize("ask", ["plot", "to_dataframe"])
+    def test_one_name_where_names_are_needed_is_not_taken_letter_by_letter(self, run, refused, ask):
+        refused(TypeError, "points: got 'end', need a sequence, as ['end']", getattr(run, ask), "end")
+
+    def test_times_are_told_as_they_were_given(self, run, refused):
+        refused(ValueError, "t: got 99 s, need 0 <= t <= ", run.displacement, 99.0)
+        refused(ValueError, "t: got -1 to 99 s, need 0 <= t <= ", run.displacement, [0.0, 99.0, -1.0])
+
+    def test_a_run_that_failed_at_once_says_why_it_has_no_motion(self, run, refused):
+        failed = dataclasses.replace(run, segments=(), message="at t = 0 s: singular")
+        refused(
+            ValueError, "t: got a time of a run that has no motion (at t = 0 s: singular)", failed.displacement, 0.0
+        )
+
     def test_other_questions_that_make_no_sense_are_refused(self, run, refused):
         refused(ValueError, "t: got shape", run.displacement, np.zeros((2, 2)))
         refused(ValueError, "t: got shape", run.displacement, [])

@@ -20,11 +20,12 @@ import numpy as np
 from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.display import Shown, kinds, names
-from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
+from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.element import links_of
 from multiphi_exudyn.time.level_rows import force_row, patch_row, pressing_row
 
@@ -192,6 +193,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     >>> print(1e3 * histories.points["tip"][:1].round(6))  # mm
     [7.5]
     """
+    no_text("points", points)
     body = _body_of(mbs, items)
     on_points = [mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in items.get("sInterface", {}).values()]
     table = {key: mbs.GetSensorStoredData(items[key]) for key in (*RECORDED, "sLevel") if key in items}
@@ -227,6 +229,8 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
 
 
 def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
+    if not isinstance(items, Mapping):
+        raise MultiPhiTypeError(f"items: got {items!r}, need the dict that CreateMultiPhiBody returned")
     for body in bodies_of(mbs).values():
         if isinstance(body, MultiPhiBody) and items.get("nGenericODE2") == body.items["nGenericODE2"]:
             return body

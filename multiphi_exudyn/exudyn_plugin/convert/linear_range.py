@@ -10,112 +10,26 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Extent, Linearisation
+from multiphi_exudyn.exudyn_plugin.convert.range_check import TOLERANCE, RangeCheck
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["LinearLimits", "LinearRange", "RangeCheck"]
+__all__ = ["LinearLimits", "LinearRange"]
 
-TOLERANCE = 0.02  # error from which a motion is told to have left the range: a pendulum that swings by 2 degrees has it
 SAME = 1e-3  # error up to which user functions do what the model does: a hundred times what differentiating them leaves
-LAG = 0.05  # rad: shift of an oscillation from which a motion is told to have left the range; an error of 4 %
+NEUTRAL = 1e-6  # of the largest stiffness beside the motion: what differentiating leaves of none
 SPREAD = 10  # instants over the run, besides those of the largest displacement and velocity
 DENSE = 30  # the same where user functions are to be seen, which may act in a part of the run only
 ROUND_OFF = 1e-12  # of the largest coordinate: a motion below it is that of round-off in the forces
 SAMPLES = 256  # times at which the largest displacement and velocity are looked for
 PROBED = 12  # lowest modes of which limits are kept: those that move far
 LARGEST, SMALLEST = 12, -24  # powers of two: amplitudes tried for a limit, of the largest coordinate of the system
-
-
-@dataclass(frozen=True)
-class RangeCheck:
-    """How far a reduced motion left the range in which the linearisation of its Exudyn system holds.
-
-    Made by ``Reduction.check``: at a few instants the system is asked for its accelerations in the model's motion.
-
-    Attributes
-    ----------
-    times : array (k,)
-        When it was asked [s].
-    errors : array (k,)
-        What the forces that the model lacks move it away, relative to the motion's largest displacement.
-    reason : str
-        Why nothing could be checked; empty where it could.
-    lag : float
-        By how much [rad], about, errors that repeat in every oscillation shift it until the end of the run.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> reduction = reduce(mbs)
-    >>> given = {"velocity": reduction.velocity, "loads": reduction.loads}
-    >>> tr = mp.simulate(reduction.model, 0.1, **given)
-    >>> reduction.check(tr).holds
-    True
-    """
-
-    times: np.ndarray
-    errors: np.ndarray
-    reason: str = ""
-    lag: float = 0.0
-
-    @property
-    def error(self) -> float:
-        """The largest error, nan where nothing could be checked."""
-        return math.nan if self.reason else float(np.max(self.errors, initial=0.0))
-
-    @property
-    def holds(self) -> bool:
-        """Whether the motion stayed within the linear range; False where nothing could be checked."""
-        return self.error <= TOLERANCE and self.lag <= LAG
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """What a user must not miss."""
-        if self.reason:
-            return (f"linear range: not checked, {self.reason}",)
-        if self.holds:
-            return ()
-        if self.error <= TOLERANCE:
-            return (
-                f"linear range: what the model lacks of its Exudyn system is small ({100 * self.error:.2g} %), but "
-                f"shifts frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
-            )
-        found = self.times[np.argmax(self.errors > TOLERANCE)]
-        away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
-        return (
-            f"linear range: left by t = {found:.3g} s; what the model lacks of its Exudyn system moves it {away} of "
-            "the largest displacement away; make the motion smaller, or solve the system",
-        )
 
 
 def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
@@ -125,10 +39,17 @@ def _lag(away: np.ndarray, amplitudes: np.ndarray, turned: float) -> float:
     """
     moving = amplitudes - np.mean(amplitudes, axis=0)
     powers = np.sum(moving**2, axis=1)
-    if not np.max(powers) > 0:
-        return 0.0
+    if np.max(powers) <= TOLERANCE**2 * np.max(np.sum(amplitudes**2, axis=1)):
+        return 0.0  # it stands, as good as; what is off there is an error, and no shift
     lasting = min(1.0, 2 * float(np.mean(powers) / np.max(powers)))  # share of the run in which it moves; of a sine 1
     return float(0.5 * turned * lasting * abs(np.sum(away * moving)) / np.sum(powers))
+
+
+def _softest(stiffness: np.ndarray) -> float:
+    """The lowest eigenvalue [1/s2] of a matrix (k, k), 0 where it is round-off or there is none."""
+    values = np.linalg.eigvalsh(stiffness)
+    lowest = float(np.min(values, initial=0.0))
+    return lowest if lowest < -NEUTRAL * float(np.max(np.abs(values), initial=0.0)) else 0.0
 
 
 def _told(left_out: Sequence[str]) -> Iterator[str]:
@@ -151,19 +72,30 @@ def _let_go(trajectory: Trajectory) -> Iterator[str]:
 class LinearRange:
     """Validity of a model that ``reduce`` made: asks its system, and names what was left out (grouped sentences).
 
-    asked: the part of what was left out that the system has at any state, which is named where the two disagree.
-    Pickled it becomes ``LinearLimits``; a copy asks the same system.
+    asked: the part of what was left out that the system has at any state, which is named where the two disagree. idle:
+    directions in which nothing moves the system, named where it is unstable there in the mean of the motion: then the
+    least push, which no run of it has, would take it away. Pickled it becomes ``LinearLimits``; a copy asks the same
+    system.
     """
 
-    def __init__(self, mbs: Any, linear: Linearisation, left_out: Sequence[str], asked: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        mbs: Any,
+        linear: Linearisation,
+        left_out: Sequence[str],
+        asked: Sequence[str] = (),
+        idle: Sequence[str] = (),
+    ) -> None:
         self._mbs, self._linear = mbs, linear
-        self._left_out, self._asked = tuple(part for part in left_out if part not in asked), tuple(asked)
+        self._left_out = tuple(part for part in left_out if part not in (*asked, *idle))
+        self._asked, self._idle = tuple(asked), tuple(idle)
 
     def __call__(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Sentences for ``Trajectory.warnings``."""
         found = self.check(trajectory)
-        missing = self._left_out if found.error <= SAME else (*self._left_out, *self._asked)
-        return (*_told(missing), *_let_go(trajectory), *found.sentences)
+        asked = self._asked if found.error > SAME or found.reason else ()
+        idle = self._idle if found.softest < 0 or found.reason else ()
+        return (*_told((*self._left_out, *asked, *idle)), *_let_go(trajectory), *found.sentences)
 
     def __copy__(self) -> LinearRange:
         return self
@@ -172,7 +104,7 @@ class LinearRange:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LinearLimits, ((*self._left_out, *self._asked), *self._limits)
+        return LinearLimits, ((*self._left_out, *self._asked, *self._idle), *self._limits)
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """The error of a trajectory of this model at a few instants."""
@@ -203,10 +135,11 @@ class LinearRange:
                 for t in times
             ]
             turned = [compared.turned(trajectory.displacement(t), reach) for t in times]
+            beside = np.mean([compared.stiffening(trajectory.displacement(t), reach) for t in spread], axis=0)
         errors, away = (np.array(parts) for parts in zip(*found, strict=True))
         errors = np.maximum(errors, turned)
         amplitudes = (linear.modes[1].T @ (linear.mass @ trajectory.displacement(times))).T
-        return RangeCheck(times, errors, lag=_lag(away, amplitudes, rate * trajectory.t_end))
+        return RangeCheck(times, errors, "", _lag(away, amplitudes, rate * trajectory.t_end), _softest(beside))
 
     def _changed(self) -> str:
         """Why the system is no longer the one that was reduced, as far as its size tells; empty if it is."""

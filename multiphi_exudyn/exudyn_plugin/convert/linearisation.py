@@ -28,10 +28,11 @@ import scipy.linalg
 from multiphi_exudyn.exudyn_plugin.convert.full_system import FullSystem
 from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad
 
-__all__ = ["Compared", "Extent", "Linearisation", "Sphere"]
+__all__ = ["Compared", "Extent", "Idle", "Linearisation", "Sphere"]
 
 FAST = 10.0  # times the rate of the motion: a mode that is faster follows it in balance, to a hundredth
 TOUCHING = 1e-9  # of the reach: a gap that is closed
+ASIDE = 1e-3  # of the reach, by which directions that are left out are tried
 STAGES = 7  # of relaxation: what couples stiff modes to soft ones spans many decades of stiffness
 
 
@@ -54,13 +55,25 @@ class Sphere:
 
 
 @dataclass(frozen=True, eq=False)
+class Idle:
+    """Directions that a linearisation is without, because nothing moves the system there.
+
+    shapes U (n_full, k) of unit mass, momenta M U (n_full, k), of: what is wrong with them.
+    """
+
+    shapes: np.ndarray
+    momenta: np.ndarray
+    of: str
+
+
+@dataclass(frozen=True, eq=False)
 class Linearisation:
     """M z'' + C z' + K z = static + (contacts and loads by functions of time), q = displacement + basis z.
 
     mass, damping, stiffness (n, n), static (n,): the system's own, without contacts. basis S (n_full, n).
     displacement, velocity (n_full,): q_0 and v_0 at the time [s]. largest: of the system's coordinates [m, rad].
-    symmetrised: of which matrices the other part is left out, a sentence each. held: an instability
-    in which nothing moves, if there is one. contacts: rows (n_full,) by name.
+    symmetrised: of which matrices the other part is left out, a sentence each. idle: directions that are left out,
+    if there are any. contacts: rows (n_full,) by name.
     spheres: by name, the contacts whose direction is that of q_0.
     loads, forces: of the system and of its objects, by index.
     """
@@ -75,7 +88,7 @@ class Linearisation:
     time: float
     largest: float
     symmetrised: tuple[str, ...] = ()
-    held: str = ""
+    idle: Idle | None = None
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
     spheres: Mapping[str, Sphere] = field(default_factory=dict)
     loads: Mapping[int, TimedLoad] = field(default_factory=dict)
@@ -130,13 +143,28 @@ class Compared:
             moved = self._full.moved(displacement, linear.basis @ z_t, pushed, extent.reach)
             more = shapes.T @ (linear.mass @ (linear.basis.T @ moved.accelerations) - force)
             drift = more / np.maximum(squares, extent.rate**2)
-            found = np.hypot(np.linalg.norm(relaxed) + np.linalg.norm(drift), moved.shift)
+            aside = 0.0 if linear.idle is None else linear.idle.momenta.T @ moved.accelerations / extent.rate**2
+            found = math.hypot(np.linalg.norm(relaxed) + np.linalg.norm(drift), moved.shift, np.linalg.norm(aside))
             if found < least:
                 least, away = float(found), relaxed + drift
             if least <= enough * extent.size:
                 break
             relaxed = relaxed + np.where(squares >= softest, drift, 0.0)
         return least / extent.size, away
+
+    def stiffening(self, z: np.ndarray, reach: float) -> np.ndarray:
+        """Symmetric part of the stiffness (k, k) [1/s2] in the directions that are left out, at z; none: k = 0."""
+        linear = self._linear
+        if linear.idle is None:
+            return np.zeros((0, 0))
+        place, still = linear.displacement + linear.basis @ z, np.zeros(len(linear.displacement))
+        pulled = []
+        for shape in linear.idle.shapes.T:
+            step = ASIDE * reach / float(np.max(np.abs(shape)))
+            ends = [self._full.moved(place + sign * step * shape, still, still, reach) for sign in (-1, 1)]
+            pulled.append(linear.idle.momenta.T @ (ends[0].accelerations - ends[1].accelerations) / (2 * step))
+        found = np.array(pulled)
+        return (found + found.T) / 2
 
     def turned(self, z: np.ndarray, reach: float) -> float:
         """Twice the angle [rad] by which contacts of spheres that touch have turned since q_0.

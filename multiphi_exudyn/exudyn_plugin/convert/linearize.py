@@ -12,10 +12,8 @@ their geometric stiffness (geometric_stiffness.py).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -23,94 +21,18 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current
-from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
-    generalised_forces,
-    geometric_stiffness,
-    static_solver,
-)
-from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation
-from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import ASYMMETRY, Checked, UnstableState, checked_matrices
+from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
-from multiphi_exudyn.exudyn_plugin.convert.unstable import stable_directions
-from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.exudyn_plugin.convert.system_matrices import forces, projected_matrices
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.dofs import Place
-from multiphi_exudyn.mechanics.structure import LinearStructure
 
-__all__ = ["LinearizedStructure", "linear_structure_from"]
+__all__ = ["check_system", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
-SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
 LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class LinearizedStructure(LinearStructure):
-    """A linear structure that knows the Exudyn coordinates it came from.
-
-        q = q_0 + S z
-
-    It is a LinearStructure in z, made by ``linear_structure_from`` and ``reduce``. S^T S is the identity, so a matrix A
-    in z acts in Exudyn's coordinates as S A S^T.
-
-    Attributes
-    ----------
-    mass, stiffness : array (n, n)
-        M [kg, kg m2] and K [N/m, N m] in z.
-    damping : array (n, n), ModalDamping, RayleighDamping or None
-        C [N s/m, N m s] in z, or how it is made.
-    points : mapping of str to array (n,)
-        Displacements of markers and coordinates from q_0, as rows in z.
-    dofs : None
-        Rows in z have no nodes.
-    free : array (n,)
-        0 to n - 1: nothing is fixed beside the system's constraints.
-    coordinates : array (n_full, n)
-        S; a copy, read-only.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> structure = reduce(mbs).structure
-    >>> structure.n, structure.coordinates.shape
-    (1, (1, 1))
-    """
-
-    coordinates: np.ndarray
-
-    def __post_init__(self, fixed: Iterable[Place]) -> None:
-        super().__post_init__(fixed)
-        coordinates = np.array(self.coordinates, dtype=float)
-        if coordinates.ndim != 2 or coordinates.shape[1] != self.n:
-            raise MultiPhiValueError(f"coordinates: got shape {coordinates.shape}, need (n_full, {self.n})")
-        coordinates.flags.writeable = False
-        object.__setattr__(self, "coordinates", coordinates)
 
 
 def linear_structure_from(
@@ -190,7 +112,7 @@ def linear_structure_from(
     with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
         with _inactive(mbs, objects):
-            found, basis, _ = projected_matrices(mbs)
+            found, basis = projected_matrices(mbs)
             _check_equilibrium(mbs, found.stiffness, basis)
         rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
@@ -268,97 +190,6 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
             mbs.SetObjectParameter(index, "activeConnector", True)
 
 
-def projected_matrices(
-    mbs: Any, allowed: float = ASYMMETRY, pushes: np.ndarray | None = None
-) -> tuple[Checked, np.ndarray, str]:
-    """M, K, C in z, (n, n), the basis S, (n_full, n), and an instability that is held; allowed: ``checked_matrices``.
-
-    pushes (k, n_full): what may move the system, where an unstable direction is held if none of them does.
-
-    What is round-off of the stiffness that forces give, or of a force over the system's size, is none: it would be a
-    frequency, or an instability.
-    """
-    geared, geometric = _geared_springs(mbs), geometric_stiffness(mbs)
-    with _slack(mbs, geared):
-        result = mbs.ComputeLinearizedSystem(
-            projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
-        )
-        sizes = np.abs(geometric) + np.max(np.abs(forces(mbs))) / (_largest_coordinate(mbs) or math.inf)
-    mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
-    basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
-    if basis.shape[1] == 0:
-        raise MultiPhiValueError("mbs: got constraints that hold every coordinate, need one that can move")
-    stiffness += basis.T @ geometric @ basis
-    stiffness = drop_round_off(stiffness, np.abs(basis).T @ sizes @ np.abs(basis))
-    for item in geared.values():
-        first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
-        row = (item["factor1"] * second - item["factor0"] * first) @ basis
-        stiffness += item["stiffness"] * np.outer(row, row)
-        damping += item["damping"] * np.outer(row, row)
-    try:
-        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, ""
-    except UnstableState as unstable:
-        if pushes is None:
-            raise
-        momentum = mass @ (basis.T @ mbs.systemData.GetODE2Coordinates_t(exu.ConfigurationType.Initial))
-        kept = stable_directions(mass, stiffness, damping, np.vstack([momentum, pushes @ basis]))
-        if kept is None:
-            raise
-        mass, stiffness, damping = (kept.T @ matrix @ kept for matrix in (mass, stiffness, damping))
-        basis = basis @ kept
-        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, unstable.where
-
-
-def linearised(mbs: Any, time: float, pushes: Sequence[np.ndarray]) -> Linearisation:
-    """The system about its initial state, at a time [s], without contacts and loads by functions of time.
-
-    pushes: rows (n_full,) of these contacts and loads.
-    """
-    data, initial = mbs.systemData, exu.ConfigurationType.Initial
-    displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-    found, basis, held = projected_matrices(mbs, SYMMETRISED, np.vstack([forces(mbs, time), *pushes]))
-    mass, stiffness, damping = found.mass, found.stiffness, found.damping
-    static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
-    largest = _largest_coordinate(mbs)
-    return Linearisation(
-        mass, damping, stiffness, static, basis, displacement, velocity, time, largest, found.told, held
-    )
-
-
-def _largest_coordinate(mbs: Any) -> float:
-    """Of the system at its initial state, where it stands [m, rad]."""
-    kinds = exu.ConfigurationType
-    places = (mbs.systemData.GetODE2Coordinates(kind) for kind in (kinds.Reference, kinds.Initial))
-    return float(np.max(np.abs(sum(places))))
-
-
-def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
-    """Springs of coordinates with factors, of which Exudyn's tangent does not hold the factors."""
-    items = {i: mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())}
-    geared = {i: item for i, item in items.items() if (item.get("factor0", 1.0), item.get("factor1", 1.0)) != (1, 1)}
-    geared = {
-        i: item for i, item in geared.items() if item.get("activeConnector") and "springForceUserFunction" in item
-    }
-    for item in geared.values():
-        if item["springForceUserFunction"]:
-            raise MultiPhiValueError(f"spring {item['name']!r}: got a user function and factors, need one of both")
-    return geared
-
-
-@contextmanager
-def _slack(mbs: Any, springs: Mapping[int, Mapping[str, Any]]) -> Iterator[None]:
-    """Take stiffness and damping from springs and, whatever happens, give them back."""
-    try:
-        for i in springs:
-            for name in ("stiffness", "damping"):
-                mbs.SetObjectParameter(exu.ObjectIndex(i), name, 0.0)
-        yield
-    finally:
-        for i, item in springs.items():
-            for name in ("stiffness", "damping"):
-                mbs.SetObjectParameter(exu.ObjectIndex(i), name, item[name])
-
-
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
     unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # what constraint forces cannot balance
     elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
@@ -367,13 +198,6 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
             f"mbs: its state without contacts is out of balance by {np.max(unbalanced):g} N (or N m), need "
             "an equilibrium with open contacts: take loads off, or solve the static problem first"
         )
-
-
-def forces(mbs: Any, time: float = 0.0) -> np.ndarray:
-    """Generalised forces at the initial state and a time [s], constraint forces left out, (n_full,)."""
-    with static_solver(mbs) as solver:
-        mbs.systemData.SetTime(time)
-        return generalised_forces(mbs, solver)
 
 
 def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:

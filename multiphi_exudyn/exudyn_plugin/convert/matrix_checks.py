@@ -17,19 +17,20 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 
-__all__ = ["ASYMMETRY", "Checked", "UnstableState", "checked_matrices", "coordinate_name"]
+__all__ = ["ASYMMETRY", "Checked", "NoStructure", "checked_matrices", "coordinate_name"]
 
 ASYMMETRY = 1e-6  # of the largest entry: what differentiating connectors numerically leaves
 DIFFERENTIATED = 1e-9  # of the largest damping or the fastest mode's critical one: what differentiating forces leaves
+UNDAMPED = 1e-14  # of the same: damping of a zero-frequency mode that is none, whatever couples it to others
 MASSLESS = 1e-14  # of the largest eigenvalue of M: what projecting leaves of a coordinate without mass
 
 
-class UnstableState(MultiPhiValueError):
-    """The stiffness matrix has a negative eigenvalue; where: which one, and the coordinate that moves most."""
+class NoStructure(MultiPhiValueError):
+    """Matrices of no linear structure, for the sake of some directions; of: what is wrong with these, and where."""
 
-    def __init__(self, where: str) -> None:
-        super().__init__(f"stiffness: got a negative one {where}, need a state that is stable, or a constraint there")
-        self.where = where
+    def __init__(self, message: str, of: str) -> None:
+        super().__init__(message)
+        self.of = of
 
 
 @dataclass(frozen=True)
@@ -51,23 +52,26 @@ def checked_matrices(
     damping also a ratio to critical damping.
     """
     told: list[str] = []
-    mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
-    stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)
     values, vectors = scipy.linalg.eigh(mass)
     if values[0] <= MASSLESS * values[-1]:
         where = _of_largest(mbs, basis @ vectors[:, 0])
         raise MultiPhiValueError(
-            f"mass: got {_kind(values[0], values[-1])} mass at {where}, need a mass there or a constraint that holds it"
+            f"mass: got {_kind(values[0], values[-1])} mass at {where}, {values[0] / values[-1]:.1g} of the largest, "
+            f"need more than {MASSLESS:g} of it there, or a constraint that holds it"
         )
+    mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
+    stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)
     try:
         modes = complete_modes(mass, stiffness)
     except MultiPhiValueError as error:
         values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
-        raise UnstableState(
-            f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {_of_largest(mbs, basis @ vectors[:, 0])}"
+        where = f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {_of_largest(mbs, basis @ vectors[:, 0])}"
+        raise NoStructure(
+            f"stiffness: got a negative one {where}, need a state that is stable, or a constraint there",
+            f"one of them unstable {where}",
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))
-    return Checked(mass, stiffness, _not_driving(damping, mass, modes), tuple(told))
+    return Checked(mass, stiffness, _damping(damping, mass, modes), tuple(told))
 
 
 def _kind(lowest: float, largest: float) -> str:
@@ -82,15 +86,22 @@ def _critical(damping: np.ndarray, modes: Modes) -> float:
     return float(np.max(ratios, initial=0.0))
 
 
-def _not_driving(damping: np.ndarray, mass: np.ndarray, modes: Modes) -> np.ndarray:
-    """A symmetric damping matrix (n, n) without the negative damping that is round-off of differentiation."""
+def _damping(damping: np.ndarray, mass: np.ndarray, modes: Modes) -> np.ndarray:
+    """A symmetric damping matrix (n, n) without what is round-off of differentiation.
+
+    That is negative damping, and that of zero-frequency modes that are damped by nothing but it.
+    """
     own = modes.shapes.T @ damping @ modes.shapes
+    largest = max(np.max(np.abs(np.linalg.eigvalsh(own))), 2 * np.max(modes.omega))
+    undamped = (modes.omega == 0) & (np.abs(np.diagonal(own)) <= UNDAMPED * largest)
+    undamped &= np.max(np.abs(own), axis=1) <= 10 * DIFFERENTIATED * largest
+    own[undamped], own[:, undamped] = 0.0, 0.0
     values, vectors = np.linalg.eigh(own)
-    largest = max(np.max(np.abs(values)), 2 * np.max(modes.omega))
-    if not -DIFFERENTIATED * largest <= values[0] < 0:
+    driving = -DIFFERENTIATED * largest <= values[0] < 0
+    if not driving and not np.any(undamped):
         return damping
     momenta = mass @ modes.shapes @ vectors
-    found: np.ndarray = (momenta * np.maximum(values, 0.0)) @ momenta.T
+    found: np.ndarray = (momenta * (np.maximum(values, 0.0) if driving else values)) @ momenta.T
     return (found + found.T) / 2
 
 
@@ -113,9 +124,10 @@ def _symmetric(
         acting = ", ".join(_acting_on(mbs, {first, second})) or "none"
         where = f"{places}, on both of which act: {acting}"
         if min(away, critical) > allowed:
-            raise MultiPhiValueError(
+            raise NoStructure(
                 f"mbs: its {name} matrix is not symmetric (follower or gyroscopic forces?), got entries that differ by "
-                f"{away:.2g} of the largest {where}; need a symmetric one"
+                f"{away:.2g} of the largest {where}; need a symmetric one",
+                f"with them its {name} matrix is not symmetric {places}",
             )
         ratio = f" (a ratio to critical damping of {critical:.2g})" if critical < math.inf else ""
         told.append(f"{name} matrix, of which entries differ by {away:.2g} of the largest{ratio} {where}")

@@ -36,6 +36,9 @@ ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, abo
 class PositionInterface:
     """A point of a body as a position of the Exudyn system, to which markers of positions attach.
 
+    Given to a body by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": PositionInterface(...)})``; its
+    node is then ``items["nInterface"]["tip"]``, for MarkerNodePosition.
+
     Parameters
     ----------
     position : sequence of float
@@ -66,6 +69,9 @@ class PositionInterface:
 @dataclass(frozen=True)
 class RigidInterface:
     """A place of a body as a rigid frame of the Exudyn system, to which every joint attaches.
+
+    Given to a body by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; its
+    node is then ``items["nInterface"]["tip"]``, for MarkerNodeRigid.
 
     A body is linear: a run in which a rigid interface turns by more than 5 degrees issues a warning.
 

@@ -94,11 +94,11 @@ class SweepLoadSpec(SweepCourse):
 
 
 class GravitySpec(Table):
-    """Weight of the whole structure along +z, from t = 0 on."""
+    """Weight of the whole structure along +z, from t = 0 on; a beam knows its direction."""
 
     kind: Literal["gravity"]
     acceleration: Finite  # m/s2, negative where it pulls down
-    direction: Place | None = None  # unit rigid-body motion along gravity; a beam knows its own
+    direction: Annotated[dict[Name, Finite], Field(min_length=1)] | None = None  # unit rigid-body motion along gravity
 
 
 class StopMotionSpec(Table):
@@ -115,7 +115,7 @@ class BaseMotionSpec(Table):
     kind: Literal["base-motion"]
     course: SmoothCourse
     fixed_stops: tuple[Name, ...] = ()
-    direction: Place | None = None  # as of gravity
+    direction: Place | None = None  # unit rigid-body motion of the base; a beam knows its own
 
 
 LoadSpec = Annotated[

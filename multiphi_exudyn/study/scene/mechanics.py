@@ -214,7 +214,7 @@ def _check_models(scene: Scene, mechanics: Mechanics) -> None:
         contacts=mechanics.contacts,
         laws=mechanics.force_laws,
         frictions=mechanics.frictions,
-        loads=loads_of(scene, None if mechanics.beams is None else ""),
+        loads=loads_of(scene, None if mechanics.beams is None else np.zeros(0)),
         printed=mechanics.printed,
     )
     for i, model in enumerate(scene.file.models):

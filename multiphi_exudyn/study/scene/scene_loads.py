@@ -7,6 +7,9 @@ depends on its mesh and is given here by who has the mesh.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
@@ -33,7 +36,10 @@ from multiphi_exudyn.study.scene.scenes import Scene, refuse
 __all__ = ["described_loads", "loads_of"]
 
 
-def loads_of(scene: Scene, transverse: At | None) -> tuple[Load, ...]:
+Given = TypeVar("Given", bound=At)  # direction of a scene file
+
+
+def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
     """The loads, in the file's order; raises MultiPhiValueError naming file and field.
 
     transverse: unit rigid-body motion along +z, None for a structure that has none.
@@ -46,14 +52,11 @@ def described_loads(scene: Scene) -> tuple[str, ...]:
     return tuple(_described(spec) for spec in scene.file.loads)
 
 
-def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Load:
-    if isinstance(spec, (GravitySpec, BaseMotionSpec)):
-        direction = transverse if spec.direction is None else spec.direction
-        if direction is None:
-            refuse(scene, f"{field}.direction", None, "one: only a beam knows its transverse motion")
-        if isinstance(spec, GravitySpec):
-            return Gravity(direction, spec.acceleration)
-        return BaseMotion(direction, _smooth(spec.course), spec.fixed_stops)
+def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | None) -> Load:
+    if isinstance(spec, GravitySpec):
+        return Gravity(_along(scene, field, spec.direction, transverse), spec.acceleration)
+    if isinstance(spec, BaseMotionSpec):
+        return BaseMotion(_along(scene, field, spec.direction, transverse), _smooth(spec.course), spec.fixed_stops)
     if isinstance(spec, StopMotionSpec):
         return StopMotion(spec.contact, _course(scene, f"{field}.course", spec.course))
     if isinstance(spec, ConstantLoadSpec):
@@ -64,6 +67,13 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: At | None) -> Lo
     if isinstance(spec, HarmonicLoadSpec):
         return HarmonicLoad(spec.at, spec.amplitude, spec.frequency_hz, spec.phase)
     return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
+
+
+def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
+    direction = transverse if given is None else given
+    if direction is None:
+        refuse(scene, f"{field}.direction", None, "one: only a beam knows its transverse motion")
+    return direction
 
 
 def _course(scene: Scene, field: str, spec: CourseSpec) -> TimeFunction:

@@ -97,6 +97,8 @@ def _forms(schema: Mapping[str, Any], form: Any, data: Any) -> list[Mapping[str,
 def _needed(item: Mapping[str, Any]) -> str:
     kinds = {
         "missing": "a value",
+        "dict_type": "a table",
+        "model_type": "a table",
         "extra_forbidden": "no field of this name",
         "union_tag_invalid": f"a kind among {item.get('ctx', {}).get('expected_tags')}",
         "union_tag_not_found": "a table with the field kind",

@@ -24,7 +24,7 @@ from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.planar_beam import beam_nodes
-from multiphi_exudyn.mechanics.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
 from multiphi_exudyn.study.scene.mechanics import Mechanics
@@ -117,7 +117,7 @@ class Workbench:
         return loads_of(self.scene, self._transverse)
 
     @property
-    def _transverse(self) -> At | None:
+    def _transverse(self) -> np.ndarray | None:
         """Unit rigid-body motion along +z (n,) of a beam that has a load along it."""
         along = any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.scene.file.loads)
         if self.mechanics.beams is None or not along:

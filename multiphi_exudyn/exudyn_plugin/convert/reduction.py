@@ -1,0 +1,134 @@
+"""What ``reduce`` makes of an Exudyn system: the model, its start and loads, and what was taken and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.display import Shown, names
+from multiphi_exudyn.exudyn_plugin.convert.item_fates import grouped
+from multiphi_exudyn.exudyn_plugin.convert.items import Item
+from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, LinearRange
+from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
+from multiphi_exudyn.exudyn_plugin.convert.range_check import RangeCheck
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["Reduction"]
+
+
+@dataclass(frozen=True, repr=False)
+class Reduction(Shown):
+    """What ``reduce`` made of an Exudyn system.
+
+    Attributes
+    ----------
+    model : MultiPhiModel
+        Structure, contacts, modes.
+    velocity : array (n,)
+        z'(0) [m/s, rad/s] of the current state; the displacement z(0) is zero.
+    loads : tuple of loads
+        The constant load of a state out of balance, none if it is zero, and those by functions of time.
+    taken : tuple of Item
+        Every item of the system that is part of the model.
+    left_out : tuple of (Item, str)
+        What is no part of it, with the reason.
+    symmetrised : tuple of str
+        Matrices that were not symmetric, by how much and between which coordinates; their symmetric part is taken, and
+        what the other part does is found by ``check``.
+
+    Examples
+    --------
+    >>> import exudyn as exu
+    >>> import exudyn.itemInterface as eii
+    >>> import multiphi_exudyn as mp
+    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
+    >>> container = exu.SystemContainer()
+    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
+    >>> ground = mbs.AddNode(eii.NodePointGround())
+    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
+    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
+    >>> ends = [
+    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
+    ...     for n in (ground, node)
+    ... ]
+    >>> spring = mbs.AddObject(
+    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
+    ... )
+    >>> data = mbs.AddNode(
+    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
+    ... )
+    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
+    >>> stop = mbs.AddObject(
+    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
+    ... )
+    >>> mbs.Assemble()
+    >>> print(reduce(mbs).report)
+    1 degrees of freedom, contacts: 1, frictions: 0, modes: all
+    taken
+      ObjectMass1D 'mass': its matrices
+      ObjectConnectorCoordinateSpringDamper 'spring': its matrices
+      ObjectContactCoordinate 'stop': contact, 1e+06 N/m
+    left out
+      nothing
+    """
+
+    model: MultiPhiModel
+    velocity: np.ndarray
+    loads: tuple[Load, ...]
+    taken: tuple[Item, ...]
+    left_out: tuple[tuple[Item, str], ...]
+    symmetrised: tuple[str, ...] = ()
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "degrees of freedom", str(self.structure.n)
+        yield "contacts", names([contact.name for contact in self.model.contacts])
+        yield "modes", str(self.model.modes)
+        yield "taken", str(len(self.taken))
+        yield "left out", names([str(item) for item, _ in self.left_out])
+
+    @property
+    def structure(self) -> LinearizedStructure:
+        """M, C, K, the points and S."""
+        structure = self.model.structure
+        assert isinstance(structure, LinearizedStructure)
+        return structure
+
+    @property
+    def report(self) -> str:
+        """What was taken and what was left out, items of one type and one fate a line."""
+        frictions = sum(contact.held for contact in self.model.contacts)
+        elements = f"contacts: {len(self.model.contacts) - frictions}, frictions: {frictions}"
+        size = f"{self.structure.n} degrees of freedom, {elements}, modes: {self.model.modes}"
+        taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
+        left = [f"  {line}" for line in grouped(self.left_out)]
+        made = ["made symmetric", *(f"  {sentence}" for sentence in self.symmetrised)] if self.symmetrised else []
+        return "\n".join([size, "taken", *taken, *made, "left out", *(left or ["  nothing"])])
+
+    def check(self, trajectory: Trajectory) -> RangeCheck:
+        """How far a trajectory of this model left the linear range; its warnings say so too."""
+        validity = self.model.validity
+        assert isinstance(validity, (LinearRange, LinearLimits))
+        return validity.check(trajectory)
+
+    def report_of(self, trajectory: Trajectory, tolerance: float = 0.01) -> str:
+        """How far a trajectory of this model can be trusted, a line each: linear range, horizon, warnings.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of ``simulate`` with this model.
+        tolerance : float, default 0.01
+            Of the horizon, see ``Trajectory.horizon``.
+        """
+        found = self.check(trajectory)
+        missed = f"forces that the model lacks: {found.error:.2g} of its largest displacement"
+        held, horizon = "holds" if found.holds else "does not hold", trajectory.horizon(tolerance)
+        lines = [
+            f"linear range ({held}): {f'not checked, {found.reason}' if found.reason else missed}",
+            f"determined within {100 * tolerance:g} % until {horizon:.6g} of {trajectory.t_end:g} s",
+        ]
+        return "\n".join([*lines, *(f"warning: {sentence}" for sentence in trajectory.warnings)])
