@@ -12,7 +12,7 @@ import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Matrix", "is_real", "no_text", "one_of", "real_array"]
+__all__ = ["Matrix", "did_you_mean", "is_real", "no_text", "one_of", "real_array"]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 
@@ -46,10 +46,18 @@ def no_text(name: str, given: object) -> None:
         raise MultiPhiTypeError(f"{name}: got {given!r}, need a sequence, as [{given!r}]")
 
 
-def one_of(given: object, known: Iterable[object]) -> str:
-    """What an error needs in place of an unknown name: "one of: ...", and the name that may have been meant."""
+def one_of(given: object, known: Iterable[object], what: str = "") -> str:
+    """What an error needs in place of an unknown name: "one of: a, b", and the name that may have been meant.
+
+    what: of what they are, for "one of the points: a, b".
+    """
     names = [str(name) for name in known]
     listed = ", ".join(names[:SHOWN]) or "none"
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    close = difflib.get_close_matches(str(given), names, n=1)
-    return f"one of: {listed}{more}" + (f"; did you mean {close[0]!r}?" if close else "")
+    return f"one of{f' the {what}' if what else ''}: {listed}{more}{did_you_mean(given, names)}"
+
+
+def did_you_mean(given: object, known: Iterable[str]) -> str:
+    """The known name nearest to what was given, as the end of a sentence; "" where none is near."""
+    near = difflib.get_close_matches(str(given), list(known), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""

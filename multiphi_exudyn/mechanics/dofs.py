@@ -114,7 +114,9 @@ def fixed_dofs(given: Any, n: int, dofs: DofTable | None) -> np.ndarray:
 def known(name: str, dofs: DofTable | None) -> DofTable:
     """The table, refused where there is none."""
     if dofs is None:
-        raise MultiPhiValueError(f"{name}: got a node where no row's node is known, need dofs=, or DoF indices")
+        raise MultiPhiValueError(
+            f"{name}: got a node, but these matrices do not say whose their rows are; need a row, from 0, or dofs="
+        )
     return dofs
 
 

@@ -109,6 +109,7 @@ def test_scenes_are_listed_with_their_titles(capsys):
         (["simulate"], "invalid choice: 'simulate'"),
         (["compare"], "required: SCENE"),
         (["compare", "no-such-scene"], "got 'no-such-scene', need a TOML file or one of: beam-chain"),
+        (["compare", "papper-rig"], "did you mean 'paper-rig'?"),
         (["compare", "paper-rig", "--t-end", "-1"], "--t-end: got '-1', need a time > 0"),
         (["compare", "paper-rig", "--t-end", "nan"], "--t-end: got 'nan', need a time > 0"),
         (["compare", "paper-rig", "--t-end", "soon"], "--t-end: got 'soon', need a time > 0"),

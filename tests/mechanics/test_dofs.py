@@ -51,7 +51,7 @@ class TestPoints:
         refused(TypeError, f"points['tip']: got node {node!r}", structure, points={"tip": (node, "uz")})
 
     def test_refuses_a_node_where_none_is_known(self, refused):
-        refused(ValueError, "points['tip']: got a node where", structure, dofs=None, points={"tip": (7, "uz")})
+        refused(ValueError, "points['tip']: got a node, but", structure, dofs=None, points={"tip": (7, "uz")})
 
 
 class TestTable:
@@ -118,7 +118,7 @@ class TestFixed:
             (ValueError, {"fixed": range(6), "dofs": None}, "fixed: got all 6 degrees of freedom"),
             (ValueError, {"fixed": [(2, "all")]}, "fixed: got node 2, need one of 3 nodes"),
             (ValueError, {"fixed": [(1, "uy")]}, "fixed: got 'uy' of node 1"),
-            (ValueError, {"fixed": [(1, "all")], "dofs": None}, "fixed (1, 'all'): got a node where"),
+            (ValueError, {"fixed": [(1, "all")], "dofs": None}, "fixed (1, 'all'): got a node, but"),
             (ValueError, {"fixed": [5], "dofs": None, "points": {"p": 5}}, "points['p']: got a place that is fixed"),
             (ValueError, {"fixed": [1]}, 'fixed: got 1, need (node, component) or (node, "all"), as (1, "all")'),
             (TypeError, {"fixed": 5}, "fixed: got 5, need a list"),

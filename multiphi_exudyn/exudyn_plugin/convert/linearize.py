@@ -112,7 +112,7 @@ def linear_structure_from(
     with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
         with _inactive(mbs, objects):
-            found, basis, _ = projected_matrices(mbs)
+            found, basis = projected_matrices(mbs)
             _check_equilibrium(mbs, found.stiffness, basis)
         rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))

@@ -56,7 +56,8 @@ def checked_matrices(
     if values[0] <= MASSLESS * values[-1]:
         where = _of_largest(mbs, basis @ vectors[:, 0])
         raise MultiPhiValueError(
-            f"mass: got {_kind(values[0], values[-1])} mass at {where}, need a mass there or a constraint that holds it"
+            f"mass: got {_kind(values[0], values[-1])} mass at {where}, {values[0] / values[-1]:.1g} of the largest, "
+            f"need more than {MASSLESS:g} of it there, or a constraint that holds it"
         )
     mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
     stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)

@@ -75,6 +75,10 @@ def reduce(
     ``<object>.upper`` and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``,
     with the object's name.
 
+    Where the system is unstable, or its matrices are not symmetric, for the sake of directions in which nothing of it
+    moves it, neither speeds nor forces, contacts or loads, all these directions are left out: put loads on the system
+    before, which a model without them could not take there.
+
     Parameters
     ----------
     mbs : exudyn.MainSystem

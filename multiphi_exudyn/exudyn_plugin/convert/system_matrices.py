@@ -33,13 +33,14 @@ __all__ = ["forces", "linearised", "projected_matrices"]
 SYMMETRISED = 0.005  # of the largest entry: asymmetry that is left out, its forces being looked at after every run
 
 
-def projected_matrices(
-    mbs: Any, allowed: float = ASYMMETRY, pushes: np.ndarray | None = None
-) -> tuple[Checked, np.ndarray, Idle | None]:
-    """M, K, C in z, (n, n), the basis S, (n_full, n), and directions that are left out; allowed: ``checked_matrices``.
+def projected_matrices(mbs: Any) -> tuple[Checked, np.ndarray]:
+    """M, K, C in z, (n, n), and the basis S, (n_full, n)."""
+    mass, stiffness, damping, basis = _tangents(mbs)
+    return checked_matrices(mbs, mass, stiffness, damping, basis, ASYMMETRY), basis
 
-    pushes (k, n_full): what may move the system. Where it is no linear structure for the sake of directions in which
-    none of them moves it, these are left out.
+
+def _tangents(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """M, K, C (n, n), and S (n_full, n).
 
     What is round-off of the stiffness that forces give, or of a force over the system's size, is none: it would be a
     frequency, or an instability.
@@ -61,21 +62,29 @@ def projected_matrices(
         row = (item["factor1"] * second - item["factor0"] * first) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
+    return mass, stiffness, damping, basis
+
+
+def _moved_matrices(mbs: Any, pushes: np.ndarray) -> tuple[Checked, np.ndarray, Idle | None]:
+    """M, K, C in z, S, and the directions that are left out.
+
+    pushes (k, n_full): what may move the system. Where it is no linear structure for the sake of directions in which
+    none of them moves it, these are left out.
+    """
+    mass, stiffness, damping, basis = _tangents(mbs)
     try:
-        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, None
+        return checked_matrices(mbs, mass, stiffness, damping, basis, SYMMETRISED), basis, None
     except NoStructure as fault:
-        if pushes is None:
-            raise
         momentum = mass @ (basis.T @ mbs.systemData.GetODE2Coordinates_t(exu.ConfigurationType.Initial))
         directions = moved_directions(mass, stiffness, damping, np.vstack([momentum, pushes @ basis]))
         if directions is None:
             raise
         kept, others = directions
         idle = Idle(basis @ others, basis @ mass @ others, fault.of)
-        sizes = np.abs(kept).T @ np.abs(stiffness) @ np.abs(kept)
-        mass, stiffness, damping = (kept.T @ matrix @ kept for matrix in (mass, stiffness, damping))
-        stiffness, basis = drop_round_off(stiffness, sizes), basis @ kept
-        return checked_matrices(mbs, mass, stiffness, damping, basis, allowed), basis, idle
+    sizes = np.abs(kept).T @ np.abs(stiffness) @ np.abs(kept)
+    mass, stiffness, damping = (kept.T @ matrix @ kept for matrix in (mass, stiffness, damping))
+    stiffness, basis = drop_round_off(stiffness, sizes), basis @ kept
+    return checked_matrices(mbs, mass, stiffness, damping, basis, SYMMETRISED), basis, idle
 
 
 def linearised(mbs: Any, time: float, pushes: Sequence[np.ndarray]) -> Linearisation:
@@ -85,7 +94,7 @@ def linearised(mbs: Any, time: float, pushes: Sequence[np.ndarray]) -> Linearisa
     """
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-    found, basis, idle = projected_matrices(mbs, SYMMETRISED, np.vstack([forces(mbs, time), *pushes]))
+    found, basis, idle = _moved_matrices(mbs, np.vstack([forces(mbs, time), *pushes]))
     mass, stiffness, damping = found.mass, found.stiffness, found.damping
     static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
     largest = _largest_coordinate(mbs)

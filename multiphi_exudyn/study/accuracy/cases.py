@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, MethodSpec, StudyFile, is_number
 from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -263,7 +264,7 @@ def _find(source: str) -> Path:
         return _shipped_folder() / f"{source}.toml"
     if Path(source).is_file():
         return Path(source)
-    raise MultiPhiValueError(f"STUDY: got {source!r}, need a TOML file or one of: {', '.join(shipped)}")
+    raise MultiPhiValueError(f"STUDY: got {source!r}, need a TOML file or {one_of(source, shipped)}")
 
 
 def _refuse(study: Study, field: str, given: object, needed: str) -> None:

@@ -25,6 +25,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.study.comparison.placement import meeting
 from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, REFERENCE, greyed, panels
@@ -235,14 +236,14 @@ def _chosen(scene: Scene, model: str | None, reference: str | None) -> tuple[str
     if not reduced:
         raise MultiPhiValueError(f"{scene.path}: models: got none that is reduced, need one to draw")
     return (
-        _one_of("--model", reduced[0] if model is None else model, reduced),
-        _one_of("--reference", scene.file.comparison.reference if reference is None else reference, drawn),
+        _known("--model", reduced[0] if model is None else model, reduced),
+        _known("--reference", scene.file.comparison.reference if reference is None else reference, drawn),
     )
 
 
-def _one_of(option: str, given: str, known: list[str]) -> str:
+def _known(option: str, given: str, known: list[str]) -> str:
     if given not in known:
-        raise MultiPhiValueError(f"{option}: got {given!r}, need one of: {', '.join(known)}")
+        raise MultiPhiValueError(f"{option}: got {given!r}, need {one_of(given, known)}")
     return given
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, WithJsonSchema
@@ -22,14 +21,9 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
-    "did_you_mean",
     "numbered",
-    "one_of",
     "place_in_words",
 ]
-
-
-SHOWN = 12  # names in a message
 
 
 def _not_zero(value: float) -> float:
@@ -73,20 +67,6 @@ def by_key(*keys: str) -> Discriminator:
 def numbered(name: str, i: int) -> str:
     """The name of the i-th of a row."""
     return name.replace("{i}", str(i))
-
-
-def one_of(what: str, given: object, known: Iterable[str]) -> str:
-    """What is needed in place of a name: "one of the points: a, b", of many the first few, and what may be meant."""
-    names = list(known)
-    shown = ", ".join(names[:SHOWN]) or "none"
-    more = f", ... ({len(names)} in all)" if len(names) > SHOWN else ""
-    return f"one of the {what}: {shown}{more}{did_you_mean(given, names)}"
-
-
-def did_you_mean(given: object, known: Iterable[str]) -> str:
-    """The known name nearest to what was given, as the end of a sentence; "" where none is near."""
-    near = difflib.get_close_matches(str(given), list(known), 1)
-    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def place_in_words(at: str | Mapping[str, float]) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.arguments import Matrix, one_of
 from multiphi_exudyn.mechanics.beam import Beam, Clamp
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
@@ -25,7 +25,6 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.demands import Demands
 from multiphi_exudyn.study.scene.described import beam_of, damping_of, matrices_of
-from multiphi_exudyn.study.scene.fields import one_of
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.scene_file import (
     DisplacedStart,
@@ -183,7 +182,7 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
             place = getattr(load, part, None) or ()
             named |= {f"loads[{i}].{part}": name for name in ([place] if isinstance(place, str) else place)}
     unknown = {field_name: name for field_name, name in named.items() if name not in mechanics.points}
-    faults = [f"{at}: got {name!r}, need {one_of('points', name, mechanics.points)}" for at, name in unknown.items()]
+    faults = [f"{at}: got {name!r}, need {one_of(name, mechanics.points, 'points')}" for at, name in unknown.items()]
     if faults:
         raise MultiPhiValueError(f"{scene.path}: {'; '.join(faults)}")
 
@@ -196,7 +195,7 @@ def _check_loads(scene: Scene, mechanics: Mechanics) -> None:
         moved += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
         for part, name in moved:
             if name not in names:
-                refuse(scene, f"loads[{i}].{part}", name, one_of("contacts", name, names))
+                refuse(scene, f"loads[{i}].{part}", name, one_of(name, names, "contacts"))
 
 
 def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:

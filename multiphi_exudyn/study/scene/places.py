@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.scene.fields import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 
 __all__ = ["with_value"]
 
@@ -57,7 +57,7 @@ def _list(given: list[Any], parts: Sequence[str], change: Change, place: str) ->
         chosen, count = {int(parts[0])} if parts[0].isdecimal() else set(), 1
     if not chosen or max(chosen) >= len(given):
         known = [EVERY, *map(str, range(len(given))), *(name for name in names if isinstance(name, str))]
-        raise MultiPhiValueError(f"{place}: got {parts[0]!r}, need {one_of('entries', parts[0], known)}")
+        raise MultiPhiValueError(f"{place}: got {parts[0]!r}, need {one_of(parts[0], known, 'entries')}")
     return [change(entry, parts[count:]) if i in chosen else entry for i, entry in enumerate(given)]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.study.scene.fields import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.scene.model_kinds import ModelSpec
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
@@ -87,7 +87,7 @@ def _find(source: str, folder: Path) -> Path:
         return _shipped_folder() / f"{source}.toml"
     if (folder / source).is_file():
         return folder / source
-    raise MultiPhiValueError(f"SCENE: got {source!r}, need a TOML file or one of: {', '.join(shipped)}")
+    raise MultiPhiValueError(f"SCENE: got {source!r}, need a TOML file or {one_of(source, shipped)}")
 
 
 def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
@@ -97,7 +97,7 @@ def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     base = data.pop("base")
     shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
     if base not in shipped:
-        raise MultiPhiValueError(f"{path}: base: got {base!r}, need one of: {', '.join(shipped)}")
+        raise MultiPhiValueError(f"{path}: base: got {base!r}, need {one_of(base, shipped)}")
     content = read_toml(_shipped_folder() / f"{base}.toml")
     if "base" in content:
         raise MultiPhiValueError(f"{path}: base: got {base!r}, need a scene that has no base itself")
@@ -116,7 +116,7 @@ def _check(scene: Scene) -> None:
     for part, given in parts.items():
         for name in given:
             if name not in names:
-                refuse(scene, f"comparison.{part}", name, one_of("models", name, names))
+                refuse(scene, f"comparison.{part}", name, one_of(name, names, "models"))
     first: dict[str, ModelSpec] = {}
     for i, model in enumerate(map(scene.filled, file.models)):
         if first.setdefault(model.name, model) != model:

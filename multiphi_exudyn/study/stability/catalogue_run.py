@@ -6,6 +6,7 @@ import importlib.util
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.exudyn_runs import (
@@ -52,8 +53,7 @@ def chosen_cases(name: str | None, quick: bool) -> list[Case]:
         return [case for case in CATALOGUE if case.quick or not quick]
     found = [case for case in CATALOGUE if case.name == name]
     if not found:
-        known = ", ".join(case.name for case in CATALOGUE)
-        raise MultiPhiValueError(f"--case: got {name!r}, need one of: {known}")
+        raise MultiPhiValueError(f"--case: got {name!r}, need {one_of(name, (case.name for case in CATALOGUE))}")
     return found
 
 
