@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Event, Loss, State
+from multiphi_exudyn.events.state import Event, Loss, State, total_loss
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
@@ -150,12 +150,8 @@ class MultiPhiBody:
     @property
     def events(self) -> list[Event]:
         """Closings and openings with their exact times."""
-        return [*self._seen, *(() if self._run_ahead is None else self._run_ahead.events)]
-
-    @property
-    def _seen(self) -> list[Event]:
-        """Those of the start, and those in steps that were done again."""
-        return [*self._events, *(() if self._run_beside is None else self._run_beside.events)]
+        run = self._run_ahead or self._run_beside
+        return [*self._events, *(() if run is None else run.events)]
 
     @property
     def time(self) -> float:
@@ -194,9 +190,11 @@ class MultiPhiBody:
     def warnings(self) -> tuple[str, ...]:
         """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
+        lost = total_loss(() if self._run_beside is None else self._run_beside.events)
         interface = self.coordinates.interface
         turned = () if interface is None else interface.warnings
-        return (*warnings_of_body(self.model, self._record.of(self._seen, truncated)), *self._outside, *turned)
+        summary = self._record.of(total_loss(self._events) + lost, truncated)
+        return (*warnings_of_body(self.model, summary), *self._outside, *turned)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The level of elements in these states as the solver has it."""

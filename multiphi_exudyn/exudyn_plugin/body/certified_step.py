@@ -8,9 +8,9 @@ h^4/384 max|s''''|, and it lies above the least of its Bernstein coefficients: s
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
 velocities: under a constant force it grows no faster than with a rate sigma, that of a growing mode (omega^2 < 0) or
 what friction that goes with pressure feeds (levels/sliding.py), mostly not at all, so the values at the two ends bound
-it in between, whatever that force is. What fails the test is
-looked at exactly (body.py): the test may not decide, but it does not err. Of forces f on points s also holds L f
-(modal_force.py), of the step's mean: what stands at each end, less half its change.
+it in between, whatever that force is. What fails the test is looked at exactly (step_by_step.py): the test may not
+decide, but it does not err. Of forces f on points s also holds L f (modal_force.py), of the step's mean: what stands at
+each end, less half its change.
 
 Under loads that vary, s of xi = (eta, w), linear interpolation is off by at most h^2/8 max|s''|:
 

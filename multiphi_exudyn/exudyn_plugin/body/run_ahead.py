@@ -26,7 +26,6 @@ from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
 __all__ = ["RunAhead"]
 
@@ -53,7 +52,6 @@ class RunAhead:
         self._body, self._motion, self._record = body, motion, record
         self._step, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
-        self._steps = BoundedCache[tuple[int, ...], UndisturbedSteps](body.model.most_levels)
         self._state = np.array(here.views)
         self._way = _way(here.stepped)
         self._past, self._truncated = list[Sequence[Event]](), 0.0
@@ -151,7 +149,8 @@ class RunAhead:
             )
 
     def _steps_of(self, stepped: SteppedLevel) -> UndisturbedSteps:
-        return self._steps.get_or_build(stepped.states, lambda: UndisturbedSteps(stepped, self._step))
+        step, levels = self._step, self._body.own.levels
+        return levels.further(stepped.states, ("steps", stepped.step, step), lambda: UndisturbedSteps(stepped, step))
 
     # ------------------------------------------------------------------ what comes
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from multiphi_exudyn.events.state import Event, Loss, State
+from multiphi_exudyn.events.state import Loss, State
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.time.reliability import RunSummary
 
@@ -29,10 +27,9 @@ class RunRecord:
         self._levels.setdefault(level.indices, level)
         self._energy = max(self._energy, energy)
 
-    def of(self, events: Iterable[Event], truncated: float = 0.0) -> RunSummary:
-        """The summary with what truncation took at these events, and at others [J]."""
-        lost = self._truncated + sum(_truncated(event.loss) for event in events) + truncated
-        return RunSummary(tuple(self._levels.values()), lost, self._energy)
+    def of(self, lost: Loss, truncated: float) -> RunSummary:
+        """The summary with what was lost at events, and truncated at others [J]."""
+        return RunSummary(tuple(self._levels.values()), self._truncated + _truncated(lost) + truncated, self._energy)
 
 
 def _truncated(loss: Loss) -> float:

@@ -14,7 +14,7 @@ the body's own coordinates and ties left out of it. So an impact on the body is 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,10 +61,10 @@ class SystemMatrices:
         self._points = np.array(list(points), dtype=int)
         self._own = np.array(list(own), dtype=int)
         self._ties = [row for tie in ties for row in mbs.systemData.GetObjectLTGAE(tie)]
-        self._free = np.setdiff1d(np.arange(len(self._state["AECoords"])), self._ties)  # constraints beside the ties
+        self._free = _others(len(self._state["AECoords"]), self._ties)  # constraints beside the ties
         count, m = len(self.coordinates[0]), len(self._points)
         self._nothing = AttachedInertia(np.zeros((m, m)), np.eye(m)), np.zeros((count, m))
-        self._others = np.setdiff1d(np.arange(len(self.coordinates[0])), [*self._own, *self._points])
+        self._others = _others(count, [*self._own, *self._points])
 
     @property
     def coordinates(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -198,14 +198,22 @@ class SystemMatrices:
         return np.asarray((found[0] - found[1]) / (2 * apart))
 
 
+def _others(count: int, places: Sequence[int]) -> np.ndarray:
+    """Positions among so many that are none of these, ascending."""
+    left = np.ones(count, bool)
+    left[list(places)] = False
+    return np.flatnonzero(left)
+
+
 def _connected(mass: np.ndarray, jacobian: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Positions of these coordinates and of all that mass and constraints connect with them, ascending."""
-    masses, holds = mass != 0, jacobian != 0
+    holds = (jacobian != 0).astype(float)
+    linked = (mass != 0) | (holds.T.dot(holds) > 0)
     found, count = np.zeros(len(mass), bool), 0
     found[points] = True
     while np.count_nonzero(found) > count:
         count = int(np.count_nonzero(found))
-        found |= masses[found].any(axis=0) | holds[holds[:, found].any(axis=1)].any(axis=0)
+        found |= linked[found].any(axis=0)
     return np.flatnonzero(found)
 
 
