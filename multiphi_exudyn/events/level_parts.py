@@ -71,7 +71,7 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
     modal, patterns, static = level.modal, level.excitation.patterns, level.excitation.static + base.preload
     moved = np.hstack([modal.vectors, carried])
-    springs = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
+    springs = base.springs[index]
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
     held = springs * level.gap_constants[index]
     given = carried.T @ base.pushes - level.excitation.stops.T  # by the forces of elements

@@ -98,9 +98,8 @@ def _force_rows(
     gap_rows: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
-    stiffness, damping = base.stiffnesses[closed], base.dampings[closed]
-    rigid = np.isinf(stiffness)
-    forces, rates = -np.where(rigid, 0.0, stiffness)[:, None] * gap_rows, -damping[:, None] * gap_rows
+    rigid = np.isinf(base.stiffnesses[closed])
+    forces, rates = -base.springs[closed][:, None] * gap_rows, -base.dampings[closed][:, None] * gap_rows
     if rigid.any():
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]

@@ -291,6 +291,6 @@ class Level(Shown):
         self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
     ) -> np.ndarray:
         """lambda (k,) of the closed contacts from the forces along their directions."""
-        index, closing = list(self.indices), np.zeros(len(self.base.links))
-        closing[index] = self.base.directions[:, index].T @ configuration + gaps
-        return self.base.contact_forces(closed_directions, along, closing)[index]
+        index, every = list(self.indices), np.zeros(len(self.base.links))
+        every[index] = gaps
+        return self.base.contact_forces(closed_directions, along, configuration, every)[index]

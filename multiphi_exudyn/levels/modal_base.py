@@ -153,8 +153,7 @@ class ModalBase(ElementTable, Shown):
             return constant
         index = list(closed)
         closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
-        springs = np.where(np.isinf(self.stiffnesses[index]), 0.0, self.stiffnesses[index])
-        return constant + 0.5 * float(np.sum(springs * closing**2))
+        return constant + 0.5 * float(self.springs[index] @ (closing * closing))
 
     @functools.cached_property
     def squares(self) -> np.ndarray:
@@ -233,16 +232,19 @@ class ModalBase(ElementTable, Shown):
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
-    def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, closing: np.ndarray) -> np.ndarray:
-        """lambda (l,) [N] from the forces (d,) along closed directions and the gaps (l,) there; zero where open.
+    def contact_forces(
+        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
+    ) -> np.ndarray:
+        """lambda (l,) [N] from the forces (d,) along closed directions and y (m,) there; zero where open.
 
-        Springs of one direction have what their gaps say, and a rigid contact among them the rest.
+        gaps: (l,) at y = 0. Springs of one direction have what their gaps say, and a rigid contact among them the rest.
         """
         forces = np.zeros(len(self.links))
         if all(len(members) == 1 for members in closed_directions.members):
             index = [i for (i,) in closed_directions.members]
             forces[index] = self.direction_signs[index] * along
             return forces
+        closing = self.directions.T @ configuration + gaps
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:

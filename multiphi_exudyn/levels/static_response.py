@@ -128,7 +128,9 @@ def _solver(bent: np.ndarray, own: np.ndarray, sprung: np.ndarray, coupling: np.
 def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
     """Of the unknowns (d + k,), to which rows and columns are scaled."""
     forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
-    largest = float(np.max(np.abs(forces[:, None] * coupling), initial=0.0)) or 1.0
+    if not coupling.size:
+        return np.concatenate([forces, np.ones(coupling.shape[1])])
+    largest = float(np.max(np.abs(forces[:, None] * coupling))) or 1.0
     return np.concatenate([forces, np.full(coupling.shape[1], 1 / largest)])
 
 

@@ -27,10 +27,10 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.mathematics.lanczos import check_mass, definite_factor, iterated, lanczos
 from multiphi_exudyn.mathematics.modes import (
     FIRST_SHIFT,
     NEAR,
-    ROUND_OFF,
     Modes,
     classified,
     largest_ratio,
@@ -43,6 +43,8 @@ DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it i
 ACCURATE = 1e-9  # error of omega^2 of sample levels, up to which Krylov vectors are added
 DEEPEST = 8  # blocks of Krylov vectors at most
 CHECKED = 4  # highest modes of a sample level that are looked at: they have the largest errors
+ROUGH, FEW = 1e-5, 10  # error of omega^2, and vectors at a time, where it is only asked whether a mode was missed
+CLEAR = 1e-2  # of omega^2: with that error a mode so far above the last is another one
 BAR_DELAY = 2.0  # s before a progress bar appears
 
 Vectors: TypeAlias = tuple[np.ndarray, np.ndarray]  # shapes C (n, k), C^T A C = I, and A C
@@ -105,7 +107,7 @@ def left_out(mass: Any, stiffness: Any, modes: Modes, rows: np.ndarray) -> np.nd
     """Share (k,) of the static flexibility h.K^-1 h, or h.A^-1 h, of rows (k, n) that modes do not hold."""
     mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
     shift = float(modes.omega[modes.rigid]) ** 2 if modes.rigid else 0.0
-    factor = _definite_factor(scipy.sparse.csc_array(stiffness + shift * mass))
+    factor = definite_factor(scipy.sparse.csc_array(stiffness + shift * mass))
     if factor is None:
         raise NumericalFailure("static response: K is singular to round-off")
     whole = np.einsum("ij,ji->i", rows, factor.solve(np.ascontiguousarray(rows.T)))
@@ -117,10 +119,10 @@ class _Lowest:
     """The lowest modes under way. values, vectors: omega^2 and shapes of those found. shift: s; factor: of A."""
 
     def __init__(self, mass: Any, stiffness: Any, least: int, bar: Any) -> None:
-        _check_mass(mass)
+        check_mass(mass)
         self.mass, self.stiffness, self._least, self._bar = mass, stiffness, least, bar
         self.values, self.vectors = np.zeros(0), np.zeros((mass.shape[0], 0))
-        self.shift, self._factor = 0.0, _definite_factor(stiffness)
+        self.shift, self._factor = 0.0, definite_factor(stiffness)
 
     def solve(self, given: np.ndarray) -> np.ndarray:
         """A^-1 of vectors (n,) or (n, k)."""
@@ -155,7 +157,7 @@ class _Lowest:
 
     def _move(self, shift: float) -> None:
         self.shift = shift
-        self._factor = _definite_factor(scipy.sparse.csc_array(self.stiffness + shift * self.mass))
+        self._factor = definite_factor(scipy.sparse.csc_array(self.stiffness + shift * self.mass))
         if self._factor is None:
             raise MultiPhiValueError(
                 f"stiffness: indefinite, lowest eigenvalue omega^2 below {-shift:g}; need a positive semidefinite "
@@ -174,15 +176,19 @@ class _Lowest:
 
     def _add(self, further: int) -> None:
         """So many more, by the compliance without those that are there."""
-        values, vectors = _lanczos(self.mass, self.stiffness, further, self.shift, self._beyond)
+        values, vectors = lanczos(self.mass, self.stiffness, further, self.shift, self._beyond)
         self._take(values, vectors)
 
     def _add_missed(self) -> bool:
         """Whether there was one more below the last: of modes of one frequency an iteration may see a part alone."""
         if not len(self.values) or len(self.values) >= self.mass.shape[0] - 1:
             return False
-        value, vector = _iterated(self.mass, self.stiffness, 1, self.shift, self._beyond)
-        missed = bool(value[0] + self.shift <= (1 + NEAR) * (self.values[-1] + self.shift))
+        given, last = (self.mass, self.stiffness, 1, self.shift, self._beyond), self.values[-1] + self.shift
+        value, _ = iterated(*given, tolerance=ROUGH, vectors=FEW)
+        if value[0] + self.shift > (1 + CLEAR) * last:
+            return False
+        value, vector = iterated(*given)
+        missed = bool(value[0] + self.shift <= (1 + NEAR) * last)
         if missed:
             self._take(value, vector)
             order = np.argsort(self.values, kind="stable")
@@ -300,50 +306,3 @@ def _ritz(mass: Any, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues of A (k,) in the space of A-orthonormal shapes, and the rotation (k, k) to its M-normalised modes."""
     inverse, rotation = scipy.linalg.eigh(shapes.T @ (mass @ shapes))
     return 1 / inverse, rotation / np.sqrt(inverse)
-
-
-def _definite_factor(matrix: Any) -> Any | None:
-    """Sparse triangular factors of a symmetric matrix; None where it is not positive definite to round-off.
-
-    Pivots are taken from the diagonal, so that their signs are those of the eigenvalues (Sylvester).
-    """
-    try:
-        factor = scipy.sparse.linalg.splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-    except RuntimeError:  # "Factor is exactly singular"
-        return None
-    pivots = factor.U.diagonal()[factor.perm_c]
-    definite = np.array_equal(factor.perm_r, factor.perm_c) and np.all(pivots > ROUND_OFF * matrix.diagonal())
-    return factor if definite else None
-
-
-def _check_mass(mass: Any) -> None:
-    diagonal = scipy.sparse.diags_array(mass.diagonal())
-    if (mass != diagonal).nnz and _definite_factor(mass) is None:
-        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix")
-
-
-def _lanczos(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
-
-    answer: to a force, A^-1, or what other modes leave of it.
-    """
-    values, vectors = _iterated(mass, stiffness, count + 1, shift, answer)
-    apart = np.flatnonzero(np.diff(values) > NEAR * np.abs(values[1:]))
-    whole = count >= stiffness.shape[0] - 2  # there is no more to part them from
-    kept = count if whole and not apart.size else (apart[-1] + 1 if apart.size else 0)
-    return values[:kept], vectors[:, :kept]
-
-
-def _iterated(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The ``count`` lowest omega^2 that a Lanczos iteration sees, ascending, and their shapes."""
-    n = stiffness.shape[0]
-    start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
-    operator = scipy.sparse.linalg.LinearOperator((n, n), answer, dtype=float)
-    try:
-        values, vectors = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=-shift, OPinv=operator, v0=start)
-    except scipy.sparse.linalg.ArpackError as error:
-        raise NumericalFailure(f"modes: Lanczos iteration for {count} of {n} modes failed: {error}") from error
-    order = np.argsort(values)
-    return values[order], vectors[:, order]

@@ -128,9 +128,9 @@ def turned(
 
 def _signs(seen: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Of every mode the sign (m,) with which the first row or coordinate moves that moves in it."""
-    moves = np.abs(seen) > MOVES * sizes[: len(seen), None]
-    if not len(seen) or not moves.any(axis=0).all():
-        seen = np.vstack([seen, shapes])
+    if len(seen) and (np.abs(seen[0]) > MOVES * sizes[0]).all():
+        return np.where(seen[0] >= 0, 1.0, -1.0)
+    seen = np.vstack([seen, shapes])
     first = _first_moved(np.abs(seen), sizes[: len(seen), None])
     return np.where(seen[first, np.arange(seen.shape[1])] >= 0, 1.0, -1.0)
 

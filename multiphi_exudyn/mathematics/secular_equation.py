@@ -35,14 +35,15 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
             own[first:last] = np.eye(1, last - first)[0] * float(turn[:, 0] @ p[first:last])
     sizes = own * own / (d + d[min(count, len(d) - 1)])
     present = sizes > ABSENT**2 * sizes.sum()
-    whole = bool(present.all()) and not turns
+    if count < len(d) and not turns and present.all():
+        return _roots(d, p, stiffness, count)
     poles, left = np.flatnonzero(present), np.flatnonzero(~present)[:count]
     roots = min(count, len(poles) - 1)
     if roots < 1 or (roots < count and np.isfinite(stiffness)) or roots + len(left) < count:
         return None
-    found = _roots(*((d, own) if whole else (d[poles], own[poles])), stiffness, roots)
-    if found is None or whole:
-        return found
+    found = _roots(d[poles], own[poles], stiffness, roots)
+    if found is None:
+        return None
     values = np.concatenate([found[0], d[left]])
     order = np.argsort(values, kind="stable")[:count]
     vectors = np.zeros((len(d), len(values)))
@@ -56,8 +57,8 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
 
 def _turns(d: np.ndarray, p: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
     """Of every cluster of equal d its first, one past its last, and a rotation whose first column is along p."""
-    apart = np.diff(d) > EQUAL * d[1:]
-    if np.all(apart):
+    apart = d[1:] - d[:-1] > EQUAL * d[1:]
+    if apart.all():
         return []
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(d)]
     turns = []

@@ -75,6 +75,11 @@ class ElementTable:
         return np.array([link.stiffness for link in self.links])
 
     @functools.cached_property
+    def springs(self) -> np.ndarray:
+        """The same (l,), zero where rigid: a rigid contact stores nothing."""
+        return np.where(np.isinf(self.stiffnesses), 0.0, self.stiffnesses)
+
+    @functools.cached_property
     def dampings(self) -> np.ndarray:
         """Dampings (l,) [N s/m]."""
         return np.array([link.damping for link in self.links])

@@ -35,7 +35,7 @@ STOPS = [mp.UnilateralContact("rigid", "p", 0.1), mp.UnilateralContact("soft", {
 def arbitrary(request, monkeypatch):
     """Eigensolvers with another sign of every mode, and another basis of modes of one frequency."""
     random = np.random.default_rng(request.param)
-    solver, lanczos = modes.right_singular_vectors, lowest_modes._lanczos
+    solver, lanczos = modes.right_singular_vectors, lowest_modes.lanczos
 
     def mixed(values, vectors):
         vectors = vectors * random.choice([-1.0, 1.0], vectors.shape[1])
@@ -46,7 +46,7 @@ def arbitrary(request, monkeypatch):
 
     for module in (modes, level_modes):
         monkeypatch.setattr(module, "right_singular_vectors", lambda matrix: mixed(*solver(matrix)))
-    monkeypatch.setattr(lowest_modes, "_lanczos", lambda *given: mixed(*lanczos(*given)))
+    monkeypatch.setattr(lowest_modes, "lanczos", lambda *given: mixed(*lanczos(*given)))
 
 
 class TestTurned:

@@ -100,8 +100,8 @@ def test_a_cluster_larger_than_what_is_computed_beyond_the_modes_is_kept_whole()
 
 def counted(monkeypatch):
     """How many modes Lanczos iterations have been asked for, call by call."""
-    asked, lanczos = [], lowest_modes._lanczos
-    monkeypatch.setattr(lowest_modes, "_lanczos", lambda *given: asked.append(given[2]) or lanczos(*given))
+    asked, lanczos = [], lowest_modes.lanczos
+    monkeypatch.setattr(lowest_modes, "lanczos", lambda *given: asked.append(given[2]) or lanczos(*given))
     return asked
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, planar_beam
-from multiphi_exudyn.mathematics.lowest_modes import lowest_modes
+from multiphi_exudyn.mathematics.lowest_modes import _Lowest, lowest_modes
 from multiphi_exudyn.mathematics.modes import complete_modes, right_singular_vectors
 
 
@@ -188,9 +188,26 @@ class TestLowestModes:
         with pytest.raises(MultiPhiValueError, match="mass: indefinite"):
             lowest_modes(mass, scipy.sparse.eye_array(62), 4, np.zeros((0, 62)))
 
+    def test_are_looked_for_once_more_by_a_few_solves(self, monkeypatch):
+        """Whether one was missed takes no accuracy, while the next one is clearly above."""
+        solves, looked, solve, look = [], [], _Lowest.solve, _Lowest._add_missed
+
+        def looking(found):
+            before = len(solves)
+            missed = look(found)
+            looked.append(len(solves) - before)
+            return missed
+
+        monkeypatch.setattr(_Lowest, "solve", lambda found, given: solves.append(1) or solve(found, given))
+        monkeypatch.setattr(_Lowest, "_add_missed", looking)
+        mass, stiffness = (scipy.sparse.csr_array(matrix) for matrix in chain(400))
+        lowest_modes(mass, stiffness, 20, np.zeros((0, 400)))
+        assert len(looked) == 1
+        assert looked[0] <= 21
+
     def test_that_do_not_converge_are_a_failure_with_its_cause(self, monkeypatch):
         eigsh = scipy.sparse.linalg.eigsh
-        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lambda *a, **k: eigsh(*a, **k, maxiter=1, ncv=6))
+        monkeypatch.setattr(scipy.sparse.linalg, "eigsh", lambda *a, **k: eigsh(*a, **{**k, "maxiter": 1, "ncv": 6}))
         mass, stiffness = (scipy.sparse.csr_array(matrix) for matrix in chain(400))
         with pytest.raises(NumericalFailure, match="Lanczos iteration for 5 of 400 modes failed"):
             lowest_modes(mass, stiffness, 4, np.zeros((0, 400)))
