@@ -288,7 +288,7 @@ def go(ints: Ints, numbers: Numbers, problem: int, driven: int, step: float) -> 
 @compiled
 def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
     """SOLVED, with z, where every row is complementary and x is what z pushes, else UNDECIDED."""
-    r, x, missing, total = ints[problem + UNKNOWNS], ints[problem + X], ints[problem + PUSHED], 0.0
+    r, x, missing, total, most = ints[problem + UNKNOWNS], ints[problem + X], ints[problem + PUSHED], 0.0, 0.0
     reach, units = norm(numbers, x, r), ints[problem + PUSH_UNITS]
     for i in range(r):
         numbers[missing + i] = numbers[x + i]
@@ -296,10 +296,11 @@ def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
         share = numbers[ints[problem + SHARES] + k]
         share = max(min(share, bound(ints, numbers, problem, k, ABOVE)), bound(ints, numbers, problem, k, BELOW))
         total += abs(share)
+        most = max(most, numbers[ints[problem + TERMS] + k])
         for i in range(r):
             numbers[missing + i] -= share * numbers[units + k * r + i]
         w, terms = abs(numbers[ints[problem + RESULTS] + k]), numbers[ints[problem + TERMS] + k] + reach
         if ints[ints[problem + SIDES] + k] == BETWEEN and not w <= FOLLOWING * terms:
             return UNDECIDED
         numbers[ints[problem + Z] + k] = share / numbers[ints[problem + PUSH_LENGTHS] + k]
-    return SOLVED if norm(numbers, missing, r) <= PROVED * (total + reach) else UNDECIDED
+    return SOLVED if norm(numbers, missing, r) <= PROVED * (total + reach) + ZERO * most else UNDECIDED
