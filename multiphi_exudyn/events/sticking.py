@@ -72,7 +72,8 @@ from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, 
 from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
-from multiphi_exudyn.mathematics.free_rows import ABOVE, BETWEEN, SIDES, WAITING, norm, product
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BELOW, SIDES, WAITING, norm, product
+from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 
 __all__ = ["stick_together"]
 
@@ -134,7 +135,7 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
         if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
-        falling = choose(ints, numbers, count)
+        falling = choose(ints, numbers, count, asking)
     thin_out_idle(ints, numbers, count)
     for i in range(ints[ELEMENTS]):
         ints[key + i] = ints[wishes + i]
@@ -260,7 +261,7 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
         limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
         slipped = key_push(ints, i, limit)
         low, high = slipped - most, slipped + most
-        if at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
+        if most <= limit and at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
             low = slipped - limit if ints[asking + i] == forward else slipped + limit
             high = low
         numbers[ints[LOWEST] + k] = low
@@ -309,10 +310,11 @@ def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
 
 
 @compiled
-def choose(ints: Ints, numbers: Numbers, count: int) -> int:
+def choose(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
     """12. WISHES: the states of the solution; how many of them begin to slip, and fall from their static limit.
 
-    Those that come from slip fall first: what then does not need more than its static limit goes on sticking.
+    Those that come from slip fall first: what then does not need more than its static limit goes on sticking. Who asks
+    at its static limit, which it would exceed, falls unless others bear more now.
     """
     states, falling = ints[ints[WORKED + LEVEL] + STATES], 0
     for stuck in range(2):
@@ -322,10 +324,11 @@ def choose(ints: Ints, numbers: Numbers, count: int) -> int:
             limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
             slipped = key_push(ints, i, limit)
             side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks
+            force = numbers[ints[FURTHER] + k] - slipped
+            exceeds = most > limit and abs(force) >= (1.0 - FOLLOWING) * most
             if numbers[low] == numbers[high]:
                 entered += SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
-            elif side != BETWEEN and side != WAITING:
-                force = numbers[ints[FURTHER] + k] - slipped
+            elif side in (BELOW, ABOVE) or (exceeds and at_limit(ints, numbers, i, ints[asking + i]) == 1):
                 entered += SLIP_BACKWARD if side == ABOVE or force > 0.0 else SLIP_FORWARD
                 now = (ints[states + i] == sticks) == (stuck == 1)
                 if now and most > limit and abs(force) > limit:

@@ -89,6 +89,7 @@ from multiphi_exudyn.mathematics.row_sides import choose_sides, first_change, is
 __all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "pose", "problem_ints", "problem_numbers", "solve"]
 
 SOLVED, EXCLUDED, UNDECIDED = 0, 1, 2  # no z is complementary; round-off keeps the sides from settling
+APART = 1e-9  # of its terms: by which a row is moved so that it does not come to zero with another one
 PROVED = 1e-12  # of all pushes: what x may differ from their sum
 
 
@@ -172,20 +173,34 @@ def solve(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> int:
         numbers[z + k] = 0.0
     if count == 1:
         return only_one(ints, numbers, problem)
-    answer = attempt(ints, numbers, problem, in_turn)
-    return answer if answer == SOLVED else attempt(ints, numbers, problem, 1 - in_turn)
+    answer = attempt(ints, numbers, problem, in_turn, 0.0)
+    if answer != SOLVED:
+        answer = attempt(ints, numbers, problem, 1 - in_turn, 0.0)
+    return answer if answer != UNDECIDED else attempt(ints, numbers, problem, in_turn, APART)
 
 
 @compiled
-def attempt(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> int:
-    """The answer where the row violated most is driven first, or rows in turn: round-off spoils either elsewhere."""
+def attempt(ints: Ints, numbers: Numbers, problem: int, in_turn: int, apart: float) -> int:
+    """The answer where the row violated most is driven first, or rows in turn: round-off spoils either elsewhere.
+
+    apart: of their terms, by which every row of another multiple is moved until all are complementary: where several
+    come to zero at once they may change sides with each other for ever.
+    """
     scale(ints, numbers, problem)
+    for k in range(ints[problem + COUNT]):
+        numbers[ints[problem + OFFSETS] + k] += (k + 1) * apart * numbers[ints[problem + TERMS] + k]
     push_fixed(ints, numbers, problem)
     for _ in range(SETS * (ints[problem + COUNT] + 1)):
         look(ints, numbers, problem)
         driven = most_lacking(ints, numbers, problem, in_turn)
-        if driven < 0:
+        if driven < 0 and apart == 0.0:
             return proved(ints, numbers, problem)
+        if driven < 0:
+            for k in range(ints[problem + COUNT]):
+                numbers[ints[problem + OFFSETS] + k] -= (k + 1) * apart * numbers[ints[problem + TERMS] + k]
+            meet(ints, numbers, problem)
+            apart = 0.0
+            continue
         answer = drive(ints, numbers, problem, driven)
         if answer != SOLVED:
             return answer
@@ -273,7 +288,7 @@ def go(ints: Ints, numbers: Numbers, problem: int, driven: int, step: float) -> 
 @compiled
 def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
     """SOLVED, with z, where every row is complementary and x is what z pushes, else UNDECIDED."""
-    r, x, missing, total = ints[problem + UNKNOWNS], ints[problem + X], ints[problem + PUSHED], 0.0
+    r, x, missing, total, most = ints[problem + UNKNOWNS], ints[problem + X], ints[problem + PUSHED], 0.0, 0.0
     reach, units = norm(numbers, x, r), ints[problem + PUSH_UNITS]
     for i in range(r):
         numbers[missing + i] = numbers[x + i]
@@ -281,10 +296,11 @@ def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
         share = numbers[ints[problem + SHARES] + k]
         share = max(min(share, bound(ints, numbers, problem, k, ABOVE)), bound(ints, numbers, problem, k, BELOW))
         total += abs(share)
+        most = max(most, numbers[ints[problem + TERMS] + k])
         for i in range(r):
             numbers[missing + i] -= share * numbers[units + k * r + i]
         w, terms = abs(numbers[ints[problem + RESULTS] + k]), numbers[ints[problem + TERMS] + k] + reach
         if ints[ints[problem + SIDES] + k] == BETWEEN and not w <= FOLLOWING * terms:
             return UNDECIDED
         numbers[ints[problem + Z] + k] = share / numbers[ints[problem + PUSH_LENGTHS] + k]
-    return SOLVED if norm(numbers, missing, r) <= PROVED * (total + reach) else UNDECIDED
+    return SOLVED if norm(numbers, missing, r) <= PROVED * (total + reach) + ZERO * most else UNDECIDED

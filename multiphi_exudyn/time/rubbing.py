@@ -6,7 +6,10 @@ which of them bears the load is not determined, nor when they begin to slip: two
 do at S + F here, and might at 2 S. Friction at rigid contacts is decided one contact after the other: where several
 turn at one instant, their order may count.
 
-A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py).
+A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py):
+the modes of slip and those of stick do not move its place alike. It is told, and not mended. The static residual of the
+modes left out, which serves friction of constant limits, would go with the pressure here: a force that moves no mass
+and follows N' is not symmetric, and may make energy. More modes are the remedy.
 """
 
 from __future__ import annotations

@@ -149,6 +149,26 @@ def rod(angle, friction):
     return rows, np.array([NONE, 0]), np.array([0.0, friction])
 
 
+def test_rows_that_come_to_zero_at_once_do_not_change_sides_for_ever():
+    """One contact at rest, to which the friction of another one drives the structure, and its own friction at zero."""
+    W = np.array(
+        [
+            [0.59733191472623792, 0.0, 0.59733191472623792, -0.57453308670707937],
+            [0.0, 0.8639797211645257, 0.0, -0.33620855287948714],
+            [0.59733191472623792, 0.0, 1.6284496315066497, -1.8836235329905477],
+            [-0.57453308670707937, -0.33620855287948714, -1.8836235329905477, 2.3640320323590407],
+        ]
+    )
+    b, leaders = np.array([0.0, -1.3321739437070392, 0.0, 0.48015792774859745]), np.array([NONE, NONE, 0, 1])
+    ties, low = np.array([0.0, 0.0, 0.34176142930911907, 0.0574027466821208]), np.zeros(4)
+    high, sizes = np.array([np.inf, np.inf, 0.0, 0.0]), np.array([0.76, 1.33, 1.65, 2.16])
+    (expected,) = enumerated(W, b, low, high, leaders, ties)
+    for in_turn in (0, 1):
+        _, z, answer, _ = complementary(np.linalg.cholesky(W), None, b, sizes, low, high, leaders, ties, in_turn)
+        assert answer == SOLVED
+        assert_allclose(z, expected, rtol=0, atol=1e-12)
+
+
 class TestRodOnARoughFloor:
     """One contact, p_n >= 0, |p_t| <= mu p_n: what sticks, slips or jams, in closed form."""
 

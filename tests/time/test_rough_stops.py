@@ -167,6 +167,17 @@ class TestCoupledImpact:
         assert run.status == "ok"
         assert run.contact_intervals("floor")[-1][1] == 3.0
 
+    def test_whose_sticking_is_on_the_edge_of_the_cone_ends_all_its_bounces(self):
+        """mu is how the mass couples x to y: ever smaller impulses are exactly on the edge, but for round-off."""
+        structure = mp.LinearStructure(COUPLED, np.diag([3.0, 2.0]), points={"x": 0, "y": 1})
+        given = {"friction": 0.4, "restitution": 0.5, "tangential_velocity": 0.1}
+        model = mp.MultiPhiModel(structure, [mp.UnilateralContact("f", "y", 0.0, tangential="x", **given)], modes="all")
+        runs = [
+            mp.simulate(model, 1.0, [0.0, height], [0.3, -1.0], [mp.ConstantLoad("y", -3.0)]) for height in (0.0, 1e-9)
+        ]
+        assert [run.status for run in runs] == ["ok", "ok"]
+        assert_allclose(runs[0].displacement(1.0), runs[1].displacement(1.0), rtol=0, atol=1e-8)
+
 
 def rod(friction, speed, height):
     """Painleve's rod, m 1, half length 1, J 1/3, with one end on the floor, at an angle."""

@@ -88,7 +88,18 @@ def largest_energy(run: Trajectory, segments: Sequence[Segment], joule: float = 
     rests = DIFFERENCE * max(map(_potential, segments))
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
     passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
+    passed = max(passed, PASSED * _stretched(run))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST * joule, rests, passed)
+
+
+def _stretched(run: Trajectory) -> float:
+    """What springs of friction would hold [J] if the start had stretched them; it has not, but for round-off of it."""
+    links, places = run.model.links, run.start.displacement @ run.model.base.directions
+    return sum(
+        0.5 * link.stiffness * place**2
+        for link, place in zip(links, places.tolist(), strict=True)
+        if link.held and not link.rigid
+    )
 
 
 def _potential(segment: Segment) -> float:

@@ -123,6 +123,11 @@ def _rubbing(parts, law, gap, restitution=0.0):
                 parts.stops[i] = replace(parts.stops[i], restitution=restitution)
     rows = [stop.row for stop in parts.stops]
     for i in range(len(parts.contacts)):
+        beside = [slider for slider in parts.sliders if np.isinf(slider.stiffness)]
+        if not any(contact.rigid for contact in parts.contacts) and beside and random.random() < 0.4:  # one motion
+            lever, friction = float(random.choice([1.0, -1.0, 0.5])), float(10.0 ** random.uniform(-1.3, 0.3))
+            parts.rub(i, lever * beside[-1].row, friction, friction, np.inf, lever * beside[-1].velocity)
+            continue
         row = next(
             (r for r in random_rows(parts, parts.n) if np.linalg.matrix_rank([*rows, r], tol=0.01) > len(rows)), None
         )
@@ -180,31 +185,28 @@ def _free(random):
 def _redundant(random):
     """Scenes of other kinds, blocks split in two or three of one direction: the motion is the same.
 
-    Those without a higher static limit: which part lets go first, and what the others then bear, has no one answer.
+    Of a higher static limit one part has all that it is higher: with several it has no one answer which lets go first.
     """
     scene = (_blocks, _loads, _impacts)[int(random.integers(3))](random)
     given = [contact for contact in scene.model.contacts if isinstance(contact, mp.Friction)]
-    contacts, blocks = [], [block for block in given if block.rigid and block.most == block.limit]
+    contacts, blocks = [], [block for block in given if block.rigid]
     for contact in scene.model.contacts:
         if contact not in blocks or (contact is not blocks[0] and random.random() < 0.3):
             contacts.append(contact)
             continue
         shares = random.dirichlet(np.full(int(random.integers(2, 4)), 2.0))
+        last = int(random.integers(len(shares)))
         for k, share in enumerate(shares.tolist()):
-            lever = float(random.choice([1.0, -1.0, 0.5, 3.0]))
-            contacts.append(_part(contact, f"{contact.name}.{k}", share / abs(lever), lever))
+            lever, more = float(random.choice([1.0, -1.0, 0.5, 3.0])), contact.most - contact.limit
+            most = share * contact.limit + (more if k == last else 0.0)
+            contacts.append(_part(contact, f"{contact.name}.{k}", share * contact.limit, most, lever))
     return replace(scene, model=mp.MultiPhiModel(scene.model.structure, contacts, modes="all"))
 
 
-def _part(block, name, share, lever):
-    """A share of a block's limits along its direction times a number."""
-    return mp.Friction(
-        name,
-        lever * np.asarray(block.direction),
-        share * block.limit,
-        share * block.most,
-        velocity=lever * block.velocity,
-    )
+def _part(block, name, limit, most, lever):
+    """A part of a block, with these limits along its direction, as friction along that times a number."""
+    direction, size = lever * np.asarray(block.direction), abs(lever)
+    return mp.Friction(name, direction, limit / size, most / size, velocity=lever * block.velocity)
 
 
 def _units(random):
