@@ -43,9 +43,9 @@ from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.motion import Motion, motion_of
+from multiphi_exudyn.time.recorded import Events
 from multiphi_exudyn.time.reliability import warnings_of_body
-from multiphi_exudyn.time.simulate import motion_of
 
 __all__ = ["MultiPhiBody"]
 
@@ -144,7 +144,7 @@ class MultiPhiBody:
         layout, matched = LevelData(self.model), matched_step is not None
         self.coordinates = Coordinates(self.items, stepped, state.held, layout, most, matched)
         self._given = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
-        self._given_events = tuple(motion.record.events())
+        self._given_events = tuple(Events(motion.record))
         self._events = list(self._given_events)
 
     @property

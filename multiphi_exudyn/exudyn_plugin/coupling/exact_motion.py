@@ -14,6 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.entering import set_state
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Event, State
@@ -107,7 +108,7 @@ class ExactMotion:
         w, w_t = arrays.channels.at(arrays.buffers, time)
         if len(w):
             place, speed = (np.concatenate([x[:r], at, x[r:]]) for x, at in ((place, w), (speed, w_t)))
-        arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
+        set_state(arrays, level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
 
     def _run(self, until: float, trial: bool) -> tuple[bool, tuple[Event, ...]]:
         """The loop until it ends, with all that it needs; whether there were events on the way, and which."""
