@@ -28,7 +28,7 @@ def set_start(
     held: places (h,) that links hold. sprung: links that hold by their springs.
     """
     base = arrays.base
-    ints, numbers, _ = arrays.buffers.all
+    ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
     m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[base + a.STATES])
     for i, state in enumerate(key):
         ints[states + i] = state

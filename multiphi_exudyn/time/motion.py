@@ -141,15 +141,15 @@ class Motion:
             message=self.message,
             start=self.start,
             start_loss=self.start_loss,
-            final=self._state if segments else None,
+            final=self._state if self.record.count else None,
             final_work=float(numbers[a.WORK]),
-            load=self.levels.load,
+            load=self.levels.excitation.static,
             stats=Statistics(
                 levels_built=self.model.levels_built,
                 levels_possible=self.model.levels_possible,
                 transitions=self._transitions,
                 events=len(events),
-                segments=len(segments),
+                segments=self.record.count,
                 function_evaluations=self._evaluations,
                 record_bytes=self.record.bytes,
                 array_bytes=self.arrays.buffers.size,
@@ -168,7 +168,7 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if not all_finite(self.state.displacement):
+            if self._state is not None and not all_finite(self._state.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
@@ -225,7 +225,7 @@ class Motion:
 
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
-        ints, numbers, _ = self.arrays.buffers.all
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         self._kept = _Kept(numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
 
     def _enter(self) -> None:
@@ -265,7 +265,7 @@ class Motion:
         ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
 
     def _state_reached(self) -> State:
-        ints, numbers, _ = self.arrays.buffers.all
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
         level, exits = self.arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
         phases = (Phase.ARMED,) * exits if settled else tuple(PHASES[k] for k in ints[waits : waits + exits].tolist())

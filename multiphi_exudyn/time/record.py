@@ -84,8 +84,10 @@ class Record:
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        last = sum([part.nbytes for part in self._last.values()])
-        return last + sum([part.bytes for part in self._parts.values()])
+        taken = [part.nbytes for part in self._last.values()]
+        if self._parts:
+            taken += [part.bytes for part in self._parts.values()]
+        return sum(taken)
 
     @property
     def parts(self) -> dict[str, Growing]:
@@ -119,7 +121,7 @@ class Record:
             known[number] = self._numbers.setdefault(level.states, len(self.levels))
             if known[number] == len(self.levels):
                 self.levels.append(level)
-        if any(number != other for number, other in known.items()):
+        if list(known) != list(known.values()):
             numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property

@@ -21,9 +21,9 @@ T = TypeVar("T")
 class Made(Sequence[T], Generic[T]):
     """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
 
-    def __init__(self, make: Callable[[int], T], count: int) -> None:
-        self._make, self._count = make, count
-        self._known: dict[int, T] = {}
+    _make: Callable[[int], T]
+    _count: int
+    _known: dict[int, T]
 
     def __len__(self) -> int:
         return self._count
@@ -54,7 +54,7 @@ class Recorded(Made[Segment], Segments):
     """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments."""
 
     def __init__(self, record: Record, defects: float, truncated: float) -> None:
-        super().__init__(record.segment, record.count)
+        self._make, self._count, self._known = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
         self.defects, self.truncated = defects, truncated
 
@@ -115,7 +115,7 @@ class Events(Made[Event]):
     """The events of a record so far."""
 
     def __init__(self, record: Record) -> None:
-        super().__init__(record.event, 0 if record.eventless else len(record.places))
+        self._make, self._count, self._known = record.event, 0 if record.eventless else len(record.places), {}
         self._record = record
 
     @property

@@ -67,7 +67,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.t_start
+    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.start.time
     known, excitation = _Known.of(model, segments), segments.levels[0].excitation
     found = list(known.always)
     if 0 < known.fastest * trajectory.t_end < HARDLY:
@@ -162,7 +162,7 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     at_events = segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost, defects = abs(at_start) + at_events, total_defect(trajectory)
+    lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
     if lost > 0 and lost > ENERGY_SHARE * abs(given := trajectory.initial_energy):
         alone = _left_alone(trajectory, segments)
         found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))

@@ -197,12 +197,13 @@ class Run:
         if isinstance(self.model.modes, Tolerance):
             return self._decided()
 
-        def run(finer: float) -> Trajectory:
-            motion = self._motion(finer)
-            motion.advance(self.t_end)
-            return motion.trajectory(self.t_end, self._again)
+        return to_tolerance(self._to_end, self.loads)
 
-        return to_tolerance(run, self.loads)
+    def _to_end(self, finer: float) -> Trajectory:
+        """The answer, with smooth courses of loads to their tolerance / finer."""
+        motion = self._motion(finer)
+        motion.advance(self.t_end)
+        return motion.trajectory(self.t_end, self._again)
 
     def begun(self) -> Motion:
         """A motion at its start."""
@@ -223,12 +224,10 @@ class Run:
 
     def _first(self, levels: LoadedLevels) -> Start:
         """The start from the vectors that were given."""
-        y, v = self._in_base("displacement", self.displacement), self._in_base("velocity", self.velocity)
+        given = {"displacement": self.displacement, "velocity": self.velocity}
+        base, vector = self.model.base, self.model.structure.vector
+        y, v = [None if x is None else base.coordinates(vector(name, x)) for name, x in given.items()]
         return first_start(levels, self.t_end, y, v, self.stretches or {})
-
-    def _in_base(self, name: str, given: np.ndarray | None) -> np.ndarray | None:
-        """A given vector (n,) in base coordinates."""
-        return None if given is None else self.model.base.coordinates(self.model.structure.vector(name, given))
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
