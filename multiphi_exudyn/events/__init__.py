@@ -33,5 +33,5 @@ The sentences themselves stand in decision, where an instant is decided: decide,
 Order: load_channels, excitation, pieces, channels, loaded_level, defect_forms, transition, state, exits, exit_table,
 loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact, phases, changes,
 independence, rebounds, resting, striking, switching, sticking, decision, waiting, start, channel_arrays,
-element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays.
+element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays, entering.
 """

@@ -20,15 +20,12 @@ from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.scratch_arrays import ScratchArrays
-from multiphi_exudyn.events.state_arrays import measure
 
 __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
 FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
 ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
-
-Measure = Callable[[np.ndarray, np.ndarray, int], None]
 
 
 class Held(Protocol):
@@ -143,57 +140,6 @@ class LevelArrays:
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
-    def set_start(
-        self,
-        displacement: np.ndarray,
-        velocity: np.ndarray,
-        key: Sequence[int],
-        held: np.ndarray,
-        sprung: Sequence[int],
-    ) -> None:
-        """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
-
-        held: places (h,) that links hold. sprung: links that hold by their springs.
-        """
-        self._base = self._base or self._add_base()
-        ints, numbers, _ = self.buffers.all
-        m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[self._base + a.STATES])
-        for i, state in enumerate(key):
-            ints[states + i] = state
-        ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = self._base, a.FRESH
-        drive = int(ints[a.DRIVE])
-        for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
-            start = int(ints[a.GIVEN + part])
-            numbers[start : start + m] = values
-            if q:
-                numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
-            if len(held):
-                numbers[start + m + q : start + m + q + len(held)] = placed
-        numbers[a.GIVEN_SPRINGS] = self._springs(sprung) if sprung else 0.0
-
-    def _springs(self, sprung: Sequence[int]) -> float:
-        """Strain energy [J] that these links have in the place of GIVEN."""
-        base, ints, n = self.levels.model.base, self.ints, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
-        links = [k for k in sprung if np.isfinite(base.stiffnesses[k])]
-        rows = self.numbers[ints[self._base + a.GAPS] :][: len(base.links) * (n + 1)].reshape(-1, n + 1)[links]
-        gaps = rows[:, :-1] @ self.numbers[ints[a.GIVEN + a.PLACE] :][:n] + rows[:, -1]
-        return 0.5 * float(base.stiffnesses[links] @ (gaps * gaps))
-
-    def set_state(
-        self, level: int, place: np.ndarray, speed: np.ndarray, phases: Sequence[int], measured: Measure = measure
-    ) -> None:
-        """The current state: xi, xi' (n,) in a level, the phases of its exits; measured: ``measure``, or compiled."""
-        n, state = len(place), a.CURRENT
-        self.ints[state + a.LEVEL] = level
-        for part, values in ((a.PLACE, place), (a.SPEED, speed)):
-            start = int(self.ints[state + part])
-            self.numbers[start : start + n] = values
-        start = int(self.ints[state + a.PHASES])
-        self.ints[start : start + len(phases)] = phases
-        self.ints[state + a.SETTLED] = int(not any(phases))
-        self.ints[a.STARTING] = 0
-        measured(self.ints, self.numbers, state)
-
     @property
     def outgrown(self) -> bool:
         """Whether a level has come that is larger than the record has room for."""
@@ -254,12 +200,15 @@ class LevelArrays:
         """Room for the powers that a response to a term has taken."""
         self.scratch.reserve_powers(max(len(level.modal.response.basis.rates) for level in self.loaded.values()))
 
-    def _add_base(self) -> int:
-        """The base as a level, and memory for what happens there."""
-        base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
-        for state in (a.GIVEN, a.SLOWED):
-            self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
-        return put_base(self.buffers, base, self.levels.excitation)
+    @property
+    def base(self) -> int:
+        """Where the base stands as a level in the ints, with memory for what happens there, put there if it was not."""
+        if not self._base:
+            base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
+            for state in (a.GIVEN, a.SLOWED):
+                self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
+            self._base = put_base(self.buffers, base, self.levels.excitation)
+        return self._base
 
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count

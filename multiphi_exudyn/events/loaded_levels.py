@@ -75,6 +75,16 @@ class LoadedLevels:
         """Levels under a static ``load`` (m,) in base coordinates alone."""
         return cls(model, Excitation.constant(load, len(model.links), model.held))
 
+    @classmethod
+    def under(cls, model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
+        """Levels under an excitation, for motions from a time [s] to an end.
+
+        Those under its static loads are kept by the model: the maps between them serve every run.
+        """
+        load = excitation.static
+        alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: cls.static(model, load))
+        return cls(model, excitation, time, end, alone) if excitation.prescribed else alone
+
     def set_out(self, time: float, until: float) -> None:
         """Take another time and end [s] for the motions that follow."""
         self.drive, self.until = self.excitation.drive(time), until

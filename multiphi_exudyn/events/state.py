@@ -155,7 +155,7 @@ class Event:
 def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndarray:
     """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4).
 
-    Some events are kept in arrays (time/record.py).
+    Some events are kept in arrays (time/recorded.py).
     """
     kept = getattr(events, "table", None)
     if kept is not None:
@@ -165,13 +165,13 @@ def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndar
 
 
 def total_loss(events: Sequence[Event]) -> Loss:
-    """The energies that left at all events, some of which are kept in arrays (time/record.py)."""
+    """The energies that left at all events, some of which are kept in arrays (time/recorded.py)."""
     kept = getattr(events, "loss", None)
     return sum((event.loss for event in events), Loss()) if kept is None else kept
 
 
 def total_impulse(events: Sequence[Event], contact: str, first: float, last: float) -> float:
-    """What a contact was struck with [N s] in [first, last] [s]; some events are kept in arrays (time/record.py)."""
+    """What a contact was struck with [N s] in [first, last] [s]; some events are kept in arrays (time/recorded.py)."""
     kept = getattr(events, "impulse", None)
     if kept is not None:
         return float(kept(contact, first, last))

@@ -85,13 +85,6 @@ class ModalBase(ElementTable, Shown):
         return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
 
     @functools.cached_property
-    def still(self) -> np.ndarray:
-        """No displacement, or no velocity (m,); not to be written to."""
-        zeros = np.zeros(self.modes.count)
-        zeros.setflags(write=False)
-        return zeros
-
-    @functools.cached_property
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
         """|H| (m, l) and |gaps| (l,): with them a gap's round-off is judged."""
         return np.abs(self.directions), np.abs(self.gaps)

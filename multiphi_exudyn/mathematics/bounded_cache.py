@@ -41,8 +41,11 @@ class BoundedCache(Generic[K, V]):
 
     def get_or_build(self, key: K, make: Callable[[], V]) -> V:
         """The entry, made and put in where there is none."""
-        found = self.find(key)
-        return self.keep(key, make()) if found is None else found
+        found = self._entries.pop(key, None)
+        if found is None:
+            return self.keep(key, make())
+        self._entries[key] = found
+        return found
 
     def drop(self, key: K) -> None:
         """Let an entry go, if there is one."""

@@ -134,9 +134,9 @@ def indicator(lost: float, samples: Samples) -> float:
     return math.sqrt(lost) / amplitude
 
 
-def total_defect(trajectory: Trajectory) -> float:
-    """Sum of |defect|^2 [m2 kg] over a run, which the loop has added up where it could."""
-    known = listed(trajectory.segments).defects
+def total_defect(trajectory: Trajectory, segments: Segments) -> float:
+    """Sum of |defect|^2 [m2 kg] over the segments of a run, which the loop has added up where it could."""
+    known = segments.defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(known) else known
 
 

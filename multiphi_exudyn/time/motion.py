@@ -14,7 +14,9 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.level_arrays import LevelArrays, Measure
+from multiphi_exudyn.events.entering import Measure, set_start, set_state
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Loss, Phase, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
@@ -24,10 +26,11 @@ from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.failures import NOT_FINITE, failure
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.record import PHASES, Record
+from multiphi_exudyn.time.recorded import Events, Recorded
 from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Again, Trajectory
 
-__all__ = ["NUMBERS", "Motion", "carry", "measured"]
+__all__ = ["NUMBERS", "Motion", "carry", "measured", "motion_of"]
 
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 
@@ -127,8 +130,8 @@ class Motion:
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
         numbers = self._kept.numbers
-        segments = self.record.segments(float(numbers[a.DEFECTS]), float(numbers[a.TRUNCATED]))
-        events = self.record.events()
+        segments = Recorded(self.record, float(numbers[a.DEFECTS]), float(numbers[a.TRUNCATED]))
+        events = Events(self.record)
         return Trajectory(
             model=self.model,
             segments=segments,
@@ -138,15 +141,15 @@ class Motion:
             message=self.message,
             start=self.start,
             start_loss=self.start_loss,
-            final=self._state if segments else None,
+            final=self._state if self.record.count else None,
             final_work=float(numbers[a.WORK]),
-            load=self.levels.load,
+            load=self.levels.excitation.static,
             stats=Statistics(
                 levels_built=self.model.levels_built,
                 levels_possible=self.model.levels_possible,
                 transitions=self._transitions,
                 events=len(events),
-                segments=len(segments),
+                segments=self.record.count,
                 function_evaluations=self._evaluations,
                 record_bytes=self.record.bytes,
                 array_bytes=self.arrays.buffers.size,
@@ -165,7 +168,7 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if not all_finite(self.state.displacement):
+            if self._state is not None and not all_finite(self._state.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
@@ -222,7 +225,7 @@ class Motion:
 
     def give_up_arrays(self) -> None:
         """Keep what stands in the arrays alone: another run takes them over."""
-        ints, numbers, _ = self.arrays.buffers.all
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         self._kept = _Kept(numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
 
     def _enter(self) -> None:
@@ -235,10 +238,10 @@ class Motion:
         arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
-            arrays.set_start(start.displacement, start.velocity, start.states, start.held, start.penetrating)
+            set_start(arrays, start.displacement, start.velocity, start.states, start.held, start.penetrating)
         else:
             phases = [NUMBERS[phase] for phase in state.phases]
-            arrays.set_state(level, state.displacement, state.velocity, phases, self._measured)
+            set_state(arrays, level, state.displacement, state.velocity, phases, self._measured)
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
         ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
         ints[a.TRANSITIONS] = ints[a.GIVEN_UP] = 0
@@ -262,7 +265,7 @@ class Motion:
         ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
 
     def _state_reached(self) -> State:
-        ints, numbers, _ = self.arrays.buffers.all
+        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
         level, exits = self.arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
         phases = (Phase.ARMED,) * exits if settled else tuple(PHASES[k] for k in ints[waits : waits + exits].tolist())
@@ -274,3 +277,9 @@ class Motion:
         if self.arrays.ints[a.CAUSE] == a.UNAVAILABLE and self._unavailable is not None:
             return self._unavailable
         return failure(self.arrays)
+
+
+def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
+    """The run in these levels."""
+    levels.arrays = levels.arrays or LevelArrays(levels)
+    return Motion(levels.arrays, start, compiled)

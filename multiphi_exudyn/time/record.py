@@ -1,11 +1,10 @@
-"""What the loop has done, taken from its arrays; segments and events are made when somebody looks at them."""
+"""Record: what the loop has done, taken from its arrays, and the questions that many segments are asked together."""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Generic, TypeVar, overload
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
 from multiphi_exudyn.time.sampling import sample_rows, sample_squares, sample_states
-from multiphi_exudyn.time.segment import Segment, Segments, owners
+from multiphi_exudyn.time.segment import Segment, owners
 from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
 
@@ -34,127 +33,6 @@ works_of = entry(integrate_works)
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
 
 STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
-
-T = TypeVar("T")
-
-
-class Made(Sequence[T], Generic[T]):
-    """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
-
-    def __init__(self, make: Callable[[int], T], count: int) -> None:
-        self._make, self._count = make, count
-        self._known: dict[int, T] = {}
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, index: int) -> T: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[T, ...]: ...
-    def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
-        positions = range(self._count)[index]
-        return self._one(positions) if isinstance(positions, int) else tuple(map(self._one, positions))
-
-    def _one(self, i: int) -> T:
-        if i not in self._known:
-            self._known[i] = self._make(i)
-        return self._known[i]
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sequence) and tuple(self) == tuple(other)
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        return repr(tuple(self))
-
-
-class Recorded(Made[Segment], Segments):
-    """The segments of a record, which is looked into when somebody asks."""
-
-    def __init__(self, record: Record, defects: float, truncated: float) -> None:
-        super().__init__(record.segment, record.count)
-        self._record, self.arrays = record, record.arrays
-        self.defects, self.truncated = defects, truncated
-
-    @functools.cached_property
-    def starts(self) -> np.ndarray:
-        """See ``Segments``."""
-        return self._record.spans[: self._count, 0]
-
-    @functools.cached_property
-    def ends(self) -> np.ndarray:
-        """See ``Segments``."""
-        return self._record.spans[: self._count, 1]
-
-    @functools.cached_property
-    def numbers(self) -> np.ndarray:
-        """See ``Segments``."""
-        return self._record.rows[: self._count, 0]
-
-    @property
-    def levels(self) -> Sequence[LoadedLevel]:
-        """See ``Segments``."""
-        return self._record.levels
-
-    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """See ``Segments``."""
-        return self._record.states(places, after)
-
-    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
-        """See ``Segments``."""
-        return self._record.values(times, side, row)
-
-    def mean_square(self, end: float, count: int) -> float:
-        """See ``Segments``."""
-        return self._record.mean_square(end, count)
-
-    def _integral(
-        self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
-    ) -> float:
-        """See ``Segments``; in closed form at once where no channel is a function of time."""
-        if level.excitation.prescribed:
-            return super()._integral(level, row, places, starts, ends)
-        response, r, n = level.modal.response, level.modal.modes, level.width
-        x, v = self.states(places, starts - self.starts[places])[:, :, :n]
-        c = x[:, :r] @ response.from_displacement.T + v[:, :r] @ response.from_velocity.T
-        if level.driven:
-            c = c + response.from_force @ level.asymptotic.drive
-        terms = row[:r] @ response.shapes + row[n : n + r] @ response.basis.derivative(response.shapes)
-        moved = (c * terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
-        return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
-
-    @functools.cached_property
-    def works(self) -> tuple[float, float, float]:
-        """See ``Segments``."""
-        return self._record.works()
-
-
-class Events(Made[Event]):
-    """The events of a record."""
-
-    def __init__(self, record: Record) -> None:
-        super().__init__(record.event, 0 if record.eventless else len(record.places))
-        self._record = record
-
-    @property
-    def loss(self) -> Loss:
-        """The energies [J] that left at all of them."""
-        amounts = self._record.amounts
-        return Loss(*np.ones(len(amounts)).dot(amounts)[1:-1].tolist())
-
-    def impulse(self, contact: str, first: float, last: float) -> float:
-        """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
-        names, (kinds, amounts) = [name for name, _ in self._record.told], (self._record.kinds, self._record.amounts)
-        own = (kinds[:, 0] == names.index(contact)) & (amounts[:, 0] >= first) & (amounts[:, 0] <= last)
-        return float(amounts[own, -1].sum())
-
-    def table(self) -> np.ndarray:
-        """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
-        places, amounts = self._record.places, self._record.amounts
-        time, truncation = amounts[places, 0], amounts[places, 2] + amounts[places, 3]
-        return np.column_stack([time, self._record.kinds[places, 0], amounts[places, -1], truncation])
 
 
 def _joined(name: str) -> property:
@@ -206,8 +84,10 @@ class Record:
     @property
     def bytes(self) -> int:
         """What it takes of memory."""
-        last = sum([part.nbytes for part in self._last.values()])
-        return last + sum([part.bytes for part in self._parts.values()])
+        taken = [part.nbytes for part in self._last.values()]
+        if self._parts:
+            taken += [part.bytes for part in self._parts.values()]
+        return sum(taken)
 
     @property
     def parts(self) -> dict[str, Growing]:
@@ -241,7 +121,7 @@ class Record:
             known[number] = self._numbers.setdefault(level.states, len(self.levels))
             if known[number] == len(self.levels):
                 self.levels.append(level)
-        if any(number != other for number, other in known.items()):
+        if list(known) != list(known.values()):
             numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property
@@ -253,16 +133,6 @@ class Record:
     def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
         """The name of every contact, and its states."""
         return [(contact.name, contact.states) for contact in self._contacts]
-
-    # ------------------------------------------------------------------ objects
-
-    def segments(self, defects: float = math.nan, truncated: float = math.nan) -> Recorded:
-        """All segments so far."""
-        return Recorded(self, defects, truncated)
-
-    def events(self) -> Events:
-        """All events so far."""
-        return Events(self)
 
     def level(self, i: int) -> LoadedLevel:
         """The level of the i-th segment."""

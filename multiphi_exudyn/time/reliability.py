@@ -36,26 +36,28 @@ from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE, Tolerance
+from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.damping import ModalDamping
-from multiphi_exudyn.mechanics.modal_structure import ModalStructure
 from multiphi_exudyn.time.defects import Samples, indicator, total_defect
+from multiphi_exudyn.time.known_warnings import (
+    REMEDY,
+    cluster_warnings,
+    damping_warnings,
+    missing_modes,
+    static_warnings,
+)
 from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["RunSummary", "damping_warnings", "static_warnings", "warnings_of", "warnings_of_body"]
+__all__ = ["RunSummary", "warnings_of", "warnings_of_body"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
 RIGID_INDICATOR = 0.05  # where a rigid one is: its impacts raise the indicator more than the error
-PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
-REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
 SLOW = 1e-5  # rad of a period that a run sees: with less, a millionth of what loads make is round-off
 LEFT = 2e-8  # rad of a period: nothing but round-off, whose share falls with the square of what is seen
-STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
 HARDLY = 0.01  # of a period of the fastest kept mode: a run so short is hardly one that was meant
 MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
 PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
@@ -66,7 +68,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
     if not trajectory.segments:
         return ()
-    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.t_start
+    model, segments, span = trajectory.model, listed(trajectory.segments), trajectory.t_end - trajectory.start.time
     known, excitation = _Known.of(model, segments), segments.levels[0].excitation
     found = list(known.always)
     if 0 < known.fastest * trajectory.t_end < HARDLY:
@@ -115,9 +117,9 @@ class _Known:
         omega = np.concatenate([level.omega for level in levels])
         return cls(
             model.whole,
-            (*damping_warnings(model), *_missing_modes(model)),
+            (*damping_warnings(model), *missing_modes(model)),
             tuple(static),
-            tuple(_clusters(levels)),
+            tuple(cluster_warnings(levels)),
             model.level_at(()).highest_frequency,
             float(np.min(omega[omega > 0], initial=math.inf)),
         )
@@ -138,46 +140,11 @@ class RunSummary:
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     """What a user must not miss of a run in Exudyn, as far as levels and losses tell."""
-    found = [*damping_warnings(model), *_missing_modes(model)]
+    found = [*damping_warnings(model), *missing_modes(model)]
     if not model.whole:
         found.extend(static_warnings(run.levels))
         found.extend(_energy_warning(abs(run.truncated), run.energy))
     return tuple(found)
-
-
-def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
-    """Of the contact of which the modes of these levels leave out most of the static flexibility."""
-    yield from _sticking(levels)
-    held = {link.name for level in levels[:1] for link in level.base.links if link.held}
-    shares = [
-        (share, name, level.modes)
-        for level in levels
-        for name, share in level.static_shares.items()
-        if name not in held
-    ]
-    share, name, modes = max(shares, default=(0.0, "", 0))
-    if share >= CONTACT_SHARE:
-        others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
-        also = f" (and at {others} more)" if others else ""
-        yield (
-            f"truncated contact: at {name!r}{also} {modes} modes leave out {per_cent(share)} of the static "
-            f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
-        )
-
-
-def _sticking(levels: Sequence[Level]) -> Iterator[str]:
-    """Of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
-    found: dict[str, int] = {}
-    for level in levels:
-        for link in (level.base.links[i] for i in level.indices if level.modes < STICKING):
-            if link.held and (link.rigid or level.static_shares.get(link.name, 0.0) >= CONTACT_SHARE):
-                found[link.name] = min(level.modes, found.get(link.name, STICKING))
-    if found:
-        names = ", ".join(repr(name) for name in found)
-        yield (
-            f"truncated friction: {min(found.values())} modes hold what sticks at {names}, so its force may be off by "
-            f"5 % and more until it slips; {REMEDY}"
-        )
 
 
 def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
@@ -189,51 +156,6 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
         )
 
 
-def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
-    """Of modal ratios that end before the modes do, or look like per cent."""
-    damping = model.structure.damping
-    if not isinstance(damping, ModalDamping):
-        return
-    listed = damping.listed
-    if damping.beyond is None and 0 < len(listed) < (kept := model.level_at(()).modes):
-        yield (
-            f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
-            f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
-        )
-    if (largest := max(listed, default=0.0)) >= PER_CENT:
-        yield (
-            f"damping ratios: {largest:g} is {100 * largest:g} % of critical damping, which looks like a "
-            "ratio in per cent; write 0.01 for 1 %"
-        )
-
-
-def _missing_modes(model: MultiPhiModel) -> Iterator[str]:
-    """Of what acts on a structure of modes at points of which no static flexibility is known."""
-    structure = model.structure
-    if not isinstance(structure, ModalStructure):
-        return
-    names = [link.name for link in model.contacts]
-    places = [{at} if isinstance(at, str) else {*at} for at in (link.direction for link in model.contacts)]
-    told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
-    if told:
-        yield (
-            f"missing modes: the structure has its modes up to {structure.highest:g} Hz alone, so "
-            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
-            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
-            "the static flexibility of the points there"
-        )
-
-
-def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> str:
-    """How high above the highest mode [Hz] given modes swing on the stiffest of some contacts: sqrt(k h.M^-1 h)."""
-    k, lengths = model.base.stiffnesses[contacts], model.base.lengths[contacts]
-    swinging = np.sqrt(np.where(np.isfinite(k) & (k > 0), k, 0.0)) * lengths / (2 * math.pi)
-    most = int(np.argmax(swinging))
-    if not 0 < highest < swinging[most]:
-        return ""
-    return f" (on {k[most]:g} N/m these modes swing at up to {swinging[most]:.3g} Hz, where others would as well)"
-
-
 def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance | None) -> list[str]:
     """Of the energy that truncation took, whatever its sign at an instant, and of the motion that it did."""
     samples, found = Samples(segments, trajectory.t_end), list[str]()
@@ -241,7 +163,7 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     at_events = segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost, defects = abs(at_start) + at_events, total_defect(trajectory)
+    lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
     if lost > 0 and lost > ENERGY_SHARE * abs(given := trajectory.initial_energy):
         alone = _left_alone(trajectory, segments)
         found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
@@ -279,20 +201,6 @@ def _truncation(trajectory: Trajectory, error: float, tolerance: Tolerance | Non
     elif error > (RIGID_INDICATOR if rigid else INDICATOR):
         typical = ", with rigid contacts a quarter of that is typical" if rigid else ""
         yield f"truncation: displacements may be off by {per_cent(error)} of the motion{typical}; {REMEDY}"
-
-
-def _clusters(levels: Sequence[Level]) -> list[str]:
-    """One sentence where some of these levels keep modes beyond those asked for."""
-    kept = [level for level in levels if level.kept_beyond]
-    if not kept:
-        return []
-    most = max(kept, key=lambda level: level.kept_beyond)
-    asked, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
-    return [
-        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
-        f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
-        f"arbitrary; ask for {most.modes} modes"
-    ]
 
 
 def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]:

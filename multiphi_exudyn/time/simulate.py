@@ -15,7 +15,6 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -25,7 +24,7 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
 from multiphi_exudyn.time.base_share import base_warnings
 from multiphi_exudyn.time.going_on import going_on, nudged
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.motion import Motion, motion_of
 from multiphi_exudyn.time.refinement import to_tolerance
 from multiphi_exudyn.time.reliability import warnings_of
 from multiphi_exudyn.time.start import Start, first_start
@@ -38,8 +37,6 @@ __all__ = [
     "Shared",
     "checked_end",
     "holding",
-    "levels_of",
-    "motion_of",
     "outside_of",
     "simulate",
     "started",
@@ -200,12 +197,13 @@ class Run:
         if isinstance(self.model.modes, Tolerance):
             return self._decided()
 
-        def run(finer: float) -> Trajectory:
-            motion = self._motion(finer)
-            motion.advance(self.t_end)
-            return motion.trajectory(self.t_end, self._again)
+        return to_tolerance(self._to_end, self.loads)
 
-        return to_tolerance(run, self.loads)
+    def _to_end(self, finer: float) -> Trajectory:
+        """The answer, with smooth courses of loads to their tolerance / finer."""
+        motion = self._motion(finer)
+        motion.advance(self.t_end)
+        return motion.trajectory(self.t_end, self._again)
 
     def begun(self) -> Motion:
         """A motion at its start."""
@@ -226,12 +224,10 @@ class Run:
 
     def _first(self, levels: LoadedLevels) -> Start:
         """The start from the vectors that were given."""
-        y, v = self._in_base("displacement", self.displacement), self._in_base("velocity", self.velocity)
-        return first_start(levels, self.t_end, self.model.base.still if y is None else y, v, self.stretches or {})
-
-    def _in_base(self, name: str, given: np.ndarray | None) -> np.ndarray | None:
-        """A given vector (n,) in base coordinates."""
-        return None if given is None else self.model.base.coordinates(self.model.structure.vector(name, given))
+        given = {"displacement": self.displacement, "velocity": self.velocity}
+        base, vector = self.model.base, self.model.structure.vector
+        y, v = [None if x is None else base.coordinates(vector(name, x)) for name, x in given.items()]
+        return first_start(levels, self.t_end, y, v, self.stretches or {})
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""
@@ -239,7 +235,7 @@ class Run:
         time = 0.0 if before is None or self.rewound else before.t_end
 
         def made() -> LoadedLevels:
-            return levels_of(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
+            return LoadedLevels.under(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
 
         if self.shared is not None:
             return self.shared.levels((id(model), finer), made)
@@ -260,22 +256,6 @@ class Run:
             return replace(self, start=nudged(self.start, v)).trajectory()
         shapes = self.model.base.modes.shapes
         return replace(self, displacement=shapes @ y, velocity=shapes @ v).trajectory()
-
-
-def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
-    """The run in these levels."""
-    levels.arrays = levels.arrays or LevelArrays(levels)
-    return Motion(levels.arrays, start, compiled)
-
-
-def levels_of(model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
-    """The levels under an excitation, for motions from a time [s] to an end.
-
-    Those under its static loads are kept by the model: the maps between them serve every run.
-    """
-    load = excitation.static
-    alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: LoadedLevels.static(model, load))
-    return LoadedLevels(model, excitation, time, end, alone) if excitation.prescribed else alone
 
 
 def started(run: Run) -> Run:

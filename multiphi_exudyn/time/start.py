@@ -72,6 +72,13 @@ class _Scales:
     apart: tuple[int, ...] | None
 
     @functools.cached_property
+    def nowhere(self) -> np.ndarray:
+        """No displacement, or no velocity (m,); not to be written to."""
+        zeros = np.zeros(len(self.times))
+        zeros.setflags(write=False)
+        return zeros
+
+    @functools.cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """a, b (l,): none touches where h.y > a |y| + b, as the terms of h.y are no more than |h| |y|."""
         return 2 * TOUCHING * self.sizes, self.touching - self.stops
@@ -95,7 +102,7 @@ class _Scales:
 
 
 def first_start(
-    levels: LoadedLevels, end: float, y: np.ndarray, v: np.ndarray | None, stretches: Mapping[str, float]
+    levels: LoadedLevels, end: float, y: np.ndarray | None, v: np.ndarray | None, stretches: Mapping[str, float]
 ) -> Start:
     """The start from y, y' (m,), None for zero, of a run to ``end`` [s] as the contacts see it.
 
@@ -103,9 +110,10 @@ def first_start(
     """
     base = levels.model.base
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
+    y = scales.nowhere if y is None else y
     moved, length = y.dot(base.directions), math.sqrt(y.dot(y))
     if v is None:
-        v = base.still
+        v = scales.nowhere
     else:
         moving = v * scales.times
         length += math.sqrt(moving.dot(moving))

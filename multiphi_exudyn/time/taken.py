@@ -34,7 +34,7 @@ OF_NUMBERS = ("spans", "coordinates", "amounts")
 
 def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
     """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
-    ints, numbers, _ = arrays.buffers.all
+    ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
     slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
     for name, slot, counted, width in wanted:
         if rows := slots[counted]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -20,38 +20,24 @@ import numpy as np
 from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.exits import exits_of
-from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.balance import Ledger, Statistics
-from multiphi_exudyn.time.base_share import row_warnings
-from multiphi_exudyn.time.histories import INSTANTS, Histories
-from multiphi_exudyn.time.level_rows import force_row, gap_row, patch_row, point_row, pressing_row
+from multiphi_exudyn.time.histories import INSTANTS
+from multiphi_exudyn.time.model_histories import ModelHistories
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segment import Segment
 from multiphi_exudyn.time.start import Start
-from multiphi_exudyn.time.warning_groups import issue
 
 __all__ = ["Again", "Trajectory"]
 
 NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
-ROWS = {  # of a level, for an element's position
-    "gap": gap_row,
-    "contact_force": pressing_row,
-    "contact_impulse": pressing_row,
-    "friction_force": force_row,
-    "slip": patch_row,
-}
-
 Again: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
 
 
 @dataclass(frozen=True, repr=False)
-class Trajectory(Histories):
+class Trajectory(ModelHistories):
     """Result of ``simulate``: a motion in analytic pieces that answers at any time, and what is known about it.
 
         x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
@@ -141,21 +127,6 @@ class Trajectory(Histories):
     def t_start(self) -> float:
         """When it begins [s]."""
         return self.start.time
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """Names of the structure's points."""
-        return tuple(self.model.structure.points)
-
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """Names of the model's contacts."""
-        return tuple(contact.name for contact in self.model.contacts if isinstance(contact, UnilateralContact))
-
-    @property
-    def frictions(self) -> tuple[str, ...]:
-        """Names of the model's frictions."""
-        return tuple(contact.name for contact in self.model.contacts if isinstance(contact, Friction))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.
@@ -288,53 +259,6 @@ class Trajectory(Histories):
     def _coordinates(self, times: np.ndarray) -> np.ndarray:
         """y (m, k)."""
         return self.model.base.coordinates(self.displacement(times))
-
-    @property
-    def rubbing(self) -> tuple[str, ...]:
-        """Names of the model's contacts that have friction."""
-        names = [self.model.contacts[i].name for i in self.model.rubbing]
-        return tuple(name for name in names if name in self.contacts)
-
-    # ------------------------------------------------------------------ rows of a level
-
-    def _row(self, question: str, name: At) -> Callable[[LoadedLevel], np.ndarray]:
-        if question == "at":
-            if not isinstance(name, (str, Mapping)):
-                issue(row_warnings(self.model, self.model.structure.row(name)))
-            return functools.partial(point_row, self.model.base.modes.shapes.T @ self.model.structure.row(name))
-        row = ROWS[question]
-        place = self._friction if question in ("friction_force", "slip") else self._contact
-        return functools.partial(row, place(question, str(name)))
-
-    def _holds(self, question: str, name: str) -> Callable[[LoadedLevel], bool]:
-        if question == "stick_intervals":
-            places = self.model.link_places[self._friction(question, name)]
-            links = [k for k in places if self.model.links[k].held]
-        else:
-            links = self.model.pressing_links(self._contact(question, name))
-        return lambda level: not set(links).isdisjoint(level.level.indices)
-
-    def _motion(self, level: LoadedLevel, xi: np.ndarray) -> np.ndarray:
-        return np.linalg.multi_dot([self.model.base.modes.shapes, level.level.vectors, xi])
-
-    def _asymptotic(self, level: LoadedLevel) -> np.ndarray:
-        return np.asarray(self.model.base.modes.shapes @ level.asymptotic.configuration)
-
-    def _contact(self, question: str, name: str) -> int:
-        """Position of what is no friction."""
-        i = self.model.index(name)
-        if isinstance(self.model.contacts[i], Friction):
-            raise MultiPhiValueError(
-                f"{question}: got the friction {name!r}, need a contact (friction_force, slip, stick_intervals)"
-            )
-        return i
-
-    def _friction(self, question: str, name: str) -> int:
-        """Position of a friction."""
-        i = self.model.index(name)
-        if not any(self.model.links[k].held for k in self.model.link_places[i]):
-            raise MultiPhiValueError(f"{question}: got {name!r}, which has no friction, need the name of one that has")
-        return i
 
 
 def _parted(run: Trajectory, times: np.ndarray, expected: np.ndarray, limit: float) -> float:

@@ -4,8 +4,9 @@ The indicator adds the defects of a run (defects.py) like independent errors and
 
     indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
 
-It predicts an error, it does not bound it: it knows nothing of how fast neighbouring motions separate, and what one
-level holds and the next one drops weighs little in it (keep the levels' highest frequencies near each other).
+The mean is that of a polygon through 25 instants evenly spaced: the indicator is known to some per cent of itself. It
+predicts an error, it does not bound it: it knows nothing of how fast neighbouring motions separate, and what one level
+holds and the next one drops weighs little in it (keep the levels' highest frequencies near each other).
 """
 
 from __future__ import annotations
@@ -34,8 +35,9 @@ def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> 
 
         indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
 
-    The defects of a run are what the modes of the next level could not hold at its events. The indicator predicts an
-    error, it does not bound it: it knows nothing of how fast neighbouring motions separate.
+    The defects of a run are what the modes of the next level could not hold at its events; the mean is that of a
+    polygon through 25 instants evenly spaced. The indicator predicts an error, it does not bound it: it knows nothing
+    of how fast neighbouring motions separate.
 
     Parameters
     ----------

@@ -168,6 +168,7 @@ def test_a_failure_on_the_way_is_told_when_exudyn_gets_there(monkeypatch):
     system = System(model, matchedStepSize=STEP)
     monkeypatch.setattr("multiphi_exudyn.time.chatter.CHATTER_WINDOW", 4)
     monkeypatch.setattr("multiphi_exudyn.time.chatter.EVENTS_PER_PERIOD", 0.01)
+    model.entries.clear()  # what it has kept of the check
     with pytest.raises(mp.MultiPhiError, match=r"body 'body': at t = .* chatter"):
         system.solve()
     reached = system.mbs.sys["dynamicSolver"].it.currentTime

@@ -223,6 +223,37 @@ def test_runs_of_one_model_may_take_turns():
     assert_allclose(found.displacement(0.4), alone.displacement(0.4), atol=1e-9)
 
 
+def test_a_run_whose_arrays_were_lent_to_a_question_goes_on_as_if_they_had_not_been():
+    """Sums of the run, its chatter check and its channels stand there again, to the bit."""
+    model, start = rig(1e6, 6)
+    load = [mp.HarmonicLoad("node3", 0.5, 30.0)]
+    whole, other = (Run(model, 0.4, start, None, load).begun() for _ in range(2))
+    for end in (0.1, 0.2, 0.3, 0.4):
+        whole.advance(end)
+        other.advance(end)
+        assert other.trajectory(end).segments.mean_square(end, 5) > 0
+    found, expected = other.trajectory(0.4), whole.trajectory(0.4)
+    assert np.array_equal(found.events.table(), expected.events.table())
+    assert (found.segments.defects, found.segments.truncated) == (
+        expected.segments.defects,
+        expected.segments.truncated,
+    )
+    assert found.final_work == expected.final_work
+
+
+def test_a_warm_run_without_events_is_made_by_few_calls():
+    """What does not hang on the start is prepared once; each call costs a warm run a four-hundredth."""
+    model, start = rig(1e6, 6)
+    mp.simulate(model, 1e-3, displacement=start)
+    calls = []
+    sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
+    try:
+        mp.simulate(model, 1e-3, displacement=start)
+    finally:
+        sys.setprofile(None)
+    assert len(calls) < 130
+
+
 def test_a_run_stops_at_its_next_event_if_asked():
     model, start = rig(1e6, 6)
     whole = mp.simulate(model, 0.2, displacement=start)

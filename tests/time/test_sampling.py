@@ -56,6 +56,17 @@ def test_states_of_many_segments_together_are_those_of_each(loads, damping):
     assert_states_of_segments(run)
 
 
+@pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
+def test_the_mean_square_of_a_motion_is_that_of_its_displacements(loads):
+    """By the compiled flow, by single segments, and by the displacements of the structure in the norm of its mass."""
+    run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, displacement=START, loads=loads)
+    found = segment.listed(run.segments).mean_square(4.9, 25)
+    x = run.displacement(np.linspace(0.0, 4.9, 25))
+    squares = np.sum(x * (run.model.structure.mass @ x), axis=0)
+    assert found == pytest.approx(np.mean(squares[1:] + squares[:-1]) / 2, rel=1e-12)
+    assert segment.Listed(tuple(run.segments)).mean_square(4.9, 25) == pytest.approx(found, rel=1e-12)
+
+
 def test_pieces_of_a_harmonic_so_short_that_it_is_a_polynomial_there():
     """Its powers have shapes of their own."""
     run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, loads=LOADS["harmonic"])

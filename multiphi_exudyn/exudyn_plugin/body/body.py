@@ -39,9 +39,9 @@ from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.motion import Motion, motion_of
+from multiphi_exudyn.time.recorded import Events
 from multiphi_exudyn.time.reliability import warnings_of_body
-from multiphi_exudyn.time.simulate import motion_of
 
 __all__ = ["MultiPhiBody"]
 
@@ -139,7 +139,7 @@ class MultiPhiBody:
         self.coordinates = Coordinates(self.items, stepped, state.held, layout, most, matched)
         q, q_t, _ = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
         self.start = q, q_t
-        self._given_events = tuple(motion.record.events())
+        self._given_events = tuple(Events(motion.record))
         self._events = list(self._given_events)
 
     @property

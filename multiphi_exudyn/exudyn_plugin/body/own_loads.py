@@ -15,12 +15,12 @@ import numpy as np
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exits import exits_of, force_shares, signal_rows
 from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import Conditions, conditions_of, jump_times
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.simulate import levels_of
 
 __all__ = ["OwnLoads"]
 
@@ -37,7 +37,7 @@ class OwnLoads:
 
     def __init__(self, model: MultiPhiModel, loads: Sequence[Load], size: int, time: float, end: float) -> None:
         self.excitation = Excitation.of(model, loads, end, FINER)
-        self.loaded = levels_of(model, self.excitation, time, end)
+        self.loaded = LoadedLevels.under(model, self.excitation, time, end)
         self.varies = self.excitation.prescribed > 0
         self.levels = self.loaded.alone
         self._size = size

@@ -13,6 +13,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.entering import set_state
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Event, State
@@ -56,7 +57,7 @@ class ExactMotion:
     @property
     def events(self) -> Sequence[Event]:
         """What has happened in the run but for trials."""
-        return self._record.events()
+        return Events(self._record)
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
         """From now on these forces act, by the states of a level, and this hangs on the structure."""
@@ -109,7 +110,7 @@ class ExactMotion:
         w, w_t = arrays.channels.at(arrays.buffers, time)
         if len(w):
             place, speed = (np.concatenate([x[:r], at, x[r:]]) for x, at in ((place, w), (speed, w_t)))
-        arrays.set_state(level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
+        set_state(arrays, level, place, speed, [NUMBERS[phase] for phase in state.phases], measured)
 
     def _run(self, until: float, trial: bool) -> bool:
         """The loop until it ends, with all that it needs; whether anything happened on the way."""
