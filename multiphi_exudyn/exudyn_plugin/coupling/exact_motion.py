@@ -21,6 +21,7 @@ from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting, HeldForce
 from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.motion import NUMBERS, Motion, carry, measured
 from multiphi_exudyn.time.record import PHASES, Record
+from multiphi_exudyn.time.recorded import Events
 
 __all__ = ["ExactMotion", "Reached"]
 
