@@ -23,6 +23,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.mathematics.basis_arrays import exponential_size
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.signal_bounds import power_of_two_above
 
 __all__ = ["keep_drive", "load_piece", "piece_end", "set_drive"]
 
@@ -47,7 +48,7 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: fl
     power of two above what is left: bases are shared among pieces of about the same length.
     """
     q, drive, moved, piece = ints[PRESCRIBED], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
-    numbers[HORIZON] = math.ldexp(1.0, math.frexp(until - time if until > time else until)[1])
+    numbers[HORIZON] = power_of_two_above(until - time if until > time else until)
     ints[TERMS_NOW] = result
     for k in range(6 * q):
         numbers[drive + k] = 0.0

@@ -29,6 +29,7 @@ __all__ = [
     "all_above",
     "all_finite",
     "bound",
+    "power_of_two_above",
     "round_off",
     "sample_distance",
 ]

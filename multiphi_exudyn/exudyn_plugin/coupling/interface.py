@@ -77,6 +77,7 @@ class Interface:
         self._given = tuple(given)
         self._rows = np.concatenate([node.rows for node in given])
         self.count = len(self._rows)
+        self._last: tuple[ModalBase | None, np.ndarray] = None, np.zeros(0)
         ends = np.cumsum([len(node.rows) for node in given])
         self._parts = [slice(int(end) - len(node.rows), int(end)) for node, end in zip(given, ends, strict=True)]
         self.ties: list[Any] = []
@@ -131,8 +132,10 @@ class Interface:
         return _Reading(rows, in_base @ loaded.asymptotic.configuration, in_base @ loaded.channels.shapes, direct)
 
     def in_base(self, base: ModalBase) -> np.ndarray:
-        """The points (m, b) in base coordinates."""
-        return np.asarray(self._rows @ base.modes.shapes)
+        """The points (m, b) in base coordinates; of the last base they are kept."""
+        if self._last[0] is not base:
+            self._last = base, np.asarray(self._rows @ base.modes.shapes)
+        return self._last[1]
 
     def attach(self, state: Mapping[str, np.ndarray]) -> None:
         """Views of the interface coordinates in the system's current state; they hold for one run."""
