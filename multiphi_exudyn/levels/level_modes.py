@@ -43,6 +43,7 @@ NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take b
 FEW = 4  # modes of the base for each mode asked for: from there on the compliance is the cheaper way to them
 ROOTED = 50  # modes of a base from which roots of the secular equation are cheaper than all singular values
 LARGE = 150  # modes of a base from which iterations are the cheaper way to the few
+ORTHOGONAL = 1e-12  # product of two modes, above which they are taken anew from what they span
 APART = 1e-6  # relative distance of two compliances at least, to count what lies beyond the middle between them
 
 
@@ -75,6 +76,10 @@ def _rank_one(
     squares, vectors = found
     if math.isinf(stiffness):
         vectors = vectors - np.outer(along, along @ vectors) / (along @ along)
+    products = vectors.T @ vectors
+    products.flat[:: len(products) + 1] -= 1.0
+    if np.abs(products).max() > ORTHOGONAL:
+        return _modes(base, closed_directions, np.linalg.qr(vectors)[0])
     return squares, vectors, 0.0
 
 

@@ -4,8 +4,9 @@
 
 There is one root between two neighbours among the d. LAPACK's dlasd4 finds each as a distance from the nearer of them,
 in sqrt(x) and sqrt(d), by the middle way between secant and Newton; so eigenvalues have the relative accuracy of the d,
-whatever k is, and the vectors are orthogonal to round-off. What has no part in p is left as it is (deflation):
-components that are zero, and of equal d all but one direction.
+whatever k is, and the vectors are orthogonal to round-off; but for the two roots beside a d that round-off alone tells
+from them: their vectors are right together, and not one by one. What has no part in p is left as it is (deflation):
+components that are zero or round-off, and of equal d all but one direction.
 Source: R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89 (1993).
 """
 
@@ -21,6 +22,7 @@ __all__ = ["rank_one_modes"]
 
 EQUAL = 4 * np.finfo(float).eps  # of d: nearer ones are equal
 ABSENT = 1e-16  # of |p| with weights 1 / d: smaller components have no part in it
+NOISE = 2e-14  # of |p|: round-off of modes that do not move in this direction
 
 
 def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -34,7 +36,7 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
         for first, last, turn in turns:
             own[first:last] = np.eye(1, last - first)[0] * float(turn[:, 0] @ p[first:last])
     sizes = own * own / (d + d[min(count, len(d) - 1)])
-    present = sizes > ABSENT**2 * sizes.sum()
+    present = (sizes > ABSENT**2 * sizes.sum()) & (np.abs(own) > NOISE * math.sqrt(p @ p))
     if count < len(d) and not turns and present.all():
         return _roots(d, p, stiffness, count)
     poles, left = np.flatnonzero(present), np.flatnonzero(~present)[:count]

@@ -68,6 +68,23 @@ class TestFewModesOfALevel:
         assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < 1e-10
 
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
+    @pytest.mark.parametrize("aside", [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+    def test_one_contact_in_the_middle_of_a_symmetric_structure(self, stiffness, aside):
+        """Of a string held there every mode of one half is a pair; a little aside round-off would mix the two."""
+        middle = np.zeros(159)
+        middle[79], middle[80] = 1.0, aside
+        stiff = 4e4 * (2 * np.eye(159) - np.eye(159, k=1) - np.eye(159, k=-1))
+        stop = UnilateralContact("stop", middle, 1e-3, stiffness)
+        base = MultiPhiModel(LinearStructure(np.eye(159), stiff), [stop], modes=12).base
+        few, full = build_level(base, (0,), 13), build_level(base, (0,))
+        assert_allclose(few.omega[:12], full.omega[:12], rtol=1e-11)
+        assert_allclose(few.vectors.T @ few.vectors, np.eye(13), rtol=0, atol=1e-12)
+        wanted = full.vectors[:, :12]
+        assert np.linalg.norm(few.vectors[:, :12] - wanted @ (wanted.T @ few.vectors[:, :12]), 2) < 1e-10
+        stiff = few.vectors.T @ (base.squares[:, None] * few.vectors) + (few.gap_rows.T * base.springs) @ few.gap_rows
+        assert_allclose(stiff, np.diag(few.squares), rtol=0, atol=1e-9 * few.squares[-1])
+
+    @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):
         base, made = bed(stiffness).base, []
         monkeypatch.setattr("multiphi_exudyn.levels.level_modes._of_all", lambda *given: made.append(given))
