@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -27,6 +27,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.mathematics.inner_products import Vectors, orthonormal_beside, ritz
 from multiphi_exudyn.mathematics.lanczos import check_mass, definite_factor, iterated, lanczos
 from multiphi_exudyn.mathematics.modes import (
     FIRST_SHIFT,
@@ -39,15 +40,12 @@ from multiphi_exudyn.mathematics.modes import (
 
 __all__ = ["ACCURATE", "HeldRows", "LowestModes", "left_out", "lowest_modes"]
 
-DEPENDENT = 1e-12  # of a row's flexibility: what the other shapes leave of it is round-off below
 ACCURATE = 1e-9  # error of omega^2 of sample levels, up to which Krylov vectors are added
 DEEPEST = 8  # blocks of Krylov vectors at most
 CHECKED = 4  # highest modes of a sample level that are looked at: they have the largest errors
 ROUGH, FEW = 1e-5, 10  # error of omega^2, and vectors at a time, where it is only asked whether a mode was missed
 CLEAR = 1e-2  # of omega^2: with that error a mode so far above the last is another one
 BAR_DELAY = 2.0  # s before a progress bar appears
-
-Vectors: TypeAlias = tuple[np.ndarray, np.ndarray]  # shapes C (n, k), C^T A C = I, and A C
 
 
 @dataclass(frozen=True)
@@ -210,7 +208,7 @@ class _Lowest:
         """The modes with the Krylov vectors of ``rows``, and the largest error of omega^2 of the samples."""
         added, shapes, error = np.zeros(0), np.zeros((len(self.vectors), 0)), 0.0
         for vectors in self._krylov(rows):
-            added, rotation = _ritz(self.mass, vectors[0])
+            added, rotation = ritz(self.mass, vectors[0])
             shapes = vectors[0] @ rotation
             error = max((self._error(added, rotation, vectors, rows, sample) for sample in samples), default=0.0)
             if error <= ACCURATE:
@@ -229,7 +227,7 @@ class _Lowest:
         block = self._beside(forces / sizes)
         vectors = np.zeros((len(forces), 0)), np.zeros((len(forces), 0))
         for _ in range(DEEPEST):
-            block = _orthonormal(block, vectors)
+            block = orthonormal_beside(block, vectors)
             if not block[0].shape[1]:
                 return
             vectors = np.hstack([vectors[0], block[0]]), np.hstack([vectors[1], block[1]])
@@ -286,23 +284,3 @@ def _sample_modes(
     forces = -stiffness[:, None] * (directions @ y)
     forces[rigid] = np.linalg.lstsq(directions[rigid].T, whole @ y - found * y, rcond=None)[0]
     return found, y, forces
-
-
-def _orthonormal(block: Vectors, others: Vectors) -> Vectors:
-    """A-orthonormal vectors of a block beside others; what is round-off of one, or of another, is left out."""
-    own, pushed = block
-    for _ in range(2):
-        taken = others[1].T @ own
-        own, pushed = own - others[0] @ taken, pushed - others[1] @ taken
-    for _ in range(2):  # once more: orthonormal to round-off
-        products = own.T @ pushed
-        kept, turn = scipy.linalg.eigh((products + products.T) / 2)
-        turn = turn[:, kept > DEPENDENT] / np.sqrt(kept[kept > DEPENDENT])
-        own, pushed = own @ turn, pushed @ turn
-    return own, pushed
-
-
-def _ritz(mass: Any, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues of A (k,) in the space of A-orthonormal shapes, and the rotation (k, k) to its M-normalised modes."""
-    inverse, rotation = scipy.linalg.eigh(shapes.T @ (mass @ shapes))
-    return 1 / inverse, rotation / np.sqrt(inverse)
