@@ -34,7 +34,7 @@ def set_start(
         ints[states + i] = state
     ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = base, a.FRESH
     drive = int(ints[a.DRIVE])
-    for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0))):
+    for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0 * held))):
         start = int(ints[a.GIVEN + part])
         numbers[start : start + m] = values
         if q:
