@@ -107,9 +107,9 @@ class Motion:
         self._state, self.time, self.message, self.start_loss = state, time, "", NOTHING
         self._starting = False
         self.record = Record(self.model.contacts, self.arrays)
-        numbers, piece = self._at_first(time), self._kept.piece
-        numbers[a.AGE], numbers[a.DEFECTS] = self._kept.numbers[a.AGE], math.nan
-        self._kept = _Kept(numbers, 0, NO_RING, piece)
+        numbers = self._kept.numbers.copy()
+        numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
+        self._kept = _Kept(numbers, 0, NO_RING, self._kept.piece)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
