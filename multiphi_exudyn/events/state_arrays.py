@@ -100,15 +100,19 @@ def accelerate(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
 
 @compiled
 def acceleration_sizes(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
-    """Of which terms (n,) the accelerations are the sums, and omega |eta'|, how large the velocities make them."""
-    level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
+    """Of which terms (n,) the accelerations are the sums, and omega |eta'|, how large the velocities make them.
+
+    A displacement counts with the terms of the map that has made it.
+    """
+    level, x, v, mapped = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED], ints[state + MAPPED]
     r, q, sizes = ints[level + MODES], ints[PRESCRIBED], ints[DRIVE] + 3 * ints[PRESCRIBED]
     n = r + ints[CHANNELS]
     row = ints[level + MOTION]
     for i in range(r):
         total = abs(numbers[row + 2 * n]) + numbers[ints[level + FREQUENCIES] + i] * abs(numbers[v + i])
         for j in range(r):
-            total += abs(numbers[row + j] * numbers[x + j]) + abs(numbers[row + n + j] * numbers[v + j])
+            total += abs(numbers[row + j]) * max(abs(numbers[x + j]), numbers[mapped + j])
+            total += abs(numbers[row + n + j] * numbers[v + j])
         for k in range(q):
             total += abs(numbers[row + r + k]) * numbers[sizes + k]
             total += abs(numbers[row + n + r + k]) * numbers[sizes + q + k]

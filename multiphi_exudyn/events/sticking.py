@@ -54,6 +54,7 @@ from multiphi_exudyn.events.arrays import (
     STATIC_LIMITS,
     STICKS,
     STIFFNESSES,
+    SWING,
     TOGETHER,
     TOUCHING,
     UNION,
@@ -68,7 +69,7 @@ from multiphi_exudyn.events.impact import RESTING, fill_rows, resting_size
 from multiphi_exudyn.events.independence import held_links, independent
 from multiphi_exudyn.events.phases import first_exit, opening
 from multiphi_exudyn.events.signals import row_sign
-from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, measure
+from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, pose, solve
@@ -175,7 +176,7 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
     for k in range(loose):
         row, terms = ints[ROWS] + k * n, 0.0
         for j in range(n):
-            terms += abs(numbers[row + j]) * abs(numbers[v + j])
+            terms += abs(numbers[row + j]) * (abs(numbers[v + j]) + numbers[ints[ENTERED_STATE + SWING] + j])
         numbers[ints[VALUES] + k] = product(numbers, row, v, n)
         numbers[ints[VALUE_SIZES] + k] = terms
         numbers[ints[LOWEST] + k] = -math.inf
@@ -188,7 +189,6 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
         before = abs(numbers[v + i])
         numbers[v + i] += numbers[ints[CHANGE] + i]
         numbers[v + i] = 0.0 if abs(numbers[v + i]) <= RESTING * before else numbers[v + i]
-    measure(ints, numbers, ENTERED_STATE)
     return OK
 
 

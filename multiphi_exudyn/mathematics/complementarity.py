@@ -289,6 +289,7 @@ def go(ints: Ints, numbers: Numbers, problem: int, driven: int, step: float) -> 
 def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
     """SOLVED, with z, where every row is complementary and x is what z pushes, else UNDECIDED."""
     r, x, missing, total, most = ints[problem + UNKNOWNS], ints[problem + X], ints[problem + PUSHED], 0.0, 0.0
+    left = 0.0
     reach, units = norm(numbers, x, r), ints[problem + PUSH_UNITS]
     for i in range(r):
         numbers[missing + i] = numbers[x + i]
@@ -300,7 +301,8 @@ def proved(ints: Ints, numbers: Numbers, problem: int) -> int:
         for i in range(r):
             numbers[missing + i] -= share * numbers[units + k * r + i]
         w, terms = abs(numbers[ints[problem + RESULTS] + k]), numbers[ints[problem + TERMS] + k] + reach
-        if ints[ints[problem + SIDES] + k] == BETWEEN and not w <= FOLLOWING * terms:
-            return UNDECIDED
+        if ints[ints[problem + SIDES] + k] == BETWEEN:
+            left = max(left, w - FOLLOWING * terms)
         numbers[ints[problem + Z] + k] = share / numbers[ints[problem + PUSH_LENGTHS] + k]
-    return SOLVED if norm(numbers, missing, r) <= PROVED * (total + reach) + ZERO * most else UNDECIDED
+    pushed = PROVED * (total + reach)
+    return SOLVED if left <= pushed and norm(numbers, missing, r) <= pushed + ZERO * most else UNDECIDED

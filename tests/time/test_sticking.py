@@ -268,3 +268,21 @@ def test_two_that_stick_to_each_other_come_to_rest_on_a_belt_as_one_body(mass, s
     assert [run.status for run in runs] == ["ok"] * 2
     assert_allclose(runs[0].at("a", t), runs[1].at("a", t), rtol=0, atol=1e-12)
     assert np.any(np.diff(runs[0].stick_intervals("belt")) > 0)
+
+
+@pytest.mark.parametrize("spring", [800.0, 1e4, 1e6])
+@pytest.mark.parametrize("seed", range(4))
+def test_three_of_one_motion_beside_a_stiff_spring_let_go_and_stick_as_one(spring, seed):
+    """Their accelerations have the round-off of the displacement under gravity, times the spring."""
+    random = np.random.default_rng(seed)
+    mass, stiffness = [[3.458, -0.347], [-0.347, 1.195]], [[74.71, -20.02], [-20.02, 16.39]]
+    structure, found = mp.LinearStructure(mass, stiffness), []
+    loads = [mp.Gravity([1.0, 1.0], -9.81), mp.HarmonicLoad([1.0, 0.3], *random.uniform([4, 0.1], [9, 0.4]))]
+    start = {"displacement": random.normal(size=2), "velocity": random.normal(size=2)}
+    for parts in ([(-1.0, 0.3)], [(-3.0, 0.05), (-1.0, 0.09), (-1.0, 0.06)]):
+        rubs = [mp.Friction(f"f{k}", [0.0, lever], limit) for k, (lever, limit) in enumerate(parts)]
+        rubs.append(mp.Friction("j", [0.0, 1.0], 4.43, stiffness=spring))
+        run = mp.simulate(mp.MultiPhiModel(structure, rubs, modes="all"), 6.0, **start, loads=loads)
+        assert run.status == "ok"
+        found.append(run.displacement(np.linspace(0, 6, 41)))
+    assert_allclose(*found, rtol=0, atol=1e-9)
