@@ -1,4 +1,4 @@
-"""Many runs of one model that differ in their starts alone, on all cores.
+"""Many runs of one model that differ in their starts alone, on as many threads as are worth it.
 
 A thread carries one run at a time, on arrays of its own; levels are built once, for all. The compiled loop lets other
 threads go on, and everything else of a run is done by one thread at a time, so a run is what it is alone, to the bit,
@@ -8,8 +8,10 @@ however many threads there are. What is not asked for is not kept.
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -40,6 +42,8 @@ __all__ = ["ManyRuns", "simulate_many"]
 
 BAR_DELAY = 2.0  # s before a progress bar appears
 KEPT = 8  # levels under loads as finely interpolated as runs have needed
+TRIED = 8  # first runs, by which the number of threads is chosen
+MOSTLY = 0.6  # of their time in the loop: below it threads wait for each other longer than they gain
 
 _Start: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"
 
@@ -100,7 +104,7 @@ def simulate_many(
     times: np.ndarray | None = None,
     threads: int | None = None,
 ) -> ManyRuns:
-    """Runs of one model that differ in their starts alone, on all cores, each what ``simulate`` gives, to the bit.
+    """Runs of one model that differ in their starts alone, each what ``simulate`` gives, to the bit.
 
     Parameters
     ----------
@@ -117,7 +121,8 @@ def simulate_many(
     times : array (t,), default None
         At which they are [s], None for the end alone.
     threads : int, default None
-        How many, None for as many as there are cores; the answer does not hang on it.
+        How many; the answer does not hang on it. None for as many as there are cores where the loop takes most of the
+        first runs' time, and one elsewhere: all but the loop is done by one thread at a time.
 
     Returns
     -------
@@ -127,10 +132,8 @@ def simulate_many(
 
     Raises
     ------
-    MultiPhiTypeError
-        For arguments of another kind.
-    MultiPhiValueError
-        For what is wrong for all runs.
+    MultiPhiTypeError, MultiPhiValueError
+        For arguments of another kind, and for what is wrong for all runs.
 
     Examples
     --------
@@ -157,7 +160,7 @@ def simulate_many(
     given = Run(wider, end, loads=loads)
     task = _Task(given, starts, tuple(points), _times(times, end))
     with tqdm(total=len(starts), unit="run", disable=None, leave=False, delay=BAR_DELAY) as bar:
-        task.carry_out(_threads(threads), bar)
+        task.carry_out(_checked(threads), bar)
     result = task.result()
     groups = grouped((str(number), sentences) for number, sentences in enumerate(result.warnings))
     issue((*outside, *(group.told(len(starts)) for group in groups)))
@@ -178,12 +181,13 @@ class _Task:
         self._samples, self._ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self._events, self._told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
 
-    def carry_out(self, threads: int, bar: Any) -> None:
+    def carry_out(self, threads: int | None, bar: Any) -> None:
         """All runs; a Tolerance is decided by the first ones, one after the other."""
         left, model = iter(range(len(self._starts))), self._given.model
         while isinstance(model.modes, Tolerance) and model.decided is None and (number := next(left, None)) is not None:
             self._run(number, None)
             bar.update()
+        threads = self._chosen(left, bar) if threads is None else threads
         with ThreadPoolExecutor(threads) as pool:
             working = [pool.submit(self._work, left, bar) for _ in range(threads)]
             try:
@@ -191,6 +195,15 @@ class _Task:
                     each.result()
             finally:
                 self._stopped = True
+
+    def _chosen(self, left: Iterator[int], bar: Any) -> int:
+        """How many threads are worth it, by the first runs."""
+        worker, begun = _Worker(self), time.perf_counter()
+        with self.lock:
+            for number in itertools.islice(left, TRIED):
+                self._run(number, worker)
+                bar.update()
+        return os.cpu_count() or 1 if worker.looped > MOSTLY * (time.perf_counter() - begun) else 1
 
     def result(self) -> ManyRuns:
         """What is kept."""
@@ -233,10 +246,10 @@ class _Task:
 
 
 class _Worker:
-    """The arrays of a thread (simulate.Shared)."""
+    """The arrays of a thread (simulate.Shared); looped: time [s] that it has been in the loop."""
 
     def __init__(self, task: _Task) -> None:
-        self._task = task
+        self._task, self.looped = task, 0.0
         self._arrays = BoundedCache[LoadedLevels, LevelArrays](KEPT)
 
     def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
@@ -250,9 +263,11 @@ class _Worker:
     def _loop(self, *given: Any) -> Any:
         """The compiled loop, while others may go on."""
         self._task.lock.release()
+        begun = time.perf_counter()
         try:
             return carry(*given)
         finally:
+            self.looped += time.perf_counter() - begun
             self._task.lock.acquire()
 
 
@@ -281,11 +296,9 @@ def _times(given: Any, end: float) -> np.ndarray:
     return times
 
 
-def _threads(given: int | None) -> int:
-    if given is None:
-        return os.cpu_count() or 1
-    if not is_count(given):
-        raise MultiPhiTypeError(f"threads: got {given!r}, need an integer or None")
-    if given < 1:
-        raise MultiPhiValueError(f"threads: got {given}, need at least 1")
-    return given
+def _checked(threads: int | None) -> int | None:
+    if threads is not None and not is_count(threads):
+        raise MultiPhiTypeError(f"threads: got {threads!r}, need an integer or None")
+    if threads is not None and threads < 1:
+        raise MultiPhiValueError(f"threads: got {threads}, need at least 1")
+    return threads

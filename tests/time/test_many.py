@@ -92,6 +92,22 @@ def test_a_tolerance_is_decided_by_the_first_run():
     assert second.decided.modes == first.decided.modes
 
 
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+@pytest.mark.parametrize(("share", "most"), [(0.0, None), (math.inf, 1)], ids=["threads pay", "they do not"])
+def test_the_first_runs_choose_the_number_of_threads(share, most, monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.time.many.MOSTLY", share)
+    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    pools = []
+    pool = many.ThreadPoolExecutor
+    monkeypatch.setattr(many, "ThreadPoolExecutor", lambda threads: pools.append(threads) or pool(threads))
+    check(
+        mp.simulate_many(model("all"), END, starts(12), points=["m5"], times=TIMES),
+        alone(model("all"), starts(12)),
+        ["m5"],
+    )
+    assert pools == [most or 3]
+
+
 class TestARunThatFails:
     def test_is_a_status_of_its_row(self, monkeypatch):
         """Refused, inside a rigid stop; not finite; and failed on the way, by chatter that is looked for too early."""
