@@ -79,7 +79,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     found += known.clusters
     if model.validity is not None:
         found += model.validity(trajectory)
-    if known.slowest * span < SLOW:
+    if 0 < known.slowest * span < SLOW:
         found += _slow_mode(segments, known.slowest, span)
     if model.general:
         found += rubbing_warnings(segments, model)

@@ -5,6 +5,7 @@ import functools
 import math
 import pickle
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time import chatter
 from multiphi_exudyn.time.defects import defects
+from multiphi_exudyn.time.reliability import warnings_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
@@ -197,6 +199,12 @@ class TestSlowModel:
         assert mp.simulate(mp.MultiPhiModel(right), 1.0, velocity=np.ones(n)).warnings == ()
         (told,) = mp.simulate(mp.MultiPhiModel(swapped), 1.0, velocity=np.ones(n)).warnings
         assert told.startswith("slow model: its fastest mode takes 208 s for an oscillation, and the run lasts 1 s")
+
+    def test_a_run_that_ended_where_it_began_says_nothing_of_slow_modes(self):
+        """As one does whose start fails: no time has passed in which a mode could have moved."""
+        model = mp.MultiPhiModel(mp.LinearStructure(np.eye(2), np.diag([1.0, 4.0]), points={"tip": 0}))
+        run = mp.simulate(model, 1.0, loads=[mp.ConstantLoad("tip", 1.0)])
+        assert warnings_of(replace(run, t_end=0.0)) == ()
 
     def test_nothing_is_said_of_a_free_body(self):
         free = mp.LinearStructure([[1.0]], [[0.0]])
