@@ -21,17 +21,17 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     10      a rigid one that strikes      impact.rub, resting.sliding_level, rebounds.hear_touching
     11      restitution                   rebounds.hear_touching, rebounds.rebound, rebounds.bounce
     11      beside friction               rebounds.collide_and_rebound
-    11      the last bounce               rebounds.last_bounce, rebounds.keep_landing
+    11      the last bounce               bounces.last_bounce, bounces.keep_landing
     12      friction at rest              sticking.stick_together, sticking.decide_at_rest, sticking.choose
     12      beside rigid contacts         sticking.let_go, independence.follows
-    12      redundant friction            sticking.sort_by_reserve, sticking.thin_out_idle, independence.thin_out
+    12      redundant friction            at_rest.sort_by_reserve, sticking.thin_out_idle, independence.thin_out
     12      which of it is idle           changes.without_stick
     12      its impacts                   changes.bears_nothing, striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
 Order: load_channels, excitation, pieces, channels, loaded_level, defect_forms, transition, state, exits, exit_table,
-loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact, phases, changes,
-independence, rebounds, resting, striking, switching, sticking, decision, waiting, start, channel_arrays,
-element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays, entering.
+loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact_sizes, impact, phases,
+changes, independence, bounces, rebounds, resting, striking, switching, at_rest, sticking, decision, waiting, start,
+channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays, entering.
 """

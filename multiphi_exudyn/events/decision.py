@@ -55,8 +55,8 @@ bases of two levels need not agree, so the law says what happens then; each sent
    struck again at once. Where one of them rubs e is that of impulses: an impact without restitution, then one of at
    least e times its impulses (Poisson). A bounce too low to be seen is the last: it takes as long as all that would
    follow, and where it lands e is zero.
-   -> rebounds.hear_touching, rebounds.rebound, rebounds.collide_and_rebound, rebounds.bounce, rebounds.last_bounce,
-   rebounds.keep_landing
+   -> rebounds.hear_touching, rebounds.rebound, rebounds.collide_and_rebound, rebounds.bounce, bounces.last_bounce,
+   bounces.keep_landing
 12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together, those at contacts that
    give way with their mu N of the instant: their forces within their limits, static ones until they slip, are
    complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:
@@ -66,7 +66,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
    motion is the same where not more than one has a static limit. So do those along a closed rigid contact. One that
    would be pulled beside what sticks opens, and all is decided once more without it. None bears an impulse, nor does
    the friction of a contact that gives way.
-   -> sticking.stick_together, sticking.decide_at_rest, sticking.sort_by_reserve, sticking.choose,
+   -> sticking.stick_together, sticking.decide_at_rest, at_rest.sort_by_reserve, sticking.choose,
    sticking.thin_out_idle, sticking.let_go, independence.thin_out, independence.follows, striking.slide_on,
    changes.bears_nothing, changes.without_stick
 
@@ -133,9 +133,10 @@ from multiphi_exudyn.events.arrays import (
     TRANSITIONS_NOW,
     WORKED,
 )
+from multiphi_exudyn.events.bounces import keep_landing
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, flag_asking, is_held, turn_wishes
 from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
-from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching, keep_landing
+from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
 from multiphi_exudyn.events.sticking import stick_together

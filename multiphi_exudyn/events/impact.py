@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 
 from multiphi_exudyn.events.arrays import (
-    ACCELERATION,
     BY_IMPACT,
     CAUSE,
     CAUSED_BY,
@@ -27,7 +26,6 @@ from multiphi_exudyn.events.arrays import (
     ENTERS,
     FAILED,
     FRICTIONS,
-    GAPS,
     HELD_LINKS,
     HIGHEST,
     LEADERS,
@@ -53,23 +51,14 @@ from multiphi_exudyn.events.arrays import (
     VALUES,
 )
 from multiphi_exudyn.events.energies import kinetic
+from multiphi_exudyn.events.impact_sizes import speed_size
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity import EXCLUDED, UNDECIDED, pose, solve
 from multiphi_exudyn.mathematics.free_rows import EXCLUDED_ROWS, EXCLUDING, norm, product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = [
-    "IMMOVABLE",
-    "RESTING",
-    "collide",
-    "fill_rows",
-    "nearest",
-    "resting_size",
-    "rub",
-    "speed_size",
-    "unseen_speed",
-]
+__all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "rub"]
 
 RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
 IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
@@ -282,38 +271,3 @@ def collide(
     numbers[losses + BY_IMPACT] += plastic
     numbers[losses + STOP_WORK] += plastic - lost
     return OK
-
-
-@compiled
-def speed_size(ints: Ints, numbers: Numbers, state: int, row: int) -> float:
-    """What a gap velocity could be at the speeds of a state, whose directions an impact mixes."""
-    r, q, v = ints[ints[state + LEVEL] + MODES], ints[CHANNELS], ints[state + SPEED]
-    prescribed = 0.0
-    for k in range(r, r + q):
-        prescribed += abs(numbers[row + k]) * abs(numbers[v + k])
-    return norm(numbers, row, r) * norm(numbers, v, r) + prescribed
-
-
-@compiled
-def unseen_speed(ints: Ints, numbers: Numbers, state: int, contact: int, row: int) -> float:
-    """Gap velocity that the free motion turns back before the gap is more than round-off of its terms.
-
-    xi'' of the state stands in the accelerations.
-    """
-    level, x = ints[state + LEVEL], ints[state + PLACE]
-    n = ints[level + MODES] + ints[CHANNELS]
-    gaps = ints[level + GAPS] + contact * (n + 1)
-    size, falling = abs(numbers[gaps + n]), 0.0
-    for i in range(n):
-        size += abs(numbers[gaps + i]) * abs(numbers[x + i])
-        falling -= numbers[row + i] * numbers[ints[ACCELERATION] + i]
-    return math.sqrt(2.0 * ZERO * size * falling) if falling > 0.0 else 0.0
-
-
-@compiled
-def resting_size(numbers: Numbers, one: int, other: int, row: int, n: int) -> float:
-    """Of which terms a gap's acceleration is the sum, in the larger of two states' sizes (n,)."""
-    total = 0.0
-    for i in range(n):
-        total += abs(numbers[row + i]) * max(numbers[one + i], numbers[other + i])
-    return total

@@ -50,21 +50,13 @@ from multiphi_exudyn.events.arrays import (
     TOUCHING,
     WORKED,
 )
+from multiphi_exudyn.events.bounces import has_rebounded
 from multiphi_exudyn.events.changes import clear
-from multiphi_exudyn.events.impact import (
-    RESTING,
-    collide,
-    fill_rows,
-    nearest,
-    resting_size,
-    rub,
-    speed_size,
-    unseen_speed,
-)
+from multiphi_exudyn.events.impact import RESTING, collide, fill_rows, nearest, rub
+from multiphi_exudyn.events.impact_sizes import resting_size, speed_size, unseen_speed
 from multiphi_exudyn.events.independence import join
 from multiphi_exudyn.events.maps import find_level, find_map, move
 from multiphi_exudyn.events.phases import first_exit, opening, phase_of
-from multiphi_exudyn.events.rebounds import has_rebounded
 from multiphi_exudyn.events.signals import sign_of
 from multiphi_exudyn.events.state_arrays import accelerate, acceleration_sizes, copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled

@@ -42,13 +42,15 @@ from multiphi_exudyn.events.arrays import (
     TOUCHING,
     WORKED,
 )
+from multiphi_exudyn.events.bounces import last_bounce
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, is_held, note, transfer
 from multiphi_exudyn.events.energies import kinetic, lose
-from multiphi_exudyn.events.impact import RESTING, speed_size
+from multiphi_exudyn.events.impact import RESTING
+from multiphi_exudyn.events.impact_sizes import speed_size
 from multiphi_exudyn.events.independence import follows, held_links, join
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
-from multiphi_exudyn.events.rebounds import bounce, collide_and_rebound, last_bounce, rebound
+from multiphi_exudyn.events.rebounds import bounce, collide_and_rebound, rebound
 from multiphi_exudyn.events.resting import press, reaction_sign, same_speed, stay_closed
 from multiphi_exudyn.events.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled

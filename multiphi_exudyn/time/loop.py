@@ -80,6 +80,7 @@ from multiphi_exudyn.events.arrays import (
     WORK,
     WORKED,
 )
+from multiphi_exudyn.events.bounces import only_bounces
 from multiphi_exudyn.events.changes import clear
 from multiphi_exudyn.events.decision import decide, decide_jump
 from multiphi_exudyn.events.defect_sums import add_defect, add_start_defect
@@ -87,7 +88,6 @@ from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_
 from multiphi_exudyn.events.energies import kinetic, pattern_work, potential
 from multiphi_exudyn.events.flow import expand, state_at
 from multiphi_exudyn.events.maps import find_map
-from multiphi_exudyn.events.rebounds import only_bounces
 from multiphi_exudyn.events.start import begin
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.waiting import arm, flag_again, watch, who_asks
