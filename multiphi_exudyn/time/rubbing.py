@@ -1,10 +1,11 @@
 """What to distrust in the friction of a run: what several bear together, and what truncation turns round.
 
 Friction without a spring that follows from what sticks beside it moves as that does: it pushes with its kinetic limit,
-as if it slipped (decision.py). Where one of them has a higher static limit, that one bears it. Where several have,
-which of them bears the load is not determined, nor when they begin to slip: two of equal limits F and static limits S
-do at S + F here, and might at 2 S. Friction at rigid contacts is decided one contact after the other: where several
-turn at one instant, their order may count.
+as if it slipped (decision.py). Where one of them has a higher static limit, that one bears it. Where several have, or
+where it has let go and others stick for it, which of them bears the load is not determined, nor when they begin to
+slip: two of equal limits F and static limits S do at S + F here, and might at 2 S. Nor is it at contacts that give way,
+whose limits change with their pressures. Friction at rigid contacts is decided one contact after the other: where
+several turn at one instant, their order may count.
 
 A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py):
 the modes of slip and those of stick do not move its place alike. It is told, and not mended. The static residual of the
@@ -49,8 +50,8 @@ def rubbing_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
 
 def _shared(segments: Segments) -> Iterator[str]:
     """Of those that push with the smallest share of their static limit."""
-    dropping = [rub for rub in _rigid_friction(segments) if rub.drop > 0]
-    pairs = [(one, other) for one in dropping for other in dropping if one is not other]
+    rubs = _rigid_friction(segments)
+    pairs = [(one, other) for one in rubs for other in rubs if one is not other and one.drop > 0]
     found = [together for level in segments.levels for pair in pairs for together in _together(level, *pair)]
     if found:
         share, name, others = min(found)
@@ -70,6 +71,7 @@ class _Rub(NamedTuple):
     sticks: int
     drop: float
     pressed: bool  # by a rigid contact
+    gives_way: bool  # what presses it
 
 
 def _rigid_friction(segments: Segments) -> list[_Rub]:
@@ -77,17 +79,19 @@ def _rigid_friction(segments: Segments) -> list[_Rub]:
     for i, element in enumerate(base.contacts):
         sticks, number, spring, drop = friction_spring(element)
         if sticks >= 0 and not spring:
-            pressed = element.rigid and not element.held
-            found.append(_Rub(i, element.name, base.link_places[i][number], sticks, drop, pressed))
+            pressed, gives_way = element.rigid and not element.held, not (element.rigid or element.held)
+            found.append(_Rub(i, element.name, base.link_places[i][number], sticks, drop, pressed, gives_way))
     return found
 
 
 def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[float, str, tuple[str, ...]]]:
     """Of friction that slips in a level, and follows from another one and from what is held there: its share, all."""
-    base, open_ = level.level.base, level.states[other.element] < other.sticks
-    if open_ or level.states[one.element] <= one.sticks:
+    base, own_state, its_state = level.level.base, level.states[one.element], level.states[other.element]
+    takes_over = other.drop > 0 or its_state == other.sticks
+    shared = own_state >= one.sticks if one.gives_way else own_state > one.sticks and takes_over
+    if its_state < other.sticks or not shared:
         return
-    held = [k for k in level.level.indices if base.links[k].rigid and k != other.link] + [other.link]
+    held = [k for k in level.level.indices if base.links[k].rigid and k not in (one.link, other.link)] + [other.link]
     rows, row = base.directions[:, held], base.directions[:, one.link]
     shares = np.linalg.lstsq(rows, row, rcond=None)[0]
     own, carried = base.links[one.link].velocity, shares * [base.links[k].velocity for k in held]

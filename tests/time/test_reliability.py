@@ -373,6 +373,21 @@ class TestFriction:
         assert run.velocity(2.0) == pytest.approx([-(2.0 - 1 / 5.2) * 1.2], rel=1e-12)
         assert kinds(run) == told
 
+    @pytest.mark.parametrize(("feet", "told"), [((0.3, 0.3), ["redundant friction"]), ((0.3,), [])])
+    def test_of_elastic_contacts_that_hold_one_motion_is_told_where_one_has_a_static_limit(self, feet, told):
+        """Their limits change with their pressures: which of them bears the load hangs on the way there."""
+        structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"x": 0, "y": 1})
+        stops = [
+            mp.UnilateralContact(f"foot{k}", "y", 0.0, 1e3, friction=mu, tangential="x", static_friction=0.5 - 0.2 * k)
+            for k, mu in enumerate(feet)
+        ]
+        weight = [mp.ConstantLoad("y", -9.81), mp.ConstantLoad("x", 1.0)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            run = mp.simulate(mp.MultiPhiModel(structure, stops, modes="all"), 0.2, loads=weight)
+        assert run.status == "ok"
+        assert kinds(run) == told
+
     @pytest.mark.parametrize(
         ("loads", "coupling", "told"),
         [((4.5, 3.8), -0.3, ["friction in turn"]), ((3.5, 3.5), -0.3, []), ((4.5, 3.8), 0.0, [])],
