@@ -57,8 +57,8 @@ def _shared(segments: Segments) -> Iterator[str]:
         share, name, others = min(found)
         yield (
             f"redundant friction: {name!r} follows from {', '.join(map(repr, others))}, so which of them bears the "
-            f"load, and when they begin to slip, is not unique: it pushes with its kinetic limit, {per_cent(share)} of "
-            f"its static one; {REMEDY}"
+            f"load, and when they begin to slip, is not unique: its kinetic limit is {per_cent(share)} of its "
+            f"static one; {REMEDY}"
         )
 
 
@@ -85,7 +85,10 @@ def _rigid_friction(segments: Segments) -> list[_Rub]:
 
 
 def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[float, str, tuple[str, ...]]]:
-    """Of friction that slips in a level, and follows from another one and from what is held there: its share, all."""
+    """Of friction that follows from another one and from what is held in a level: its share, its name, and theirs.
+
+    It slips while the other one sticks, or has a static limit too; at a contact that gives way it may stick as well.
+    """
     base, own_state, its_state = level.level.base, level.states[one.element], level.states[other.element]
     takes_over = other.drop > 0 or its_state == other.sticks
     shared = own_state >= one.sticks if one.gives_way else own_state > one.sticks and takes_over
