@@ -37,7 +37,7 @@ def run_animate(
     count = len(stage.time)
     with tqdm(total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as bar:
         write_whole(file, gif(animation(stage, runs), lambda frame, total: bar.update()))
-    print(f"{count} frames, {stage.slow:g} times slower\n{file}")
+    print(f"{count} frames, {stage.slow:g} times slower than reality\n{file}")
     return True
 
 

@@ -18,8 +18,8 @@ def run_compile() -> bool:
     """Compile what a run, and a body in Exudyn, would compile, and say where it is kept; True if it is kept."""
     path = compile_entries() if available() else None
     if path is None:
-        why = "no folder is writable; NUMBA_CACHE_DIR names one" if available() else "numba is not installed"
-        print(f"nothing compiled is kept: {why}", file=sys.stderr)
+        why = "no folder is writable; set NUMBA_CACHE_DIR to one that is" if available() else "numba is not installed"
+        print(f"the compiled loop is not kept: {why}", file=sys.stderr)
         return False
     print(f"compiled, and kept in {path}")
     return True

@@ -57,7 +57,7 @@ def run_schema(kind: str, markdown: bool) -> bool:
 
 def _write_template(kind: str, path: Path) -> None:
     if path.exists():
-        raise MultiPhiValueError(f"FILE: got {str(path)!r}, need a name that is not taken")
+        raise MultiPhiValueError(f"FILE: got {str(path)!r}, which exists already, need another name")
     template = resources.files(KINDS[kind][0]) / "templates" / f"{kind}.toml"
     try:
         write_whole(path, template.read_bytes())

@@ -78,7 +78,7 @@ def parser() -> argparse.ArgumentParser:
     whole = _OneLineParser(
         "multiphi-exudyn",
         description="Structures with contacts: reduced models and the full nonlinear one, side by side.",
-        epilog="multiphi-exudyn COMMAND --help says more of a command, with an example.",
+        epilog="multiphi-exudyn COMMAND --help says more about a command, with an example.",
     )
     whole.add_argument("--version", action="version", version=f"multiphi-exudyn {__version__}")
     commands = whole.add_subparsers(
@@ -106,7 +106,7 @@ def parser() -> argparse.ArgumentParser:
         "Writes report.html, summary.json and histories.npz.",
         "compare paper-rig --t-end 0.5 --modes 12 --out rig",
     )
-    scene_options(compare, "for the models to which the scene gives none of their own")
+    scene_options(compare, "of the models whose number the scene does not fix")
     animate = add(
         "animate",
         _animate,
@@ -126,7 +126,7 @@ def parser() -> argparse.ArgumentParser:
     needs = add(
         "needs",
         _needs,
-        "list what reduced runs need: levels, coordinates, packages, memory",
+        "show what the reduced run of a scene needs: levels, coordinates, packages, memory",
         "",
         "needs paper-rig bed-of-stops",
     )

@@ -18,7 +18,9 @@ def scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
 def animate_options(parser: argparse.ArgumentParser) -> None:
     _scene_option(parser)
     parser.add_argument("--model", metavar="NAME", help="the reduced model (default: the scene's first)")
-    parser.add_argument("--reference", metavar="NAME", help="what it is shown beside (default: the scene's reference)")
+    parser.add_argument(
+        "--reference", metavar="NAME", help="the model drawn beside it (default: the scene's reference)"
+    )
     parser.add_argument(
         "--slow", type=_factor, metavar="FACTOR", help="slow motion factor (default: chosen from the duration)"
     )
@@ -34,7 +36,7 @@ def _scene_option(parser: argparse.ArgumentParser) -> None:
 
 def study_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", metavar="STUDY", help="a shipped study (see: studies) or a TOML file")
-    parser.add_argument("--quick", action="store_true", help="the short form of the study")
+    parser.add_argument("--quick", action="store_true", help="the study's short form: fewer values, shorter runs")
     parser.add_argument(
         "--on",
         metavar="WHERE",

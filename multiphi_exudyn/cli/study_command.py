@@ -14,7 +14,7 @@ from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.accuracy.study_warnings import warned
-from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
 from multiphi_exudyn.study.results import TABLE
 from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.sweep.executors import open_executor
@@ -52,7 +52,7 @@ def _tell(result: StudyResult, folder: Path) -> None:
     for tolerance in result.study.tolerances if result.timings else ():
         chosen = cheapest(known, tolerance)
         faster = times_faster(chosen, full)
-        print(f"\ncheapest within {percent(tolerance)} to {result.window:g} s{', ' + words(at) if at else ''}")
+        print(f"\ncheapest within {share(tolerance)} to {result.window:g} s{', ' + words(at) if at else ''}")
         for name, setting in chosen.items():
             if setting is None:
                 print(f"  {name:32}  none")

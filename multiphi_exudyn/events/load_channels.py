@@ -99,7 +99,8 @@ class LoadChannels:
         rigid = [link.name for link, moves in zip(self._model.links, stop, strict=True) if moves and link.rigid]
         if rigid and isinstance(course, Sampled):
             raise MultiPhiTypeError(
-                f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need a smooth course"
+                f"stop motion of the rigid contact {rigid[0]!r}: got Sampled, whose speed jumps, need Harmonic, Smooth "
+                "or Sweep"
             )
 
     def _move(self, stop: np.ndarray, history: PiecewiseExponential) -> None:

@@ -198,6 +198,6 @@ def _check(
     interlaced = (squares[softening:] >= below).all() and (squares[: len(above)] <= above).all()
     if not (error <= ORTHONORMAL and interlaced):
         raise NumericalFailure(
-            f"level: its modes fail their invariants (mass normalisation off by {error:g}, "
-            f"interlacing {'holds' if interlaced else 'violated'})"
+            f"level: its modes are not accurate (mass normalisation off by {error:g}, interlacing "
+            f"{'holds' if interlaced else 'violated'}); are units and magnitudes of mass and stiffness right?"
         )

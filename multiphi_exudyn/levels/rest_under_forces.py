@@ -33,8 +33,8 @@ def at_rest(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief:
     if base.modes.rigid:
         if base.laws or base.general:
             raise MultiPhiValueError(
-                f"static equilibrium: the open structure has {base.modes.rigid} rigid-body modes beside force laws or "
-                "friction, need none"
+                f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes) and has force laws "
+                "or friction, need supports that hold it"
             )
         return _floating(base, load, size, inertia_relief), np.zeros(len(base.contacts))
     if base.laws or base.general:
@@ -58,8 +58,8 @@ def _floating(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relie
     name = f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes)"
     if not inertia_relief and np.max(left) > BALANCED:
         raise MultiPhiValueError(
-            f"{name} and {per_cent(float(np.max(left)))} of the forces are not balanced by others, need forces that "
-            "are, supports, or inertia_relief=True for the deformation of a structure that they accelerate"
+            f"{name} and {per_cent(float(np.max(left)))} of the forces are not balanced, need balanced forces, "
+            "supports, or inertia_relief=True (the deformation while the forces accelerate the structure)"
         )
     y = np.zeros(base.modes.count)
     y[elastic] = load[elastic] / base.modes.omega[elastic] ** 2
@@ -81,6 +81,6 @@ def _pressing(rows: np.ndarray, least: np.ndarray) -> np.ndarray:
         _, multipliers = least_distance(rows, least, np.abs(least))
     except Infeasible as found:
         raise MultiPhiValueError(
-            "static equilibrium: got rigid contacts that exclude each other, need a way between"
+            "static equilibrium: got rigid contacts that exclude each other, need gaps that leave room between them"
         ) from found
     return np.asarray(multipliers > 0)

@@ -40,8 +40,8 @@ def _at_rest(base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarr
     if not independent(base, held):
         names = ", ".join(dict.fromkeys(repr(base.links[k].name) for k in held))
         raise NumericalFailure(
-            f"static equilibrium: {names} hold one motion together, so which of them bears the load is not unique; "
-            "need a finite stiffness, or a spring beside friction"
+            f"static equilibrium: {names} hold the same motion, so how they share the load is not unique; need "
+            "contacts of finite stiffness, or a spring in series with friction"
         )
     closed_directions = base.closed_directions(index, gaps[index])
     along, configuration = static_response(base, closed_directions, load)
@@ -59,6 +59,7 @@ def _check_unique(base: ModalBase, sliders: list[int], own: np.ndarray) -> None:
         if not minor > UNIQUE:
             names = ", ".join(repr(base.label(sliders[k])) for k in chosen)
             raise NumericalFailure(
-                f"static equilibrium: friction at the contact {names} wedges: it leaves {minor:.6g} of the pressure, "
-                "so there is no one equilibrium, need a positive number, by a smaller coefficient"
+                f"static equilibrium: friction wedges at the contact {names}: det(I - W) = {minor:.6g}, W being the "
+                "contact force that one newton of it brings back by friction, so the equilibrium is not unique; need a "
+                "smaller coefficient, for which it is positive"
             )

@@ -149,7 +149,7 @@ def _check(plain: Level, sliders: tuple[int, ...], answer: np.ndarray) -> None:
             if not minor > DETERMINATE:
                 names = ", ".join(repr(plain.base.label(plain.base.oblique[plain.indices[sliders[k]]])) for k in chosen)
                 raise NumericalFailure(
-                    f"friction at the rigid contact {names}: leaves h.M^-1 (h - s mu h_t) = {minor:.6g} h.M^-1 h in "
-                    "the kept modes, so sliding has no unique motion; need a positive number, by a smaller coefficient "
+                    f"friction at the rigid contact {names}: sliding has no unique motion, as h.M^-1 (h - s mu h_t) is "
+                    f"{minor:.6g} of h.M^-1 h in the kept modes; need a smaller coefficient, for which it is positive, "
                     "or a finite stiffness"
                 )

@@ -144,11 +144,12 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
         else:
             raise NumericalFailure(
                 f"static equilibrium: at {s:.3g} of the forces the structure snaps through "
-                f"({base.contacts[element].name}), need forces that reach an equilibrium slowly"
+                f"({base.contacts[element].name}), need smaller forces, or a damped run that comes to rest"
             )
         path = entered
     raise NumericalFailure(
-        "static equilibrium: contacts, friction and force laws keep changing states at one load; none was found"
+        "static equilibrium: none was found, contacts, friction and force laws keep changing their states at one load; "
+        "need a damped run that comes to rest"
     )
 
 

@@ -64,7 +64,7 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
             slack[entering] = FOLLOWING
             continue
         x, shares = _meeting(units[pushing], wanted[pushing])
-    raise NumericalFailure("least distance: round-off decides which inequalities push")
+    raise NumericalFailure("least distance: round-off decides which inequalities are active")
 
 
 def _single(row: np.ndarray, least: float, size: float) -> tuple[np.ndarray, np.ndarray]:

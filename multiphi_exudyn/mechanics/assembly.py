@@ -78,7 +78,9 @@ class Assembly(LinearStructure):
 
     def __post_init__(self, fixed: Iterable[Place]) -> None:
         if tuple(fixed):
-            raise MultiPhiValueError('fixed: got some of an assembly, need ties to the ground, {"a.tip": 1.0}')
+            raise MultiPhiValueError(
+                'fixed: got degrees of freedom of an assembly, need ties to the ground: ties=[{"a.tip": 1.0}]'
+            )
         super().__post_init__(())
 
     def part(self, name: str, displacement: np.ndarray) -> np.ndarray:
@@ -262,7 +264,9 @@ def _check_ties_hold(ties: np.ndarray, united: np.ndarray) -> None:
     broken = np.abs(ties @ united) > TIES_HOLD * (np.abs(ties) @ np.abs(united))
     if np.any(broken):
         worst = int(np.argmax(broken))
-        raise MultiPhiValueError(f"displacements: ties[{worst}] is {ties[worst] @ united:g}, need a tie that holds, 0")
+        raise MultiPhiValueError(
+            f"displacements: got {ties[worst] @ united:g} for ties[{worst}], need displacements that make it 0"
+        )
 
 
 def _finite(name: str, given: Any, n: int) -> np.ndarray:

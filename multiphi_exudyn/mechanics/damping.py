@@ -55,7 +55,9 @@ class ModalDamping:
     def __post_init__(self) -> None:
         if is_real(self.ratios):
             if self.beyond is not None:
-                raise MultiPhiValueError(f"ratios: got {self.ratios!r} and beyond, need a list of ratios beside beyond")
+                raise MultiPhiValueError(
+                    f"ratios: got the number {self.ratios!r} and beyond, need a list of ratios with beyond"
+                )
             object.__setattr__(self, "beyond", self.ratios)
             object.__setattr__(self, "ratios", (self.ratios,))
         values = real_array("ratios", self.ratios, "a ratio or a list of ratios")

@@ -115,7 +115,7 @@ def known(name: str, dofs: DofTable | None) -> DofTable:
     """The table, refused where there is none."""
     if dofs is None:
         raise MultiPhiValueError(
-            f"{name}: got a node, but these matrices do not say whose their rows are; need a row, from 0, or dofs="
+            f"{name}: got a node, but nothing says which node each row belongs to; need a row, from 0, or dofs="
         )
     return dofs
 

@@ -114,7 +114,7 @@ class ForceLaw:
         slopes = np.diff(forces) / np.diff(knots)
         if not np.any(slopes):
             raise MultiPhiValueError(
-                f"force law {self.name!r} law: got a constant force, need one that changes (or a load)"
+                f"force law {self.name!r} law: got a constant force, need one that changes with q (or a ConstantLoad)"
             )
         for name, value in (("knots", knots), ("forces", forces), ("centre", centre), ("error", error)):
             object.__setattr__(self, name, value)

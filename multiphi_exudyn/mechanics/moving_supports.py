@@ -104,7 +104,9 @@ class BaseMotion:
     def __post_init__(self) -> None:
         check_time_function("base motion", self.course)
         if isinstance(self.course, Sampled):
-            raise MultiPhiTypeError("base motion: got Sampled, whose acceleration is infinite, need a smooth course")
+            raise MultiPhiTypeError(
+                "base motion course: got Sampled, whose acceleration is infinite, need Harmonic, Smooth or Sweep"
+            )
         _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
 
 

@@ -156,7 +156,9 @@ def damping_matrix(structure: LinearStructure) -> Matrix | None:
     given = structure.damping
     if isinstance(given, ModalDamping):
         if scipy.sparse.issparse(structure.mass) or scipy.sparse.issparse(structure.stiffness):
-            raise MultiPhiValueError("damping: got ModalDamping of sparse matrices as one matrix, need dense ones")
+            raise MultiPhiValueError(
+                "damping: got ModalDamping of sparse matrices where the damping matrix C is needed, need dense matrices"
+            )
         modes = complete_modes(structure.mass, structure.stiffness).turned(structure.point_rows)
         momenta = structure.mass @ modes.shapes
         return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T

@@ -31,14 +31,15 @@ def failure(arrays: LevelArrays) -> NumericalFailure:
         f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
         "need fewer modes or a shorter run",
         a.CHATTER: f"chatter: {window} events in {told[0]:g} s, more than {allowed} in a period of the "
-        f"highest kept mode or load ({told[1]:g} Hz) or all within {ACCUMULATED:g} of the time so far",
+        f"highest kept mode or load ({told[1]:g} Hz), or all within {ACCUMULATED:g} of the time so far; more modes or "
+        "contacts of finite stiffness may help",
         a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
         a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"
         + ("" if complete else " in the kept modes, need more of them"),
-        a.UNSETTLED: "no forces were found that agree with what moves: round-off decides which contacts push, or "
-        "friction is so high that they are not unique, need a smaller coefficient",
-        a.MIXED: f"rigid contacts {names}: struck together with several restitutions, need one",
-        a.GAINING: f"rigid contacts {names}: an impact with friction and several restitutions would make energy, "
-        "need one restitution",
+        a.UNSETTLED: "no contact forces were found that agree with the motion: round-off decides which contacts push, "
+        "or friction is too high for a unique answer, need a smaller coefficient of friction",
+        a.MIXED: f"rigid contacts {names}: struck together, but their restitutions differ, need one value",
+        a.GAINING: f"rigid contacts {names}: an impact with friction and different restitutions would create energy, "
+        "need one value of restitution",
     }
     return NumericalFailure(sentences[int(ints[a.CAUSE])])

@@ -82,7 +82,7 @@ def _check_stops(level: LoadedLevel, moved: np.ndarray, before: np.ndarray) -> N
         if contact.rigid and abs(new - old) > CONTINUOUS * (abs(new) + abs(old)):
             raise MultiPhiValueError(
                 f"loads: the stop of the rigid contact {contact.name!r} jumps by {new - old:g} m where the run goes "
-                "on, need a motion that does"
+                "on, need a motion that goes on without a jump"
             )
 
 

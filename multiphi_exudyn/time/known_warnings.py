@@ -51,8 +51,8 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
     if found:
         names = ", ".join(repr(name) for name in found)
         yield (
-            f"truncated friction: {min(found.values())} modes hold what sticks at {names}, so its force may be off by "
-            f"5 % and more until it slips; {REMEDY}"
+            f"truncated friction: only {min(found.values())} modes are kept while {names} sticks, so its force may be "
+            f"off by 5 % and more until it slips; {REMEDY}"
         )
 
 
@@ -84,10 +84,10 @@ def missing_modes(model: MultiPhiModel) -> Iterator[str]:
     told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
     if told:
         yield (
-            f"missing modes: the structure has its modes up to {structure.highest:g} Hz alone, so "
+            f"missing modes: the structure has only its modes up to {structure.highest:g} Hz, so "
             f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
             f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
-            "the static flexibility of the points there"
+            "the static flexibility of these points (flexibility=)"
         )
 
 

@@ -193,7 +193,7 @@ class Motion:
             self._leave()
             raise NumericalFailure(
                 f"record: got {taken / 1e9:.2g} GB of {segments} segments, need at most {RECORD_BYTES / 1e9:.2g} GB: "
-                "a shorter run, from whose end others go on (start=), or fewer events or samples of loads"
+                "make the run shorter and continue it (start=), or give loads fewer samples"
             )
 
     @quiet

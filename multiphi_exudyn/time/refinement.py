@@ -37,7 +37,7 @@ def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> T
         finer *= SAFETY * error / min(wanted)
         trajectory = run(finer)
     if wanted and trajectory.status == "ok" and (error := _interpolation_error(trajectory)) > min(wanted):
-        told = f"smooth loads: the response is certain to {error:.2g} of its largest value, not to {min(wanted):g}"
+        told = f"smooth loads: the response is accurate to {error:.2g} of its largest value, not to {min(wanted):g}"
         return replace(trajectory, message=told)
     return trajectory
 

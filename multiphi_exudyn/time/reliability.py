@@ -196,7 +196,7 @@ def _truncation(trajectory: Trajectory, error: float, tolerance: Tolerance | Non
         kept = trajectory.model.level_at(()).modes
         yield (
             f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
-            "give the tolerance a larger number of most modes, or a run of its own to decide by"
+            "give Tolerance a larger most=, or a new model, so that it decides by this run"
         )
     elif error > (RIGID_INDICATOR if rigid else INDICATOR):
         typical = ", with rigid contacts a quarter of that is typical" if rigid else ""
@@ -220,7 +220,7 @@ def _load_pieces(excitation: Excitation, end: float) -> str:
     """Of loads that have so many pieces that they set the time and memory of a run to ``end`` [s]."""
     pieces = excitation.pieces(end)
     return (
-        f"load pieces: the loads have {pieces} pieces in {end:g} s, some "
-        f"{1e3 * PIECE_SECONDS * excitation.effort(end) / pieces:.1g} ms and {PIECE_BYTES / 1000:g} kB each; fewer "
+        f"load pieces: the loads have {pieces} pieces in {end:g} s, each of which takes some "
+        f"{1e3 * PIECE_SECONDS * excitation.effort(end) / pieces:.1g} ms and {PIECE_BYTES / 1000:g} kB; fewer "
         "samples, a larger tolerance or a lower highest frequency make the run shorter"
     )

@@ -52,8 +52,8 @@ def test_all_faults_at_once_unknown_fields_first_with_what_may_be_meant(folder, 
     code, out, err = told(capsys, "validate", "scene.toml")
     assert (code, out, err.count("\n")) == (2, "", 1)
     expected = [
-        "contacts[0].stifness: got 100000.0, need no field of this name; did you mean 'stiffness'?",
-        "loads[0].frequency: got 12.0, need no field of this name; did you mean 'frequency_hz'?",
+        "contacts[0].stifness: got 100000.0, need a known field; did you mean 'stiffness'?",
+        "loads[0].frequency: got 12.0, need a known field; did you mean 'frequency_hz'?",
         "contacts[0].stiffness: got nothing, need a value",
         "loads[0].frequency_hz: got nothing, need a value",
         "models[1].modes: got 0, need",
@@ -82,10 +82,10 @@ def test_a_scene_given_as_a_study_and_the_reverse_are_told_in_one_sentence(folde
 @pytest.mark.parametrize(
     ("axis", "said"),
     [
-        ("contacts.*.gab", "contacts[0].gab: got 0.0005, need no field of this name; did you mean 'gap'?"),
+        ("contacts.*.gab", "contacts[0].gab: got 0.0005, need a known field; did you mean 'gap'?"),
         ("contacts.stp.gap", "got 'stp', need one of the entries: *, 0, stop; did you mean 'stop'?"),
         ("contacts.1.gap", "got '1', need one of the entries: *, 0, stop"),
-        ("contact.stop.gap", "contact: got {'stop': {'gap': 0.0005}}, need no field of this name; did you mean"),
+        ("contact.stop.gap", "contact: got {'stop': {'gap': 0.0005}}, need a known field; did you mean"),
         ("modes.gap", "got 'gap' inside 6, need a field"),
     ],
 )

@@ -374,7 +374,7 @@ def test_a_function_set_later_is_found_out():
     CreateMultiPhiBody(mbs, model, displacement=start)
     mbs.SetPostStepUserFunction(lambda mbs, t: True)
     mbs.Assemble()
-    with pytest.raises(ValueError, match="replaced the switching of 'multiPhi0'"):
+    with pytest.raises(ValueError, match="replaced the one of 'multiPhi0'"):
         mbs.SolveDynamic(settings(1e-3, 0.01), solverType=TRAPEZOIDAL)
     del container
 
@@ -465,7 +465,7 @@ def test_bad_arguments_are_refused(refused):
     container, mbs = new_system()
     refused(TypeError, "model:", CreateMultiPhiBody, mbs, "rig")
     adaptive = dataclasses.replace(model, modes=mp.Tolerance(0.01))
-    refused(ValueError, "model: got modes = Tolerance", CreateMultiPhiBody, mbs, adaptive)
+    refused(ValueError, "model: got modes=Tolerance", CreateMultiPhiBody, mbs, adaptive)
     refused(ValueError, "displacement:", CreateMultiPhiBody, mbs, model, displacement=start[:-1])
     refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=1e-2)
     refused(ValueError, "matchedStepSize:", CreateMultiPhiBody, mbs, model, matchedStepSize=-1e-4)

@@ -354,7 +354,7 @@ def test_steps_that_a_contact_of_exudyn_shortens_are_refused_with_matched_modes(
     fixed = settings
     monkeypatch.setitem(globals(), "settings", shortened)
     with pytest.raises(
-        ValueError, match=r"need the same \(beside contacts of Exudyn too: .*useRecommendedStepSize=False"
+        ValueError, match=r"need the same \(beside Exudyn's own contacts set .*useRecommendedStepSize=False"
     ):
         run(chain(STIFFNESS), STEP, second_stop, matchedStepSize=STEP)
 

@@ -366,7 +366,7 @@ def test_a_report_of_a_run_says_what_holds_until_when_and_what_it_warns_of():
     reduction = reduce(mbs)
     trajectory = run(reduction, 1.0)
     linear, horizon, *warned = reduction.report_of(trajectory).splitlines()
-    assert linear.startswith("linear range (does not hold): forces that the model lacks: ")
+    assert linear.startswith("linear range (does not hold): what the model leaves out moves it by ")
     assert horizon == "determined within 1 % until 1 of 1 s"
     assert warned == [f"warning: {sentence}" for sentence in trajectory.warnings]
     assert warned[0].startswith("warning: linear range: ")

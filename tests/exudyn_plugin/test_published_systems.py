@@ -114,7 +114,7 @@ def test_a_mass_on_a_stop_comes_to_rest_where_exudyn_has_it():
 def test_a_stop_hidden_in_a_user_function_is_told():
     reduction = reduce(published.bouncing_ball_by_user_function().mbs)
     ((item, reason),) = reduction.left_out
-    assert (item.name, reason) == ("floor", "how its user function differs from its tangent at the current state")
+    assert (item.name, reason) == ("floor", "the difference of its user function from its tangent at the current state")
     assert reduction.model.contacts == ()
 
 

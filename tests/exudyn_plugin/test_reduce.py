@@ -121,7 +121,7 @@ def test_the_report_names_what_was_taken_and_what_was_left_out():
     reduction = reduce(system.mbs)
     assert [(item.name, reason) for item, reason in reduction.left_out] == [
         ("slide", "friction that slips already (data coordinate 0: 1), need a bristle that sticks: 0"),
-        ("timed", "its user function is none of time alone (it reads mbs.systemData)"),
+        ("timed", "its user function depends on more than time (it reads mbs.systemData)"),
     ]
     assert reduction.loads == ()
     assert "contacts slide.upper, slide.lower, 10000 N/m and 10 N s/m" in reduction.report
@@ -395,7 +395,7 @@ def test_items_left_out_for_one_reason_are_one_warning_and_one_line():
     reduction = reduce(springs_by_user_functions(30).mbs)
     sentence, _ = run(reduction, 0.1).warnings
     assert sentence.startswith(
-        "left out: 29 ObjectConnectorCoordinateSpringDamper ('spring1', 'spring2', 'spring3', ...): how its user"
+        "left out: 29 ObjectConnectorCoordinateSpringDamper ('spring1', 'spring2', 'spring3', ...): the difference of its"
     )
     assert len(reduction.left_out) == 30
     assert len(reduction.report.splitlines()) < 10

@@ -127,7 +127,7 @@ def test_the_report_says_what_it_became():
         ({"data": (0.4, 0.0, 0.0)}, r"slips already \(data coordinate 0: 0.4\)"),
         ({"start": 0.1}, r"stretched bristle \(data coordinate 1: 0\), need its coordinate: 0.1"),
         ({"activeConnector": False}, "not active"),
-        ({"springForceUserFunction": lambda mbs, t, i, u, *given: u}, "how its user function differs"),
+        ({"springForceUserFunction": lambda mbs, t, i, u, *given: u}, "the difference of its user function"),
     ],
 )
 def test_what_is_another_law_is_left_out_by_name(changed, reason):

@@ -364,7 +364,7 @@ def removed(system):
 def test_a_run_without_the_function_that_switches_ends_in_an_error(refused, spoil):
     system = System(model_of(50.0))
     spoil(system)
-    refused(ValueError, "PostStepUserFunction: got a function that replaced the switching of 'body'", system.solve)
+    refused(ValueError, "PostStepUserFunction: got a function that replaced the one of 'body'", system.solve)
 
 
 @pytest.mark.parametrize("by_steps", [False, True])

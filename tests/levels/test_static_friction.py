@@ -202,7 +202,7 @@ class TestContacts:
 
     def test_that_are_rigid_and_wedge_are_refused_with_their_number(self):
         """A force of 1 N along the stop changes the reaction by 2 / 10 N."""
-        with pytest.raises(mp.NumericalFailure, match=r"'floor' wedges: it leaves -0\.4 of the pressure"):
+        with pytest.raises(mp.NumericalFailure, match=r"wedges at the contact 'floor': det\(I - W\) = -0\.4,"):
             self.rigid(7.0).equilibrium({"x": 4.64, "y": -0.56})
 
     def rigid(self, friction):
@@ -224,7 +224,7 @@ class TestContacts:
         stuck = self.STIFFNESS + np.diag([0.0, 80.0])
         share = 80.0 * 7.0 * abs(np.linalg.inv(stuck)[1, 0])
         model, forces = self.model(friction=7.0, gap=-0.05), {"x": 3.0, "y": 8.0}
-        with pytest.raises(mp.NumericalFailure, match=f"'floor' wedges: it leaves {1 - share:.6g} of the pressure"):
+        with pytest.raises(mp.NumericalFailure, match=rf"'floor': det\(I - W\) = {1 - share:.6g},"):
             model.equilibrium(forces)
         free = np.linalg.solve(self.STIFFNESS, [3.0, 8.0])
         assert_allclose(self.model(friction=0.9 * 7.0 / share, gap=-0.05).equilibrium(forces).displacement, free)
@@ -266,5 +266,5 @@ def test_what_holds_one_motion_together_is_refused_by_name(block):
     structure = mp.LinearStructure(np.eye(2), [[300.0, 100.0], [100.0, 200.0]], points={"m0": 0, "m1": 1})
     rough = mp.UnilateralContact("c", {"m0": -1.0}, 0.0, friction=0.1, tangential="m1")
     model = mp.MultiPhiModel(structure, [rough, mp.Friction("f", block, 2.0)], modes="all")
-    with pytest.raises(mp.NumericalFailure, match="hold one motion together, so which"):
+    with pytest.raises(mp.NumericalFailure, match="hold the same motion, so how they share"):
         model.static_equilibrium({"m0": 10.0, "m1": -5.0})

@@ -125,7 +125,7 @@ def test_friction_without_a_spring_runs_where_nothing_is_full(tmp_path):
         (("friction", 0, "static_limit"), 0.5, "static_limit: got 0.5, need a finite force >= the limit 0.8"),
         (("friction", 0, "direction"), "nowhere", "friction[0].direction: got 'nowhere', need one of the points"),
         (("friction", 0, "stifness"), 1.0, "friction[0].stifness: got 1.0"),
-        (("friction",), [RING, RING], "friction[1].name: got 'ring', need a name of its own"),
+        (("friction",), [RING, RING], "friction[1].name: got 'ring', need another name"),
         (("friction", 0, "stiffness"), "rigid", "friction[0].stiffness: got 'inf', need a finite one: beam"),
         (
             ("models", 2),

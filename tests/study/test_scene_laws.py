@@ -118,7 +118,7 @@ RIG_START = {"load_at": "hole3", "force": -1.0}
 BROKEN = {
     "unknown kind": ([CUBIC | {"kind": "quintic"}], {}, "force_laws[0]: got"),
     "unknown point": ([CUBIC | {"at": "tap"}], {}, "force_laws[0].at: got 'tap', need one of the points"),
-    "unknown field": ([CUBIC | {"k5": 1.0}], {}, "force_laws[0].k5: got 1.0, need no field of this name"),
+    "unknown field": ([CUBIC | {"k5": 1.0}], {}, "force_laws[0].k5: got 1.0, need a known field"),
     "no coefficient": ([{k: v for k, v in CUBIC.items() if k != "k3"}], {}, "force_laws[0].k3: got nothing, need"),
     "span of a table": ([LAWS["table"] | SPAN], {}, "force_laws[0].span: got"),
     "a span that goes back": ([CUBIC | {"span": [0.01, -0.01]}], {}, "force_laws[0]: force law 'spring' span: got"),
@@ -127,7 +127,7 @@ BROKEN = {
         [LAWS["table"] | {"q": [0.0, -1.0, 1.0]}], {}, "force_laws[0]: force law 'spring' law: got a table"
     ),
     "a magnet in the span": ([LAWS["magnet"] | {"distance": 0.01}], {}, "force_laws[0]: got"),
-    "a name twice": ([CUBIC, CUBIC], {}, "force_laws[1].name: got 'spring', need a name of its own"),
+    "a name twice": ([CUBIC, CUBIC], {}, "force_laws[1].name: got 'spring', need another name"),
     "the name of a contact": (
         [CUBIC | {"name": "stop"}], {"contacts": BEAM["contacts"]}, "force_laws[0].name: got 'stop', need a name of"
     ),

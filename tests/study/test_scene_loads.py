@@ -126,7 +126,7 @@ BROKEN = {
     ),
     "negative frequency": ([HARMONIC | {"frequency_hz": -1.0}], {}, "loads[0].frequency_hz: got -1.0, need greater"),
     "no amplitude": ([{k: v for k, v in HARMONIC.items() if k != "amplitude"}], {}, "loads[0].amplitude: got nothing"),
-    "unknown field": ([HARMONIC | {"force": 1.0}], {}, "loads[0].force: got 1.0, need no field of this name"),
+    "unknown field": ([HARMONIC | {"force": 1.0}], {}, "loads[0].force: got 1.0, need a known field"),
     "unknown stop": ([LOADS["stop-motion"] | {"contact": "floor"}], {}, "loads[0].contact: got 'floor', need one of"),
     "unknown fixed stop": (
         [LOADS["base-motion"] | {"fixed_stops": ["floor"]}], {}, "loads[0].fixed_stops: got 'floor', need one of"

@@ -112,7 +112,7 @@ def test_sparse_matrices_are_refused_to_a_model_that_takes_dense_ones(tmp_path):
     data = changed(["structure"], {"matrices": files, "points": {"middle": 0, "tip": 1}})
     data["models"] = [{"kind": "craig-bampton", "name": "cb", "modes": 1, "step": 1e-3}]
     data["comparison"] = {"reference": "cb"}
-    assert "models[0].kind: got 'craig-bampton', need another kind: this one takes dense" in complaint(tmp_path, data)
+    assert "models[0].kind: got 'craig-bampton', need another kind: this kind takes dense" in complaint(tmp_path, data)
 
 
 def test_a_variant_takes_what_it_does_not_say_from_its_base(tmp_path):
@@ -135,7 +135,7 @@ STEPWISE = {"kind": "solve-ivp", "name": "ivp", "method": "RK45", "rtol": 1e-4}
 
 FILES = {"mass": "m.mtx", "stiffness": "k.mtx"}
 BROKEN = {
-    "unknown field": (["outputs", "steps"], 3, "outputs.steps: got 3, need no field of this name"),
+    "unknown field": (["outputs", "steps"], 3, "outputs.steps: got 3, need a known field"),
     "missing table": (["start"], None, "start: got nothing, need a value"),
     "missing field": (["contacts", 0, "gap"], None, "contacts[0].gap: got nothing, need a value"),
     "text for a number": (["contacts", 0, "gap"], "1", "contacts[0].gap: got '1', need a valid number"),
@@ -160,7 +160,7 @@ BROKEN = {
     "unknown method": (["models", 1], STEPWISE | {"method": "RK4"}, "models[1].method: got 'RK4', need 'RK45', 'DOP"),
     "no tolerance": (["models", 1], STEPWISE | {"rtol": 0.0}, "models[1].rtol: got 0.0, need greater than or equal"),
     "contact of a stepwise model": (
-        ["models", 1], STEPWISE | {"contact": "rigid"}, "models[1].contact: got 'rigid', need no field of this name"
+        ["models", 1], STEPWISE | {"contact": "rigid"}, "models[1].contact: got 'rigid', need a known field"
     ),
     "no start": (["start", "displacement"], 0.0, "start.displacement: got 0.0, need a value that is not zero"),
     "another kind": (["models", 0, "kind"], "exact", "models[0]: got"),
@@ -178,7 +178,7 @@ BROKEN = {
     "unknown direction": (["contacts", 0, "direction"], "tap", "contacts[0].direction: got 'tap', need one of"),
     "unknown coefficient": (["contacts", 0, "direction"], {"tap": 1.0}, "contacts[0].direction: got 'tap', need"),
     "unknown reference": (["comparison", "reference"], "full", "comparison.reference: got 'full', need one of"),
-    "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need a name of its own"),
+    "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need another name"),
     "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),
     "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: matrices: got"),
     "no matrix": (["structure"], {"matrices": FILES, "points": {"tip": 0}}, "structure: mass: got"),
@@ -196,7 +196,7 @@ def test_a_wrong_field_is_named_with_what_was_given_and_needed(tmp_path, case):
 
 def test_two_contacts_of_one_name_are_refused(tmp_path):
     data = changed(["contacts"], BEAM["contacts"] * 2)
-    assert complaint(tmp_path, data).startswith("contacts: got 'stop', need a name of its own")
+    assert complaint(tmp_path, data).startswith("contacts: got 'stop', need another name")
 
 
 def test_a_full_model_needs_a_beam_and_a_finite_stiffness(tmp_path):
@@ -205,14 +205,15 @@ def test_a_full_model_needs_a_beam_and_a_finite_stiffness(tmp_path):
     assert "need a finite one" in complaint(tmp_path, changed(["contacts", 0, "stiffness"], math.inf, data))
     np.savez(tmp_path / "one.npz", mass=np.eye(1), stiffness=np.eye(1))
     data["structure"] = {"matrices": "one.npz", "points": {"middle": 0, "tip": 0}}
-    assert "matrices have no full model" in complaint(tmp_path, data)
+    assert "this kind is made of beams" in complaint(tmp_path, data)
 
 
 @pytest.mark.parametrize("model", [COMPONENT, STEPWISE])
 def test_a_penalty_model_needs_a_finite_stiffness(tmp_path, model):
     data = changed(["models"], [*BEAM["models"], model])
     line = complaint(tmp_path, changed(["contacts", 0, "stiffness"], math.inf, data))
-    assert line == f"stiffness of contact stop: got 'inf', need a finite one: {model['name']} is a penalty model"
+    needed = f"a finite one: the contacts of {model['name']} are penalty springs"
+    assert line == f"stiffness of contact stop: got 'inf', need {needed}"
 
 
 def test_a_component_needs_contacts_on_single_points(tmp_path):
@@ -248,7 +249,7 @@ def test_contact_points_that_follow_from_each_other_are_refused(tmp_path):
     data["structure"] = {"matrices": "three.npz", "points": {"middle": 0, "tip": 1, "double": "double"}}
     data["contacts"] = [BEAM["contacts"][0] | {"name": name, "direction": name} for name in ("middle", "double")]
     data["comparison"] = {"reference": "cb"}
-    assert prepared(tmp_path, data).endswith("need another: contact point double follows from the others")
+    assert prepared(tmp_path, data).endswith("need another: point double follows from the others")
 
 
 def prepared(tmp_path, data):

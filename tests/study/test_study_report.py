@@ -13,7 +13,6 @@ from small_study import METHODS, coarser, contact, map_pairs, result_of, row, sm
 
 from multiphi_exudyn.study.accuracy import study_report
 from multiphi_exudyn.study.accuracy.analysis import settings
-from multiphi_exudyn.study.accuracy.direct_labels import Label, place_labels
 from multiphi_exudyn.study.accuracy.figure_style import styles
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
 from multiphi_exudyn.study.accuracy.overview import over_all_points, response_figure
@@ -30,6 +29,7 @@ from multiphi_exudyn.study.accuracy.study_findings import (
     shown_points,
 )
 from multiphi_exudyn.study.accuracy.study_report import render_study
+from multiphi_exudyn.study.comparison.direct_labels import Label, place_labels
 from multiphi_exudyn.study.comparison.wording import percent
 
 AXIS = {"start.displacement": [-0.01, 0.02]}
@@ -72,13 +72,13 @@ def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(r
     assert "NRMSE to 0.3 s, the worst of node2, node3 and of each setting's nearby runs" in found.asked
     assert "the reference, in words" in found.asked
     assert found.outcome == (
-        "The cheapest that reaches 10 % is Multi-Phi (r = 3): 275 µs, 2909 times faster than the cheapest full model "
+        "The cheapest within 10 % is Multi-Phi (r = 3): 275 µs, 2909 times faster than the cheapest full model "
         "that does.",
-        "The cheapest that reaches 5 % is Multi-Phi (r = 4): 300 µs, 2667 times faster than the cheapest full model "
+        "The cheapest within 5 % is Multi-Phi (r = 4): 300 µs, 2667 times faster than the cheapest full model "
         "that does.",
-        "The cheapest that reaches 2 % is Multi-Phi (r = 6): 350 µs, 9143 times faster than the cheapest full model "
+        "The cheapest within 2 % is Multi-Phi (r = 6): 350 µs, 9143 times faster than the cheapest full model "
         "that does.",
-        "The cheapest that reaches 1 % is Multi-Phi (r = 8): 400 µs, 8000 times faster than the cheapest full model "
+        "The cheapest within 1 % is Multi-Phi (r = 8): 400 µs, 8000 times faster than the cheapest full model "
         "that does.",
         "The most accurate is Multi-Phi (r = 16): 0.12 %.",
     )
@@ -123,11 +123,11 @@ def test_without_a_full_model_that_holds_the_tolerance_nothing_is_called_faster(
     rows = [row("Multi-Phi", 0.001, setting={"modes": 8}), row("full ANCF", 0.5, setting={"elements": 4})]
     timings = [timing("Multi-Phi", 1e-3, setting={"modes": 8}), timing("full ANCF", 1.0, setting={"elements": 4})]
     with_full = findings(result_of(rows, timings)).outcome[0]
-    assert with_full == "The cheapest that reaches 10 % is Multi-Phi (r = 8): 1 ms; no full model does."
+    assert with_full == "The cheapest within 10 % is Multi-Phi (r = 8): 1 ms; no full model does."
     alone = findings(result_of(rows, timings, methods=METHODS[:1])).outcome[0]
-    assert alone == "The cheapest that reaches 10 % is Multi-Phi (r = 8): 1 ms."
+    assert alone == "The cheapest within 10 % is Multi-Phi (r = 8): 1 ms."
     full = findings(result_of([row("full ANCF", 0.05)], [timing("full ANCF", 1.0)])).outcome[0]
-    assert full == "The cheapest that reaches 10 % is full ANCF: 1 s."
+    assert full == "The cheapest within 10 % is full ANCF: 1 s."
     nobody = findings(result_of([row("Multi-Phi", 0.9)], [timing("Multi-Phi", 1.0)])).outcome[0]
     assert nobody == "None of the settings reaches 10 %."
 
@@ -369,6 +369,18 @@ def test_labels_keep_clear_of_what_is_written_already():
     place_labels(figure, axes, [Label("beside it", "#000000", [(1.0, 10.0)])], [])
     figure.draw_without_rendering()
     assert not axes.texts[-1].get_window_extent().overlaps(across.get_window_extent())
+
+
+def test_a_label_at_the_left_edge_leaves_the_axis_title_free():
+    figure = pareto_figure(result_of([row("a", 0.1)], [timing("a", 1.0)]), {})
+    axes = figure.axes[0]
+    left = axes.get_xlim()[0] * 1.001, 10.0
+    figure.draw_without_rendering()
+    beside = np.array([(2 + 2 * (i % 30), 3 * (i // 30 - 15)) for i in range(900)])
+    crowd = axes.transData.inverted().transform(axes.transData.transform(left) + beside)
+    place_labels(figure, axes, [Label("at the left edge", "#000000", [left])], [(x, y) for x, y in crowd])
+    figure.draw_without_rendering()
+    assert not axes.texts[-1].get_window_extent().overlaps(axes.yaxis.label.get_window_extent())
 
 
 def test_a_label_in_a_corner_stays_inside_even_where_it_covers_points():

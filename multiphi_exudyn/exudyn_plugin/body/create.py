@@ -145,7 +145,9 @@ def CreateMultiPhiBody(
     if not isinstance(model, MultiPhiModel):
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     if isinstance(model.modes, Tolerance):
-        raise MultiPhiValueError(f"model: got modes = {model.modes}, need numbers of modes, as in simulate(...).model")
+        raise MultiPhiValueError(
+            f"model: got modes={model.modes}, which only a run decides; need the model of one, simulate(...).model"
+        )
     _check_step(matchedStepSize)
     check_drawing(drawing, color, model)
     nodes = interface_nodes(model.structure, interface)
@@ -156,16 +158,18 @@ def CreateMultiPhiBody(
     moving = [link for link in model.links if link.velocity]
     if nodes and moving:
         name, speed = moving[0].name, moving[0].velocity
-        raise MultiPhiValueError(f"velocity of {name!r}: got {speed:g} with an interface, need 0 m/s")
+        raise MultiPhiValueError(
+            f"velocity of {name!r}: got {speed:g} m/s of the counter-surface in a body with an interface, need 0 m/s"
+        )
     rough = [c.name for c in model.contacts if isinstance(c, UnilateralContact) and c.rigid and c.friction]
     if nodes and rough:
-        given = f"rigid contacts with it ({', '.join(rough)}) and an interface"
-        raise MultiPhiValueError(f"friction: got {given}, need compliant ones")
+        given = f"rigid contacts with friction ({', '.join(rough)}) in a body with an interface"
+        raise MultiPhiValueError(f"friction: got {given}, need a finite stiffness of these contacts")
     if nodes and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
-            f"loads: got {', '.join(sorted(varying))} with an interface, need constant loads (a varying force can be a "
-            "load of the system on an interface coordinate)"
+            f"loads: got {', '.join(sorted(varying))} in a body with an interface, need constant loads (give a varying "
+            "force as a load of the Exudyn system on an interface coordinate)"
         )
     look = {"show": show, "color": list(color)}
     body.items.update(_add_items(mbs, body, look, drawing))

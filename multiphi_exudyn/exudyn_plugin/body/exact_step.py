@@ -202,7 +202,10 @@ def _check_driven(body: BodyInStep, around: Surroundings, x: np.ndarray) -> None
         terms = np.append(loaded.level.gap_rows[i] * xi, loaded.gap_constants[i])
         if np.sum(terms) < -DRIVEN * np.sum(np.abs(terms)):
             name = body.model.links[i].name
-            raise NumericalFailure(f"body {body.name!r}: what is tied to it drives contact {name!r} into its stop")
+            raise NumericalFailure(
+                f"body {body.name!r}: what is attached to its interface drives the closed contact {name!r} into its "
+                "stop; give the contact a finite stiffness, or attach by a spring"
+            )
 
 
 def _check_resolved(
@@ -229,7 +232,7 @@ def _check_resolved(
         doubtful = max(doubtful, abs(float(missed[: len(moved)] @ moved)) / (2 * UNRESOLVED))
     if doubtful > most:
         raise NumericalFailure(
-            f"body {body.name!r}: at t = {instant.time:.9g} s: steps of {step.length:g} s do not resolve what hangs "
-            "on its interface, need shorter steps, fewer modes, or constraints in place of stiff connectors"
+            f"body {body.name!r}: at t = {instant.time:.9g} s: steps of {step.length:g} s are too long for what is "
+            "attached to its interface, need shorter steps, fewer modes, or constraints in place of stiff connectors"
         )
     return most

@@ -30,7 +30,7 @@ def check_matched(body: CheckedBody, step: float) -> None:
     if body.matched_step is not None and abs(step - body.matched_step) > SAME_STEP * step:
         raise MultiPhiValueError(
             f"matchedStepSize of {body.name!r}: got {body.matched_step:g} s and a solver's step of "
-            f"{step:g} s, need the same (beside contacts of Exudyn too: discontinuous.useRecommendedStepSize=False)"
+            f"{step:g} s, need the same (beside Exudyn's own contacts set discontinuous.useRecommendedStepSize=False)"
         )
 
 
@@ -60,8 +60,8 @@ def check_start(mbs: Any, body: CheckedBody, given: Sequence[np.ndarray], lost: 
     around = here.surroundings or here.beside(mbs)
     if around.on_body(here.stepped.mass):
         raise MultiPhiValueError(
-            f"node of {body.name!r}: got a mass or a constraint on it beside rigid contacts, need it on an "
-            "interface coordinate, as part of the structure, or compliant contacts"
+            f"node of {body.name!r}: got a mass or a constraint on the node of a body with rigid contacts; attach it "
+            "to an interface coordinate, make it part of the structure, or give the contacts a finite stiffness"
         )
     around.apart = {
         mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
@@ -75,5 +75,5 @@ def check_start(mbs: Any, body: CheckedBody, given: Sequence[np.ndarray], lost: 
     if struck and np.any(attached.impedance(np.eye(len(attached.mass)))):
         raise MultiPhiValueError(
             f"start of {body.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
-            "interface, need one that does not strike at the start"
+            "interface, need a start without an impact"
         )

@@ -194,7 +194,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     table = {key: mbs.GetSensorStoredData(items[key]) for key in (*RECORDED, "sLevel") if key in items}
     time = table["sCoordinates"][:, 0]
     if len(time) == 0:
-        raise MultiPhiValueError("sensors: got no stored data, need a run of SolveDynamic before")
+        raise MultiPhiValueError("sensors: got no stored data, need a run of mbs.SolveDynamic first")
     bodies_of(mbs).check_called(float(time[-1]))
     data = table["sLevel"][:, 1:] if "sLevel" in table else np.zeros((len(time), 0))
     names = body.model.structure.points if points is None else list(points)
@@ -229,7 +229,9 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
     for body in bodies_of(mbs).values():
         if isinstance(body, MultiPhiBody) and items.get("nGenericODE2") == body.items["nGenericODE2"]:
             return body
-    raise MultiPhiValueError("items: got a dict of no Multi-Phi body of this system, need one it returned")
+    raise MultiPhiValueError(
+        "items: got a dict of no Multi-Phi body in this system, need the one that CreateMultiPhiBody returned"
+    )
 
 
 def _holding(body: MultiPhiBody, element: int, held: bool) -> np.ndarray:

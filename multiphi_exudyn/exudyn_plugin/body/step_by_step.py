@@ -87,8 +87,8 @@ class StepByStep:
         """Do the step that ends at a time [s] again exactly where something may have happened in it."""
         if self._own.varies and self._told != t:
             raise MultiPhiValueError(
-                f"PreStepUserFunction: got a function that replaced the loads of {self._body.name!r}, need it set "
-                "before CreateMultiPhiBody (it is then called after them)"
+                f"PreStepUserFunction: got a function that replaced the one of {self._body.name!r}, which applies its "
+                "loads; set yours before CreateMultiPhiBody, then both are called"
             )
         if self._body.coordinates.interface is not None:
             self._body.coordinates.interface.look()

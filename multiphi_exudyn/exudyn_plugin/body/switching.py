@@ -135,8 +135,8 @@ class Switching(dict[str, SwitchingBody]):
         """Raises if a run has come to t [s] without the bodies: somebody else's PostStep function is installed."""
         if self.needed and not self.clock.time >= t:
             raise MultiPhiValueError(
-                f"PostStepUserFunction: got a function that replaced the switching of {next(iter(self))!r}, need it "
-                "set before CreateMultiPhiBody (it is then called after the switching)"
+                f"PostStepUserFunction: got a function that replaced the one of {next(iter(self))!r}, which handles "
+                "its events; set yours before CreateMultiPhiBody, then both are called"
             )
 
     def _warn(self) -> None:

@@ -35,7 +35,7 @@ HELD_GAPS = "constraints hold the gaps of its limit stops"
 HELD_FRICTION = "constraints hold the coordinate of its friction"
 IDLE = (INACTIVE, HELD_GAP, HELD_GAPS, HELD_FRICTION)  # reasons for which leaving an item out changes no motion
 USER_FUNCTION = (
-    "how its user function differs from its tangent at the current state"  # which a run's check asks the system for
+    "the difference of its user function from its tangent at the current state"  # a run's check asks the system for it
 )
 NAMED = 3  # items of a group that are told by name: enough to find the others
 _LINEAR = {
@@ -49,7 +49,7 @@ _LINEAR = {
 }
 _ONE_SIDED = {
     "ConnectorRollingDiscPenalty": "its contact and its friction away from the current state",
-    "ConnectorReevingSystemSprings": "that its rope gets slack",
+    "ConnectorReevingSystemSprings": "slackening of its rope",
 }
 
 
@@ -79,7 +79,7 @@ def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
 
 def left_out_directions(of: str) -> Iterator[tuple[Item, str]]:
     """Directions that are left out because nothing moves the system there; of: what is wrong with them."""
-    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it, {of}"
+    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it ({of})"
 
 
 def grouped(told: Iterable[tuple[Item, str]]) -> list[str]:
@@ -169,4 +169,4 @@ def _matrices(item: Mapping[str, Any]) -> str:
 
 
 def _damper(damping: float) -> str:
-    return f" and {damping:g} N s/m, which does not pull where it opens as Exudyn's does" if damping else ""
+    return f" and {damping:g} N s/m, which never pulls; Exudyn's pulls where the contact opens" if damping else ""

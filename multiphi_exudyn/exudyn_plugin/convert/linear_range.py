@@ -64,7 +64,7 @@ def _let_go(trajectory: Trajectory) -> Iterator[str]:
     if opened:
         also = f" (and {len(set(opened)) - 1} more)" if len(set(opened)) > 1 else ""
         yield (
-            f"contact damper: at {opened[0]!r}{also} it does not pull where the contact opens, as Exudyn's does, so "
+            f"contact damper: that of {opened[0]!r}{also} never pulls; Exudyn's pulls where the contact opens, so "
             "rebounds differ from Exudyn's"
         )
 

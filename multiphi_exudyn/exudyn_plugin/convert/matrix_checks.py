@@ -56,8 +56,8 @@ def checked_matrices(
     if values[0] <= MASSLESS * values[-1]:
         where = _of_largest(mbs, basis @ vectors[:, 0])
         raise MultiPhiValueError(
-            f"mass: got {_kind(values[0], values[-1])} mass at {where}, {values[0] / values[-1]:.1g} of the largest, "
-            f"need more than {MASSLESS:g} of it there, or a constraint that holds it"
+            f"mass: got {_kind(values[0], values[-1])} mass at {where} ({values[0] / values[-1]:.1g} of the largest), "
+            f"need more than {MASSLESS:g} of the largest, or a constraint that holds this coordinate"
         )
     mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, told)
     stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, told)
@@ -67,7 +67,7 @@ def checked_matrices(
         values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
         where = f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {_of_largest(mbs, basis @ vectors[:, 0])}"
         raise NoStructure(
-            f"stiffness: got a negative one {where}, need a state that is stable, or a constraint there",
+            f"stiffness: got a negative eigenvalue {where}, need a stable state, or a constraint there",
             f"one of them unstable {where}",
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, told, _critical(damping, modes))

@@ -54,7 +54,9 @@ def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
 def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
     for name, row in found.items():
         if name in rows:
-            raise MultiPhiValueError(f"points: got the name {name!r} twice, need the argument points")
+            raise MultiPhiValueError(
+                f"points: got two markers or nodes that give a point {name!r}, need names of your own, points={{...}}"
+            )
         rows[name] = row
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.display import per_cent
+
 __all__ = ["LAG", "TOLERANCE", "RangeCheck"]
 
 TOLERANCE = 0.01  # error from which a motion has left the range: a pendulum that swings by 1.1 degrees has it
@@ -91,12 +93,12 @@ class RangeCheck:
             return ()
         if self.error <= TOLERANCE:
             return (
-                f"linear range: what the model lacks of its Exudyn system is small ({100 * self.error:.2g} %), but "
-                f"shifts frequencies: at the end of the run its oscillations are off by some {self.lag:.1g} rad",
+                f"linear range: what the model leaves out of its Exudyn system is small ({per_cent(self.error)}), but "
+                f"shifts frequencies: at the end of the run the phase is off by some {self.lag:.1g} rad",
             )
         found = self.times[np.argmax(self.errors > TOLERANCE)]
-        away = f"{100 * self.error:.2g} %" if self.error < 1 else "more than 100 %"
+        away = per_cent(self.error) if self.error < 1 else "more than 100 %"
         return (
-            f"linear range: left by t = {found:.3g} s; what the model lacks of its Exudyn system moves it {away} of "
-            "the largest displacement away; make the motion smaller, or solve the system",
+            f"linear range: left by t = {found:.3g} s; what the model leaves out of its Exudyn system moves it by "
+            f"{away} of the largest displacement; make the motion smaller, or solve the Exudyn system itself",
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.display import Shown, names
+from multiphi_exudyn.display import Shown, names, per_cent
 from multiphi_exudyn.exudyn_plugin.convert.item_fates import grouped
 from multiphi_exudyn.exudyn_plugin.convert.items import Item
 from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, LinearRange
@@ -125,10 +125,10 @@ class Reduction(Shown):
             Of the horizon, see ``Trajectory.horizon``.
         """
         found = self.check(trajectory)
-        missed = f"forces that the model lacks: {found.error:.2g} of its largest displacement"
+        missed = f"what the model leaves out moves it by {per_cent(found.error)} of its largest displacement"
         held, horizon = "holds" if found.holds else "does not hold", trajectory.horizon(tolerance)
         lines = [
             f"linear range ({held}): {f'not checked, {found.reason}' if found.reason else missed}",
-            f"determined within {100 * tolerance:g} % until {horizon:.6g} of {trajectory.t_end:g} s",
+            f"horizon: determined within {100 * tolerance:g} % until {horizon:.6g} s of {trajectory.t_end:g} s",
         ]
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in trajectory.warnings)])

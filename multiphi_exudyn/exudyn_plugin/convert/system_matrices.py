@@ -119,7 +119,7 @@ def _geared_springs(mbs: Any) -> dict[int, dict[str, Any]]:
     }
     for item in geared.values():
         if item["springForceUserFunction"]:
-            raise MultiPhiValueError(f"spring {item['name']!r}: got a user function and factors, need one of both")
+            raise MultiPhiValueError(f"spring {item['name']!r}: got a user function and factors, need one of them")
     return geared
 
 

@@ -98,7 +98,7 @@ def _value(load: Mapping[str, Any], start: float, known: _NoSystem) -> Callable[
     try:
         value(0.0)
     except Exception as error:  # whatever the user's function raises
-        return f"its user function is none of time alone ({' '.join(str(error).split())})"
+        return f"its user function depends on more than time ({' '.join(str(error).split())})"
     return value
 
 

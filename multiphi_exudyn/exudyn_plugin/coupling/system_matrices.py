@@ -145,7 +145,7 @@ class SystemMatrices:
         for place in sorted(self.apart.keys() & set(moving.tolist())):
             raise MultiPhiValueError(
                 f"interface: got constraints that tie body {self.apart[place]!r} to another, both with rigid contacts, "
-                "need compliant ones, a spring between, or both structures in one model (assemble)"
+                "need contacts of finite stiffness, a spring between, or both structures in one model (assemble)"
             )
         jacobian = jacobian[:, moving]
         jacobian = jacobian[np.any(jacobian, axis=1)]

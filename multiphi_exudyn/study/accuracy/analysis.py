@@ -12,6 +12,7 @@ from typing import Any
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.wording import seconds
+from multiphi_exudyn.study.running.reduced_runner import modes_words
 from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = [
@@ -125,7 +126,7 @@ def _holds(error: float | None, tolerance: float) -> bool:
 
 def _word(field: str, value: Any) -> str:
     if field == "modes":
-        return f"r = {value}"
+        return modes_words(value)
     if field == "elements":
         return f"{value} elements"
     if field == "step":

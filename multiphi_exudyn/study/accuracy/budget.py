@@ -209,10 +209,10 @@ def _check(bench: Workbench, modes: int, step: float | None) -> None:
     if step is not None and not (math.isfinite(step) and step > 0):
         raise MultiPhiValueError(f"step: got {step!r}, need a finite time > 0 s")
     if bench.scene.file.start is None:
-        raise MultiPhiValueError(f"scene: got {bench.scene.name} without a start, need one, which is disturbed")
+        raise MultiPhiValueError(f"scene: got {bench.scene.name} without a start, need one (the budget disturbs it)")
     if bench.overrides:
         raise MultiPhiValueError(
-            f"scene: got {bench.scene.name} with printed frequencies, need levels of one structure"
+            f"scene: got {bench.scene.name} with printed frequencies, need a scene whose levels are of one structure"
         )
 
 

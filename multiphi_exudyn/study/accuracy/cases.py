@@ -142,7 +142,7 @@ def load_study(source: str, *, quick: bool = False) -> Study:
     path = _find(source)
     raw = read_toml(path)
     if "structure" in raw and "scene" not in raw:
-        raise MultiPhiValueError(f"{path}: got a scene, need a study, whose field scene names it; compare runs a scene")
+        raise MultiPhiValueError(f"{path}: got a scene, need a study (a scene is run by the command compare)")
     file = validated(StudyFile, path, raw)
     scene_path, data = scene_data(file.scene, path.parent)
     try:
@@ -172,28 +172,28 @@ def _check(study: Study) -> None:
     names = [method.name for method in study.file.methods]
     for name in names:
         if names.count(name) > 1 or name in (REFERENCE, COARSER, BUDGET):
-            _refuse(study, "methods", name, "a name of its own for every method")
+            _refuse(study, "methods", name, "another name for each method, none of them reference, coarser or budget")
     for name in study.file.maps:
         if name not in names:
             _refuse(study, "maps", name, f"one of the methods: {', '.join(names)}")
     if study.file.coarser is not None and study.file.reference is None:
-        _refuse(study, "reference", "none", "the study's own reference for its coarser copy")
+        _refuse(study, "reference", "none", "a reference, as the study gives a coarser copy of it")
     if not names and study.file.budget is None:
         _refuse(study, "methods", "none", "a method or a budget")
     for method in study.file.methods:
         fields = [("nearby", field) for field in method.nearby] + [("refine", method.refine)] * bool(method.refine)
         for kind, field in fields:
             if not all(is_number(value) for value in method.axes.get(field or "", [method.model.get(field or "")])):
-                _refuse(study, f"{kind} of {method.name}", field, "a field of the model or its axes that is a number")
+                _refuse(study, f"{kind} of {method.name}", field, "a field of its model or its axes with numbers")
     if "outputs.t_end" in study.file.axes and study.file.window is None:
-        _refuse(study, "window", "none", "one that every end time of the axis outputs.t_end reaches")
+        _refuse(study, "window", "none", "a window no longer than the shortest t_end of the axis outputs.t_end")
     _check_size(study)
     for case in _samples(study):
         try:
             mechanics_of(study.scene_for(case))
         except MultiPhiValueError as error:
             told = str(error).removeprefix(f"{study.scene_path}: ")
-            raise MultiPhiValueError(f"{study.path}: {_place(case)}: {told}") from error
+            raise MultiPhiValueError(f"{study.path}: at {_place(case)}: {told}") from error
 
 
 def _check_size(study: Study) -> None:

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import LogFormatter
 from matplotlib.transforms import Transform
 
 from multiphi_exudyn.study.accuracy.along_axis import FINEST
@@ -118,9 +119,17 @@ def note(
     axes.annotate(text, at, xycoords=system, **shift, **placing)
 
 
-def percent_axis(axes: Axes) -> None:
-    """Values that are percents already, written as such."""
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
+class _Percent(LogFormatter):
+    """Ticks of a logarithmic axis of percents, between its decades too where they are few."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g} %" if super().__call__(x, pos) else ""
+
+
+def percent_axis(axis: Axis) -> None:
+    """Values of a logarithmic axis that are percents already, written as such."""
+    axis.set_major_formatter(_Percent())
+    axis.set_minor_formatter(_Percent(minor_thresholds=(1.5, 0.5)))
 
 
 def value_axis(axes: Axes, axis: str, values: Sequence[float]) -> None:

@@ -16,7 +16,6 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import front, names_of, references, settings_at, uncertainty, words
-from multiphi_exudyn.study.accuracy.direct_labels import Label, place_labels
 from multiphi_exudyn.study.accuracy.figure_style import (
     GRID,
     LINE,
@@ -36,6 +35,7 @@ from multiphi_exudyn.study.accuracy.figure_style import (
 from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE
 from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
+from multiphi_exudyn.study.comparison.direct_labels import Label, place_labels
 from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_figure"]
@@ -103,8 +103,8 @@ def indicator_figure(result: StudyResult) -> Figure | None:
     axes.set_title(f"Spearman's rank correlation {size}, {runs} runs", fontsize=11, loc="left")
     axes.set_xlabel("indicator: the model's own prediction of its error")
     axes.set_ylabel(error_label(result))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
-    percent_axis(axes)
+    percent_axis(axes.xaxis)
+    percent_axis(axes.yaxis)
     axes.legend(frameon=False, fontsize=9)
     return figure
 
@@ -123,7 +123,7 @@ def along_figure(result: StudyResult, axis: str) -> Figure:
         if table.quantity == "error":
             axes.set_yscale("log")
             axes.set_ylabel(error_label(result))
-            percent_axis(axes)
+            percent_axis(axes.yaxis)
         else:
             axes.set_ylabel(f"{label}\n{table.contact}")
             axes.yaxis.set_major_locator(MaxNLocator(integer=table.quantity == "inner_losses"))
@@ -178,7 +178,7 @@ def _time_error_frame(axes: Axes, result: StudyResult, at: Mapping[str, Any], er
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: seconds(value)))
     axes.set_ylabel(error_label(result), fontsize=11)
     axes.tick_params(labelsize=10)
-    percent_axis(axes)
+    percent_axis(axes.yaxis)
     axes.set_title(_heading(result, at), fontsize=11, loc="left", pad=12)
 
 
@@ -186,7 +186,7 @@ def _heading(result: StudyResult, at: Mapping[str, Any]) -> str:
     failed = [setting for setting in settings_at(result, at) if setting.error is None]
     untimed = sum(setting.online_s is None for setting in failed)
     count = f"; × failed: {len(failed)}" if failed else ""
-    hidden = f", {untimed} of them without a time" if untimed else ""
+    hidden = f", {untimed} of them not shown: without a time" if untimed else ""
     return f"Lower left is better. Faint: every setting{count}{hidden}"
 
 
@@ -199,7 +199,7 @@ def _convergence(axes: Axes, result: StudyResult, axis: str, lines: Sequence[Ser
     axes.set_yscale("log")
     axes.set_ylabel(error_label(result))
     axes.grid(color=GRID)
-    percent_axis(axes)
+    percent_axis(axes.yaxis)
     value_axis(axes, axis, [value for line in lines for value in line.values])
     axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))
 

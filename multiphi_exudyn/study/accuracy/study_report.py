@@ -131,15 +131,17 @@ def _pareto(result: StudyResult, at: Mapping[str, Any], drawn: list[Setting]) ->
         return None
     return _picture(
         study_figures.pareto_figure(result, at),
-        "A line joins a method's settings that no other one of it beats in both time and error. In the grey band a "
-        "model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
+        "A line joins those settings of a method that none of its other settings beats in both time and error. In the "
+        "grey band a model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
         "Colours are the same in all pictures.",
     )
 
 
 def _convergence(result: StudyResult, at: Mapping[str, Any]) -> Picture | None:
     figure = study_figures.convergence_figure(result, at)
-    caption = "In brackets: the other fields, at their finest. Order: observed between neighbouring values. ×: failed."
+    caption = (
+        "In brackets: the other fields, each at its finest. Order: observed between neighbouring values. ×: failed."
+    )
     return None if figure is None else _picture(figure, caption)
 
 

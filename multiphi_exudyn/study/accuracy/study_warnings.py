@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from multiphi_exudyn.study.accuracy.analysis import longest, named, settings, words
 from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
-from multiphi_exudyn.study.comparison.wording import percent
+from multiphi_exudyn.study.comparison.wording import listed, share
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from multiphi_exudyn.study.sweep.row import Row
 from multiphi_exudyn.time.warning_groups import WarningGroup, grouped
@@ -40,7 +40,7 @@ def _told(group: WarningGroup, rows: Sequence[Row], of: int) -> str:
 
 def _method(name: str, settings: Sequence[str]) -> str:
     shown = settings if len(settings) <= NAMED else [f"{settings[0]} to {settings[-1]}"]
-    return f"{name}, {' and '.join(shown)}" if shown else name
+    return f"{name}, {listed(shown)}" if shown else name
 
 
 def _nudged(result: StudyResult) -> Iterable[str]:
@@ -51,7 +51,7 @@ def _nudged(result: StudyResult) -> Iterable[str]:
         end, tolerance, shortest = early[0]
         yield (
             f"sensitivity: {len(early)} of {len(ends)} settings are not determined to the end: with a start changed by "
-            f"1e-12 they differ by {percent(float(tolerance))}, the first one from {end:.3g} s on: {named(shortest)}"
+            f"1e-12 they differ by {share(float(tolerance))}, the first one from {end:.3g} s on: {named(shortest)}"
         )
 
 

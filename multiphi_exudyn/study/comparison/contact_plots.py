@@ -31,19 +31,19 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
 
 
 def friction_figure(comparison: Comparison, friction: str) -> Figure:
-    """Force and way of a friction over time; grey: it sticks in the reference."""
+    """Force and slip of a friction over time; grey: the reference sticks."""
     figure, (force, way) = panels(6.4, 2, heights=(1, 1))
     style = styles(comparison)
     for run in [comparison.reference, *pictured(comparison)]:
         drawn = style[run.name]
         for axes, values in ((force, run.friction_force[friction]), (way, 1e3 * run.slip[friction])):
             axes.plot(run.time, values, drawn.line, color=drawn.colour, lw=drawn.width, label=run.label)
-    for axes, label in ((force, "friction force [N]"), (way, "way of the patch [mm]")):
+    for axes, label in ((force, "friction force [N]"), (way, "slip [mm]")):
         for start, end in comparison.reference.stick_intervals[friction]:
             axes.axvspan(start, end, color=CONTACT, lw=0, zorder=0)
         axes.set_xlim(0, comparison.bench.t_end)
         axes.set_ylabel(label)
-    force.set_title(f"Friction {friction}; grey: it sticks in the reference", fontsize=10)
+    force.set_title(f"Friction {friction}; grey: the reference sticks", fontsize=10)
     force.legend(frameon=False, fontsize=8)
     way.set_xlabel("time [s]")
     return figure

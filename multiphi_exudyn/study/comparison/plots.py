@@ -23,6 +23,7 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
 from multiphi_exudyn.study.comparison.compare import Comparison
+from multiphi_exudyn.study.comparison.direct_labels import Label, place_labels
 from multiphi_exudyn.study.comparison.placement import coefficient, meeting
 from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
@@ -113,15 +114,16 @@ def error_time_figure(comparison: Comparison) -> Figure:
     until = comparison.headline_window
     style = styles(comparison)
     nearby = comparison.cheapest[1:]
-    for name, run in comparison.measured.items():
-        error, drawn = 100 * comparison.worst_error(run, until), style[name]
-        axes.loglog(run.online_s, error, drawn.marker, color=drawn.colour, markersize=9, mec="white")
-        if run not in nearby:
-            axes.annotate(name, (run.online_s, error), (8, 4), textcoords="offset points", fontsize=9)
-    for name, run in comparison.rigid.items():
-        error, drawn = 100 * comparison.stiff_error(run, until), style[name]
-        axes.loglog(run.online_s, error, drawn.marker, mfc="none", mec=drawn.colour, markersize=9)
+    at = {name: (run.online_s, 100 * comparison.worst_error(run, until)) for name, run in comparison.measured.items()}
+    stiff = {name: (run.online_s, 100 * comparison.stiff_error(run, until)) for name, run in comparison.rigid.items()}
+    for name, (time, error) in at.items():
+        axes.loglog(time, error, style[name].marker, color=style[name].colour, markersize=9, mec="white")
+    for name, (time, error) in stiff.items():
+        axes.loglog(time, error, style[name].marker, mfc="none", mec=style[name].colour, markersize=9)
     _error_time_frame(axes, comparison, until)
+    named = [name for name, run in comparison.measured.items() if run not in nearby and at[name][1] > 0]
+    labels = [Label(name, style[name].colour, [at[name]]) for name in named]
+    place_labels(figure, axes, labels, [*at.values(), *stiff.values()])
     return figure
 
 

@@ -39,10 +39,10 @@ HISTORY = (
     "{}: the whole run, {}and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
 )
-MANY = "A bar is a time span in contact; the contacts are numbered as the scene has them."
+MANY = "A bar is a time span in contact; contacts are numbered in the order of the scene."
 FRICTION = "The force against the motion, and how far the patch has slipped on its counter-surface."
-MODES = "Square: point mass. Triangle: closed contact, {}. The largest value of each mode is drawn alike."
-RIGID, COMPLIANT = "rigid, as in the published tables", "of the scene's own stiffness, so it may move"
+MODES = "Square: point mass. Triangle: closed contact, {}. All modes are scaled to the same largest value."
+RIGID, COMPLIANT = "rigid, as in the published tables", "a spring of the scene's stiffness, so the point there moves"
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[
         yield _picture(
             "energy",
             energy_figure(comparison),
-            "Where a bar ends short of 100 %, time integration has lost energy; beyond, it has gained some.",
+            "Where a bar ends below 100 %, time integration has lost energy; above, it has gained energy.",
         )
     if levels:
         rigid = comparison.bench.mechanics.parameter_set is not None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.wording import listed, percent
+from multiphi_exudyn.study.comparison.wording import listed, share
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 
 __all__ = ["warned"]
@@ -25,6 +25,6 @@ def _nudged(comparison: Comparison) -> Iterable[str]:
         early = [f"{name} {end:.3g} s" for name, end in ends.items() if end < ROUND_OFF * comparison.bench.t_end]
         if early:
             yield (
-                f"sensitivity: with a start changed by 1e-12 a run stays within {percent(float(tolerance))} of this "
+                f"sensitivity: with a start changed by 1e-12 a run stays within {share(float(tolerance))} of this "
                 f"one until: {listed(early)}; after that trust contact times and energies, not single values"
             )

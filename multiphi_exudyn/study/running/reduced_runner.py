@@ -27,6 +27,7 @@ __all__ = [
     "ENERGY_INTERVAL",
     "global_label",
     "level_words",
+    "modes_words",
     "printed_words",
     "reduced_label",
     "run_global_basis",
@@ -47,6 +48,11 @@ def level_words(bench: Workbench, rigid: bool) -> str:
     return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"
 
 
+def modes_words(modes: object) -> str:
+    """How many modes a model has: "r = 12", "all modes"."""
+    return "all modes" if modes == "all" else f"r = {modes}"
+
+
 def printed_words(bench: Workbench) -> str:
     """That levels have printed frequencies, as part of a label."""
     return ", printed frequencies" if bench.overrides else ""
@@ -54,7 +60,7 @@ def printed_words(bench: Workbench) -> str:
 
 def reduced_label(bench: Workbench, spec: ReducedModel) -> str:
     """How tables and figures call it."""
-    chosen = f"modes for a truncation error of {spec.tolerance:g}" if spec.tolerance else f"r = {spec.modes}"
+    chosen = f"modes for a truncation error of {spec.tolerance:g}" if spec.tolerance else modes_words(spec.modes)
     return f"Multi-Phi, {level_words(bench, spec.rigid)}, {chosen}{printed_words(bench)}"
 
 

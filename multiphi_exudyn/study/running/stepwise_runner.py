@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.study.running.energy_gain import energy_gain
-from multiphi_exudyn.study.running.reduced_runner import ENERGY_INTERVAL
+from multiphi_exudyn.study.running.reduced_runner import ENERGY_INTERVAL, modes_words
 from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.model_kinds import StepwiseModel
@@ -24,7 +24,7 @@ __all__ = ["run_stepwise", "sampled", "stepwise_label"]
 
 def stepwise_label(bench: Workbench, spec: StepwiseModel) -> str:
     """How tables and figures call it."""
-    return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, r = {spec.modes}"
+    return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, {modes_words(spec.modes)}"
 
 
 def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str, how: How) -> ModelRun:

@@ -64,48 +64,49 @@ Lack = Callable[[Demands], Iterator[str]]  # why another kind is needed
 def no_loads(demands: Demands) -> Iterator[str]:
     """Of one that takes no loads."""
     if demands.loads:
-        yield "this one has no loads"
+        yield "this kind takes no loads"
 
 
 def no_weight(demands: Demands) -> Iterator[str]:
     """Of one that takes neither weight nor a moving base."""
     if any(isinstance(load, (Gravity, BaseMotion)) for load in demands.loads):
-        yield "this one has neither weight nor moving base"
+        yield "this kind takes neither gravity nor base-motion"
 
 
 def no_sparse(demands: Demands) -> Iterator[str]:
     """Of one that takes dense matrices alone."""
     if demands.given_as == "sparse":
-        yield "this one takes dense matrices"
+        yield "this kind takes dense matrices only"
 
 
 def beams_only(demands: Demands) -> Iterator[str]:
     """Of one that is made of beams."""
     if demands.given_as != "beams":
-        yield "matrices have no full model"
+        yield "this kind is made of beams, and the structure is given as matrices"
 
 
 def no_friction(demands: Demands) -> Iterator[str]:
     """Of one that takes no friction."""
-    yield from (f"its contacts have no friction, {c.name} has" for c in demands.contacts if c.friction)
-    yield from (f"this one has no friction, and there is {friction.name}" for friction in demands.frictions)
+    yield from (f"this kind takes no friction, and the contact {c.name} has it" for c in demands.contacts if c.friction)
+    yield from (f"this kind takes no friction, and the scene has {friction.name}" for friction in demands.frictions)
 
 
 def no_damping(demands: Demands) -> Iterator[str]:
     """Of one whose contacts have no damping."""
-    yield from (f"its contacts have no damping, {c.name} has" for c in demands.contacts if c.damping)
+    yield from (f"this kind takes no damped contacts, and {c.name} is damped" for c in demands.contacts if c.damping)
 
 
 def no_laws(demands: Demands) -> Iterator[str]:
     """Of one that takes no force laws."""
-    yield from (f"this one has no force laws, and there is {law.name}" for law in demands.laws)
+    yield from (f"this kind takes no force laws, and the scene has {law.name}" for law in demands.laws)
 
 
 def single_points(demands: Demands) -> Iterator[str]:
     """Of one whose contacts act on single points."""
     for contact in demands.contacts:
         if len(factors(contact.direction)) > 1:
-            yield f"its contacts act on single points, {contact.name} on {len(factors(contact.direction))}"
+            points = len(factors(contact.direction))
+            yield f"its contacts act on single points, and {contact.name} acts on {points}"
 
 
 def not_round(demands: Demands) -> Iterator[str]:
@@ -116,7 +117,7 @@ def not_round(demands: Demands) -> Iterator[str]:
         if contact.damping:
             yield "a round support has no damping"
         if len(factors(contact.direction)) > 1:
-            yield f"a round support does not move, {contact.name} is between two points"
+            yield f"a round support does not move, and {contact.name} is between two points"
 
 
 def factors(at: object) -> list[float]:

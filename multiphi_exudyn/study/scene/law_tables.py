@@ -71,7 +71,7 @@ class MagnetLawSpec(_FollowedLaw):
     @model_validator(mode="after")
     def _magnet_outside_the_span(self) -> MagnetLawSpec:
         if min(self.span) <= self.distance <= max(self.span):
-            raise PydanticCustomError("span", "a span without the magnet at q = distance in it")
+            raise PydanticCustomError("span", "a span that does not contain q = distance, where the magnet is")
         return self
 
 

@@ -47,7 +47,7 @@ class SampledCourse(Table):
     def _one_source(self) -> SampledCourse:
         inline = self.time is not None and self.values is not None
         if (self.csv is None) != inline or (self.time is None) != (self.values is None):
-            raise PydanticCustomError("samples", "csv, or time and values")
+            raise PydanticCustomError("samples", "either csv, or time and values")
         return self
 
 

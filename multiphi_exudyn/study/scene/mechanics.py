@@ -202,7 +202,7 @@ def _check_contacts(scene: Scene, mechanics: Mechanics) -> None:
     names = [contact.name for contact in mechanics.contacts]
     for name in names:
         if names.count(name) > 1:
-            refuse(scene, "contacts", name, "a name of its own for every contact")
+            refuse(scene, "contacts", name, "another name for each contact")
     _check_published(scene, mechanics)
 
 

@@ -73,7 +73,7 @@ class _Model(Table):
         if self.penalty:
             for contact in demands.contacts:
                 if contact.rigid:
-                    needed = f"a finite one: {self.name} is a penalty model"
+                    needed = f"a finite one: the contacts of {self.name} are penalty springs"
                     yield Fault(f"stiffness of contact {contact.name}", "inf", needed, whole=True)
         yield from self.own_faults(demands)
 
@@ -103,7 +103,7 @@ class ReducedModel(_Levels):
     @model_validator(mode="after")
     def _one_choice_of_modes(self) -> ReducedModel:
         if self.modes is not None and self.tolerance is not None:
-            raise PydanticCustomError("modes", "modes or a tolerance, not both")
+            raise PydanticCustomError("modes", "modes or tolerance, not both")
         return self
 
     def filled(self, default: int) -> ReducedModel:
@@ -158,10 +158,10 @@ class FullModel(_Model):
             yield from (Fault("contact", "circle", f"'coordinate': {why}") for why in not_round(demands))
 
     def _springless(self, field: str) -> Fault:
-        return Fault(field, "inf", f"a finite one: {self.name} has friction with a spring in series", whole=True)
+        return Fault(field, "inf", f"a finite one: friction of {self.name} has a spring in series", whole=True)
 
     def _another(self, does: str, name: str, given: object) -> Fault:
-        return Fault("kind", self.kind, f"another kind: its {does}, {name} on {given}")
+        return Fault("kind", self.kind, f"another kind: its {does}, and {name} acts on {given}")
 
 
 class CraigBamptonModel(_Model):

@@ -31,7 +31,7 @@ def check_friction(scene: Scene, taken: Sequence[str], frictions: Sequence[Frict
     names = list(taken)
     for i, friction in enumerate(frictions):
         if friction.name in names:
-            needed = "a name of its own for every contact, force law and friction"
+            needed = "another name for each contact, force law and friction"
             refuse(scene, f"friction[{i}].name", friction.name, needed)
         names.append(friction.name)
 

@@ -36,7 +36,7 @@ def check_laws(scene: Scene, contacts: Sequence[UnilateralContact], laws: Sequen
     names = [contact.name for contact in contacts]
     for i, law in enumerate(laws):
         if law.name in names:
-            refuse(scene, f"force_laws[{i}].name", law.name, f"a name of its own: there is {law.name} already")
+            refuse(scene, f"force_laws[{i}].name", law.name, f"another name: there is a {law.name} already")
         names.append(law.name)
 
 

@@ -73,7 +73,7 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | Non
 def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
     direction = transverse if given is None else given
     if direction is None:
-        refuse(scene, f"{field}.direction", None, "one: only a beam knows its transverse motion")
+        refuse(scene, f"{field}.direction", None, "a direction: only a structure of beams has one of its own")
     return direction
 
 

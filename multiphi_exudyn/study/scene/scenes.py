@@ -61,7 +61,7 @@ def scene_data(source: str, folder: Path | None = None) -> tuple[Path, dict[str,
     path = _find(source, folder or Path())
     data = read_toml(path)
     if "scene" in data and "structure" not in data:
-        raise MultiPhiValueError(f"{path}: got a study, need a scene; the command study runs a study")
+        raise MultiPhiValueError(f"{path}: got a study, need a scene (a study is run by the command study)")
     return path, _with_base(path, data)
 
 
@@ -120,7 +120,7 @@ def _check(scene: Scene) -> None:
     first: dict[str, ModelSpec] = {}
     for i, model in enumerate(map(scene.filled, file.models)):
         if first.setdefault(model.name, model) != model:
-            refuse(scene, f"models[{i}].name", model.name, "a name of its own for every model")
+            refuse(scene, f"models[{i}].name", model.name, "another name for each model")
     if file.outputs.t_end / file.outputs.interval > MOST_SAMPLES:
         need = f"at least {file.outputs.t_end / MOST_SAMPLES:g} s for this t_end"
         refuse(scene, "outputs.interval", file.outputs.interval, need)

@@ -99,8 +99,8 @@ def _needed(item: Mapping[str, Any]) -> str:
         "missing": "a value",
         "dict_type": "a table",
         "model_type": "a table",
-        "extra_forbidden": "no field of this name",
-        "union_tag_invalid": f"a kind among {item.get('ctx', {}).get('expected_tags')}",
+        "extra_forbidden": "a known field",
+        "union_tag_invalid": f"one of the kinds {item.get('ctx', {}).get('expected_tags')}",
         "union_tag_not_found": "a table with the field kind",
     }
     return kinds.get(item["type"], _one_line(item["msg"]).removeprefix("Input should be "))

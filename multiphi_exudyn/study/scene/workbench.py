@@ -233,7 +233,8 @@ def _check_modes(scene: Scene, structure: LinearStructure, mechanics: Mechanics)
     most = structure.n - mechanics.directions
     if most < 1:
         raise MultiPhiValueError(
-            f"{scene.path}: structure: got {structure.n} DoFs and {mechanics.directions} contacts or laws"
+            f"{scene.path}: structure: got {structure.n} degrees of freedom and {mechanics.directions} contacts, "
+            "frictions or force laws, need more degrees of freedom than those"
         )
     for model in scene.models.values():
         if model.kind == "craig-bampton":
@@ -247,9 +248,7 @@ def _check_component(scene: Scene, structure: LinearStructure, mechanics: Mechan
     interface = _interface(structure, mechanics, scene.file.outputs.points or mechanics.points)
     missing = [name for name in _contact_points(mechanics) if name not in interface]
     if missing:
-        refuse(
-            scene, f"kind of {model.name}", model.kind, f"another: contact point {missing[0]} follows from the others"
-        )
+        refuse(scene, f"kind of {model.name}", model.kind, f"another: point {missing[0]} follows from the others")
     most = structure.n - len(interface)
     if model.modes > most:
         refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} beside {len(interface)} interface points")

@@ -42,11 +42,12 @@ class Label:
 def place_labels(figure: Figure, axes: Axes, labels: Sequence[Label], obstacles: Sequence[tuple[float, float]]) -> None:
     """Write the labels; ``obstacles`` are points in data coordinates that had better stay visible.
 
-    What is written in the axes already is kept clear of as other labels are.
+    What is written in the axes already, and the axes' ticks and titles, are kept clear of as other labels are.
     """
     figure.draw_without_rendering()
     points = axes.transData.transform(np.array(obstacles).reshape(-1, 2))
     written = [text.get_window_extent() for text in axes.texts]
+    written += [box for axis in (axes.xaxis, axes.yaxis) if (box := axis.get_tightbbox()) is not None]
     taken: list[Box] = [(box.x0, box.y0, box.x1, box.y1) for box in written]
     for label in labels:
         anchors = [(anchor, axes.transData.transform(anchor)) for anchor in label.anchors]
