@@ -149,7 +149,7 @@ def test_a_study_leaves_runs_table_and_report_and_goes_on_where_it_was(scene, tm
     assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 2
     capsys.readouterr()
     assert cli.main(["study", path, "--on", "serial"]) == 0
-    assert "cheapest within 1.00 %" in capsys.readouterr().out
+    assert "cheapest within 1 %" in capsys.readouterr().out
     assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 3
 
 

@@ -33,7 +33,7 @@ def test_templates_are_valid_as_they_are_and_overwrite_nothing(folder, capsys):
     assert code == 0
     assert "27 points (3 of contacts.*.gap x 3 of contacts.*.stiffness x 3 of loads.0.frequency_hz), 135 runs" in out
     code, _, err = told(capsys, "new", "scene")
-    assert (code, err) == (2, "FILE: got 'scene.toml', need a name that is not taken\n")
+    assert (code, err) == (2, "FILE: got 'scene.toml', which exists already, need another name\n")
     assert told(capsys, "new", "scene", "other.toml")[:2] == (0, "other.toml\n")
     assert sorted(path.name for path in folder.iterdir()) == ["other.toml", "scene.toml", "study.toml"]
 

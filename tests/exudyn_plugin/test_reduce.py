@@ -395,7 +395,7 @@ def test_items_left_out_for_one_reason_are_one_warning_and_one_line():
     reduction = reduce(springs_by_user_functions(30).mbs)
     sentence, _ = run(reduction, 0.1).warnings
     assert sentence.startswith(
-        "left out: 29 ObjectConnectorCoordinateSpringDamper ('spring1', 'spring2', 'spring3', ...): the difference of its"
+        "left out: 29 ObjectConnectorCoordinateSpringDamper ('spring1', 'spring2', 'spring3', ...): the difference of"
     )
     assert len(reduction.left_out) == 30
     assert len(reduction.report.splitlines()) < 10

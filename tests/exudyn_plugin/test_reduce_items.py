@@ -337,7 +337,7 @@ def test_a_horizontal_pendulum_has_no_stiffness_and_not_one_of_round_off(sign):
 
 def test_a_negative_stiffness_is_told_by_its_coordinate_and_body(refused):
     _, mbs = bob_on_a_link([0.0, 1.0])
-    said = r"stiffness: got a negative eigenvalue (omega^2 = -9.81 1/s2), mainly of coordinate 0 of node 'bob' (ObjectMassPoint2D"
+    said = r"stiffness: got a negative eigenvalue (omega^2 = -9.81 1/s2), mainly of coordinate 0 of node 'bob' (Object"
     refused(ValueError, said, reduce, mbs)
 
 

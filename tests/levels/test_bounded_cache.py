@@ -91,7 +91,7 @@ def test_a_record_that_becomes_too_large_ends_the_run(monkeypatch):
     run = simulate(model, 1e4, velocity=[1.0, 0.3])
     assert run.status == "failed"
     assert re.search(
-        r"at t = \d+\.\d+ s: record: got .* GB of \d+ segments, need at most .* a shorter run", run.message
+        r"at t = \d+\.\d+ s: record: got .* GB of \d+ segments, need at most .* make the run shorter", run.message
     )
     assert 1e3 < run.t_end < 1e4
     np.testing.assert_allclose(run.displacement(run.t_end), whole.displacement(run.t_end), atol=1e-10)

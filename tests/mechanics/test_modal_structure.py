@@ -95,7 +95,7 @@ class TestFlexibility:
 
 class TestWarning:
     def test_names_the_contacts_where_it_is_not_known(self):
-        with pytest.warns(mp.MultiPhiWarning, match=r"missing modes: .* up to 2[0-9.]+ Hz alone, so 'stop' acts"):
+        with pytest.warns(mp.MultiPhiWarning, match=r"missing modes: .* up to 2[0-9.]+ Hz, so 'stop' acts"):
             run, _ = peak(modal(KEPT))
         assert sum(line.startswith("missing modes") for line in run.warnings) == 1
 

@@ -103,7 +103,7 @@ def test_a_comparison_shows_what_its_models_warn_of_first(warning_runs, scene_fi
     assert told[0] == "linear range, all and r6: " + LINEAR.partition(": ")[2]
     assert told[1].startswith("static share, all and r6: ")
     assert told[2].startswith(
-        "sensitivity: with a start changed by 1e-12 a run stays within 1.00 % of this one until: all"
+        "sensitivity: with a start changed by 1e-12 a run stays within 1 % of this one until: all"
     )
     assert len(told) == 3
     page = text_of(render(comparison, (), ()))

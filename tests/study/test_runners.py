@@ -234,7 +234,7 @@ def test_a_tolerance_in_place_of_a_number_of_modes(tmp_path):
 
 def test_modes_and_a_tolerance_are_refused(tmp_path):
     data = changed(["models", 1], {"kind": "reduced", "name": "both", "tolerance": 0.01, "modes": 3})
-    with pytest.raises(MultiPhiValueError, match=r"models\[1\].*need modes or a tolerance, not both"):
+    with pytest.raises(MultiPhiValueError, match=r"models\[1\].*need modes or tolerance, not both"):
         load_scene(write(tmp_path / "scene.toml", data))
 
 

@@ -126,11 +126,15 @@ def test_friction_without_a_spring_runs_where_nothing_is_full(tmp_path):
         (("friction", 0, "direction"), "nowhere", "friction[0].direction: got 'nowhere', need one of the points"),
         (("friction", 0, "stifness"), 1.0, "friction[0].stifness: got 1.0"),
         (("friction",), [RING, RING], "friction[1].name: got 'ring', need another name"),
-        (("friction", 0, "stiffness"), "rigid", "friction[0].stiffness: got 'inf', need a finite one: beam"),
+        (
+            ("friction", 0, "stiffness"),
+            "rigid",
+            "friction[0].stiffness: got 'inf', need a finite one: friction of",
+        ),
         (
             ("models", 2),
             {"kind": "solve-ivp", "name": "s", "modes": 4, "method": "RK45", "rtol": 1e-6},
-            "models[2].kind: got 'solve-ivp', need another kind: this one has no friction, and there is ring",
+            "models[2].kind: got 'solve-ivp', need another kind: this kind takes no friction, and the scene has ring",
         ),
     ],
 )

@@ -129,7 +129,7 @@ BROKEN = {
     "a magnet in the span": ([LAWS["magnet"] | {"distance": 0.01}], {}, "force_laws[0]: got"),
     "a name twice": ([CUBIC, CUBIC], {}, "force_laws[1].name: got 'spring', need another name"),
     "the name of a contact": (
-        [CUBIC | {"name": "stop"}], {"contacts": BEAM["contacts"]}, "force_laws[0].name: got 'stop', need a name of"
+        [CUBIC | {"name": "stop"}], {"contacts": BEAM["contacts"]}, "force_laws[0].name: got 'stop', need another name"
     ),
     "on a component": ([CUBIC], {"models": [COMPONENT]}, "models[0].kind: got 'craig-bampton', need another kind"),
     "of a stepwise model": ([CUBIC], {"models": [STEPWISE]}, "models[0].kind: got 'solve-ivp', need another kind"),

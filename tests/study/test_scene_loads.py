@@ -105,7 +105,7 @@ class TestForms:
         np.savez(tmp_path / "two.npz", mass=np.eye(2), stiffness=np.eye(2))
         data = at_rest(LOADS["gravity"]) | {"structure": {"matrices": "two.npz", "points": {"middle": 0, "tip": 1}}}
         data |= {"models": [{"kind": "reduced", "name": "r12", "modes": 1}]}
-        assert complaint(tmp_path, data).startswith("loads[0].direction: got None, need one: only a beam")
+        assert complaint(tmp_path, data).startswith("loads[0].direction: got None, need a direction: only a structure")
         data["loads"] = [LOADS["gravity"] | {"direction": {"middle": 1.0, "tip": 1.0}}]
         (gravity,) = bench_of(tmp_path, data).loads
         assert gravity.direction == {"middle": 1.0, "tip": 1.0}

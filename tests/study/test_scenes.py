@@ -212,7 +212,7 @@ def test_a_full_model_needs_a_beam_and_a_finite_stiffness(tmp_path):
 def test_a_penalty_model_needs_a_finite_stiffness(tmp_path, model):
     data = changed(["models"], [*BEAM["models"], model])
     line = complaint(tmp_path, changed(["contacts", 0, "stiffness"], math.inf, data))
-    needed = f"a finite one: the contacts of {model['name']} are penalty springs"
+    needed = f"a finite one: contacts of the model {model['name']} are penalty springs"
     assert line == f"stiffness of contact stop: got 'inf', need {needed}"
 
 

@@ -68,9 +68,9 @@ def texts_of(figure):
 
 def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(result):
     found = findings(result)
-    assert "How wrong are 4 methods, at 35 settings in all" in found.asked
+    assert "How accurate are 4 methods, at 35 settings in all" in found.asked
     assert "NRMSE to 0.3 s, the worst of node2, node3 and of each setting's nearby runs" in found.asked
-    assert "the reference, in words" in found.asked
+    assert "the reference (reference, in words)" in found.asked
     assert found.outcome == (
         "The cheapest within 10 % is Multi-Phi (r = 3): 275 µs, 2909 times faster than the cheapest full model "
         "that does.",
@@ -112,7 +112,7 @@ def test_a_busy_machine_and_unsteady_repeats_are_told():
 
 def test_what_lies_below_the_uncertainty_is_told_as_that():
     given = result_of([row("reference"), row("coarser", 0.03), row("a", 0.02)], [timing("a", 1.0)])
-    assert "Who reaches 2 %, 1 % is not decided here." in " ".join(findings(given).distrust)
+    assert "Which settings are within 2 %, 1 % is not decided here." in " ".join(findings(given).distrust)
     assert findings(given).outcome[-1] == "The most accurate is a: ≤ 3.00 % (uncertainty)."
     assert error_words(0.04, 0.03) == "4.00 %"
     assert error_words(None, 0.03) == "–"
@@ -129,7 +129,7 @@ def test_without_a_full_model_that_holds_the_tolerance_nothing_is_called_faster(
     full = findings(result_of([row("full ANCF", 0.05)], [timing("full ANCF", 1.0)])).outcome[0]
     assert full == "The cheapest within 10 % is full ANCF: 1 s."
     nobody = findings(result_of([row("Multi-Phi", 0.9)], [timing("Multi-Phi", 1.0)])).outcome[0]
-    assert nobody == "None of the settings reaches 10 %."
+    assert nobody == "No setting is within 10 %."
 
 
 def test_choices_stand_in_the_order_of_their_times(result):

@@ -109,7 +109,7 @@ def most_accurate(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
 def error_words(error: float | None, own: float | None) -> str:
     """An error; one below the reference's own uncertainty only as that."""
     if error is not None and own is not None and error <= own:
-        return f"≤ {percent(own)} (the reference's uncertainty)"
+        return f"≤ {percent(own)} (uncertainty)"
     return percent(error)
 
 

@@ -73,7 +73,7 @@ class _Model(Table):
         if self.penalty:
             for contact in demands.contacts:
                 if contact.rigid:
-                    needed = f"a finite one: the contacts of {self.name} are penalty springs"
+                    needed = f"a finite one: contacts of the model {self.name} are penalty springs"
                     yield Fault(f"stiffness of contact {contact.name}", "inf", needed, whole=True)
         yield from self.own_faults(demands)
 
@@ -158,7 +158,9 @@ class FullModel(_Model):
             yield from (Fault("contact", "circle", f"'coordinate': {why}") for why in not_round(demands))
 
     def _springless(self, field: str) -> Fault:
-        return Fault(field, "inf", f"a finite one: friction of {self.name} has a spring in series", whole=True)
+        return Fault(
+            field, "inf", f"a finite one: friction of the model {self.name} has a spring in series", whole=True
+        )
 
     def _another(self, does: str, name: str, given: object) -> Fault:
         return Fault("kind", self.kind, f"another kind: its {does}, and {name} acts on {given}")
