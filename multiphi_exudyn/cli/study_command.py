@@ -46,13 +46,16 @@ def _complete(result: StudyResult) -> bool:
 
 def _tell(result: StudyResult, folder: Path) -> None:
     """The cheapest setting of every method for every tolerance, at the first point of the axes, if it was timed."""
-    at = points(result)[0] if result.rows else {}
+    places = points(result) if result.rows else [{}]
+    at = places[0]
+    first = f", at the first of {len(places)} points: {words(at)}" if at else ""
     known = [setting for setting in settings(result) if setting.at == at]
     full = full_methods_of(result)
     for tolerance in result.study.tolerances if result.timings else ():
         chosen = cheapest(known, tolerance)
         faster = times_faster(chosen, full)
-        print(f"\ncheapest within {share(tolerance)} to {result.window:g} s{', ' + words(at) if at else ''}")
+        print(f"\ncheapest within {share(tolerance)} (NRMSE to {result.window:g} s){first}")
+        print(f"  {'method':32}  {'online':>9}  {'faster':>12}  {'error':>8}  setting")
         for name, setting in chosen.items():
             if setting is None:
                 print(f"  {name:32}  none")

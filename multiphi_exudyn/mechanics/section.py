@@ -8,7 +8,7 @@ consistent mass of its cubic shape functions, rotary inertia included, in (w, th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ class Section:
     Parameters
     ----------
     start, end : float
-        Where along the beam [m], start < end.
+        Where along the beam [m], start < end. The numbers that follow are given by name.
     youngs_modulus : float
         E [Pa].
     density : float
@@ -58,6 +58,7 @@ class Section:
 
     start: float
     end: float
+    _: KW_ONLY
     youngs_modulus: float
     density: float
     area: float

@@ -61,7 +61,9 @@ def triplets(path: Path) -> Matrix | NodalMatrix:
     lines = [line.replace(",", " ") for line in lines_of(path) if not line.startswith("*")]
     columns = len(lines[0].split()) if lines else 0
     if columns not in (3, 5):
-        raise ValueError(f"a line has {columns} columns, not row, column, value nor twice node, component and a value")
+        raise ValueError(
+            f"a line has {columns} columns, and not 3 (row, column, value) or 5 (twice node and component, value)"
+        )
     table = np.loadtxt(lines, ndmin=2, dtype=float)
     labels = table[:, :-1].astype(np.int64)
     if not np.array_equal(labels, table[:, :-1]):

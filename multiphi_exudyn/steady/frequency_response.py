@@ -72,7 +72,7 @@ class FrequencyResponse(Shown):
 
     @property
     def last(self) -> SteadyState:
-        """The last one that has not failed."""
+        """The last state that has not failed."""
         return next((state for state in reversed(self.states) if state.status != "failed"), self.states[-1])
 
     def amplitude(self, point: At) -> np.ndarray:

@@ -50,7 +50,7 @@ _Start: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"
 
 @dataclass(frozen=True)
 class ManyRuns:
-    """What is kept of k runs; made by ``simulate_many``.
+    """Statuses, warnings and samples of k runs; made by ``simulate_many``.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def simulate_many(
     times: np.ndarray | None = None,
     threads: int | None = None,
 ) -> ManyRuns:
-    """Runs of one model that differ in their starts alone, each what ``simulate`` gives, to the bit.
+    """Runs of one model from many starts; each gives what ``simulate`` gives, to the bit.
 
     Parameters
     ----------

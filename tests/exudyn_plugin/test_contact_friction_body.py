@@ -144,7 +144,7 @@ class TestCoupled:
         assert_converges(whole, kind, "z", add)
 
     def test_a_belt_has_no_interface(self, refused):
-        begins = "velocity of 'floor.tangential': got 0.1 with an interface, need 0"
+        begins = "velocity of 'floor.tangential': got 0.1 m/s of the counter-surface in a body with an interface"
         given = model(floor("rigid", tangential_velocity=0.1))
         refused(ValueError, begins, lambda: CreateMultiPhiBody(system(), given, interface=("z",)))
 

@@ -152,7 +152,7 @@ class TestCoupled:
 
     def test_a_belt_has_no_interface(self, refused):
         ring = mp.Friction("ring", "m1", 0.4, velocity=0.1)
-        begins = "velocity of 'ring': got 0.1 with an interface, need 0"
+        begins = "velocity of 'ring': got 0.1 m/s of the counter-surface in a body with an interface"
         refused(ValueError, begins, lambda: CreateMultiPhiBody(system(), model(ring), interface=("m2",)))
 
 

@@ -465,7 +465,9 @@ def test_what_an_interface_cannot_hold_is_refused():
     ]:
         with pytest.raises(error, match=told):
             CreateMultiPhiBody(mbs, model, interface=interface)
-    with pytest.raises(mp.errors.MultiPhiValueError, match="got HarmonicLoad with an interface, need constant"):
+    with pytest.raises(
+        mp.errors.MultiPhiValueError, match="got HarmonicLoad in a body with an interface, need constant"
+    ):
         CreateMultiPhiBody(mbs, model, interface=("m2",), loads=[mp.HarmonicLoad("m2", 1.0, 2.0)])
     with pytest.raises(ValueError, match="need TrapezoidalIndex2"):
         run(model, STEP, spring, solver=exu.DynamicSolverType.GeneralizedAlpha)

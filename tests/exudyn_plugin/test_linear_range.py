@@ -367,6 +367,6 @@ def test_a_report_of_a_run_says_what_holds_until_when_and_what_it_warns_of():
     trajectory = run(reduction, 1.0)
     linear, horizon, *warned = reduction.report_of(trajectory).splitlines()
     assert linear.startswith("linear range (does not hold): what the model leaves out moves it by ")
-    assert horizon == "determined within 1 % until 1 of 1 s"
+    assert horizon == "horizon: determined within 1 % until 1 s of 1 s"
     assert warned == [f"warning: {sentence}" for sentence in trajectory.warnings]
     assert warned[0].startswith("warning: linear range: ")

@@ -211,7 +211,7 @@ class TestPoints:
         chain = Chain()
         chain.marker(chain.nodes[1], "n-second.0")
         chain.mbs.Assemble()
-        with pytest.raises(MultiPhiValueError, match=r"'n-second\.0' twice"):
+        with pytest.raises(MultiPhiValueError, match=r"two markers or nodes .* 'n-second\.0'"):
             linear_structure_from(chain.mbs)
 
     @pytest.mark.parametrize(

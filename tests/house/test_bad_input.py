@@ -126,7 +126,7 @@ NUMBERS = {
     "place on a beam": lambda x: mp.PointMass(x, 1.0),
     "mass on a beam": lambda x: mp.PointMass(0.0, x),
     "clamp": lambda x: mp.Clamp(x, -1.0 if isinstance(x, float) else 1.0),
-    "section": lambda x: mp.Section(x, 1.0, 2e11, 7800.0, 1e-4, 1e-9, 8e10),
+    "section": lambda x: mp.Section.rectangle(x, 1.0, width=0.02, height=0.005, youngs_modulus=2e11, density=7800.0),
 }
 ALLOWED = {
     ("stiffness", "infinite"),  # rigid

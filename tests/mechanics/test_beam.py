@@ -211,6 +211,11 @@ class TestUnits:
             assert_allclose(exact_si, exact_other, rtol=1e-11)
 
 
+def test_a_section_takes_its_properties_by_name_alone():
+    with pytest.raises(TypeError, match="positional"):
+        Section(0.0, 1.0, 2.1e11, 7850.0, 1e-4, 1e-9, 8e10)
+
+
 class TestClampLimits:
     def test_a_stiff_clamp_tends_to_the_rigid_one_and_a_soft_one_to_none(self):
         rigid, stiff = (frequencies(planar_beam(beam(clamp=c), 12), 3) for c in (Clamp(), Clamp(1e11, 1e8)))

@@ -68,7 +68,7 @@ def texts_of(figure):
 
 def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(result):
     found = findings(result)
-    assert "How accurate are 4 methods, at 35 settings in all" in found.asked
+    assert "How large are error and run time of 4 methods, at 35 settings in all" in found.asked
     assert "NRMSE to 0.3 s, the worst of node2, node3 and of each setting's nearby runs" in found.asked
     assert "the reference (reference, in words)" in found.asked
     assert found.outcome == (
@@ -84,7 +84,7 @@ def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(r
     )
     doubts = " ".join(found.distrust)
     assert "coarser copy of itself by 0.10 %. Smaller errors say nothing. The two agree to 1 % until 0.25 s" in doubts
-    assert "2 of 85 runs failed or took too long. Settings without an error: 1 of 35." in doubts
+    assert "2 of 85 runs failed or took too long. Settings whose error is not known: 1 of 35." in doubts
     assert "short form" not in doubts
 
 

@@ -109,7 +109,7 @@ class TestBallsInARow:
     def test_of_several_restitutions_are_refused_by_name(self):
         run = balls([0.0, 0.0], [0.5, 0.9], [1.0, 0.0, -1.0])
         assert run.status == "failed"
-        assert "c0, c1: struck together with several restitutions" in run.message
+        assert "c0, c1: struck together, but their restitutions differ" in run.message
 
     def test_of_which_only_one_strikes_may_have_several(self):
         run = balls([0.0, 0.0], [0.5, 0.9], [1.0, 0.0, 0.0])

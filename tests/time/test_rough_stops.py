@@ -200,7 +200,7 @@ class TestRod:
     def test_that_slides_without_a_unique_motion_is_refused_with_its_number(self):
         run = rod(1.4, -1.0, 0.0)
         assert run.status == "failed"
-        assert "leaves h.M^-1 (h - s mu h_t) = -0.05 h.M^-1 h" in run.message
+        assert "h.M^-1 (h - s mu h_t) is -0.05 of h.M^-1 h" in run.message
         assert rod(1.4, 1.0, 0.0).status == "ok"  # the other way it slides
 
     def test_that_strikes_sticks_where_it_could_not_slide(self):

@@ -144,8 +144,8 @@ class RunAhead:
         apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
         if not apart.dot(apart) <= limit * limit:
             raise MultiPhiValueError(
-                f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set; if a "
-                "PreStep or PostStep function sets them, install it before the run begins"
+                f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set, need "
+                "the PreStep or PostStep function that sets them to be there before the run begins"
             )
 
     def _steps_of(self, stepped: SteppedLevel) -> UndisturbedSteps:

@@ -60,8 +60,8 @@ def check_start(mbs: Any, body: CheckedBody, given: Sequence[np.ndarray], lost: 
     around = here.surroundings or here.beside(mbs)
     if around.on_body(here.stepped.mass):
         raise MultiPhiValueError(
-            f"node of {body.name!r}: got a mass or a constraint on the node of a body with rigid contacts; attach it "
-            "to an interface coordinate, make it part of the structure, or give the contacts a finite stiffness"
+            f"node of {body.name!r}: got a mass or a constraint on the node of a body with rigid contacts, need it "
+            "on an interface coordinate or as part of the structure, or contacts of finite stiffness"
         )
     around.apart = {
         mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name

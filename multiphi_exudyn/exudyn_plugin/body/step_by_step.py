@@ -88,7 +88,7 @@ class StepByStep:
         if self._own.varies and self._told != t:
             raise MultiPhiValueError(
                 f"PreStepUserFunction: got a function that replaced the one of {self._body.name!r}, which applies its "
-                "loads; set yours before CreateMultiPhiBody, then both are called"
+                "loads; need yours set before CreateMultiPhiBody, then both are called"
             )
         if self._body.coordinates.interface is not None:
             self._body.coordinates.interface.look()

@@ -136,7 +136,7 @@ class Switching(dict[str, SwitchingBody]):
         if self.needed and not self.clock.time >= t:
             raise MultiPhiValueError(
                 f"PostStepUserFunction: got a function that replaced the one of {next(iter(self))!r}, which handles "
-                "its events; set yours before CreateMultiPhiBody, then both are called"
+                "its events; need yours set before CreateMultiPhiBody, then both are called"
             )
 
     def _warn(self) -> None:

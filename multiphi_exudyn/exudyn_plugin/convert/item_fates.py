@@ -79,7 +79,7 @@ def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
 
 def left_out_directions(of: str) -> Iterator[tuple[Item, str]]:
     """Directions that are left out because nothing moves the system there; of: what is wrong with them."""
-    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it ({of})"
+    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it, {of}"
 
 
 def grouped(told: Iterable[tuple[Item, str]]) -> list[str]:

@@ -26,7 +26,7 @@ class RangeCheck:
     times : array (k,)
         When it was asked [s].
     errors : array (k,)
-        What the forces that the model lacks move it away, relative to the motion's largest displacement.
+        How far what the model leaves out moves it, relative to the motion's largest displacement.
     reason : str
         Why nothing could be checked; empty where it could.
     lag : float

@@ -7,7 +7,7 @@ lines without marks. Grey bands: errors below the reference's own uncertainty.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,6 +40,7 @@ __all__ = [
     "note",
     "panels_of",
     "percent_axis",
+    "seconds_axis",
     "single",
     "styles",
     "uncertainty_band",
@@ -119,27 +120,40 @@ def note(
     axes.annotate(text, at, xycoords=system, **shift, **placing)
 
 
-class _Percent(LogFormatter):
-    """Ticks of a logarithmic axis of percents, between its decades too where they are few."""
+class _Worded(LogFormatter):
+    """Ticks of a logarithmic axis in words, between its decades too where these are few."""
+
+    def __init__(self, word: Callable[[float], str]) -> None:
+        super().__init__()
+        self.word = word
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return f"{x:g} %" if super().__call__(x, pos) else ""
+        return self.word(x) if super().__call__(x, pos) else ""
 
 
 def percent_axis(axis: Axis) -> None:
     """Values of a logarithmic axis that are percents already, written as such."""
-    axis.set_major_formatter(_Percent())
-    axis.set_minor_formatter(_Percent(minor_thresholds=(1.5, 0.5)))
+    _write(axis, lambda value: f"{value:g} %")
+
+
+def seconds_axis(axis: Axis) -> None:
+    """Values of a logarithmic axis in s, with the units that read best."""
+    _write(axis, seconds)
+
+
+def _write(axis: Axis, word: Callable[[float], str]) -> None:
+    axis.set_major_formatter(_Worded(word))
+    axis.set_minor_formatter(_Worded(word))
 
 
 def value_axis(axes: Axes, axis: str, values: Sequence[float]) -> None:
-    """Logarithmic where the values are far apart, with the values themselves as ticks."""
+    """The values themselves as ticks; logarithmic where they are far apart."""
     ticks = sorted(set(values))
     if ticks[0] > 0 and (axis in FINEST or ticks[-1] / ticks[0] >= WIDE):
         axes.set_xscale("log")
-        shown = ticks[:: -(-len(ticks) // MOST_TICKS)]
-        axes.set_xticks(shown, [seconds(tick) if axis == "step" else f"{tick:g}" for tick in shown])
-        axes.set_xticks([], minor=True)
+    shown = ticks[:: -(-len(ticks) // MOST_TICKS)]
+    axes.set_xticks(shown, [seconds(tick) if axis == "step" else f"{tick:g}" for tick in shown])
+    axes.set_xticks([], minor=True)
     axes.set_xlabel(FIELD_LABELS.get(axis, axis))
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import front, names_of, references, settings_at, uncertainty, words
@@ -27,6 +27,7 @@ from multiphi_exudyn.study.accuracy.figure_style import (
     note,
     panels_of,
     percent_axis,
+    seconds_axis,
     single,
     styles,
     uncertainty_band,
@@ -36,7 +37,6 @@ from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlatio
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE
 from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.direct_labels import Label, place_labels
-from multiphi_exudyn.study.comparison.wording import seconds
 
 __all__ = ["along_figure", "convergence_figure", "indicator_figure", "pareto_figure"]
 
@@ -175,7 +175,7 @@ def _time_error_frame(axes: Axes, result: StudyResult, at: Mapping[str, Any], er
     axes.grid(color=GRID)
     axes.set_axisbelow(True)
     axes.set_xlabel("online time of one run, median", fontsize=11)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: seconds(value)))
+    seconds_axis(axes.xaxis)
     axes.set_ylabel(error_label(result), fontsize=11)
     axes.tick_params(labelsize=10)
     percent_axis(axes.yaxis)
