@@ -27,16 +27,18 @@ from multiphi_exudyn.events.arrays import (
     RUBBINGS,
     SPEED,
     SWINGS,
+    WORK_NUMBERS,
     WORK_WAVES,
 )
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.response_arrays import SHAPES
+from multiphi_exudyn.mathematics.response_arrays import SHAPES, state_of
+from multiphi_exudyn.time.work_sums import dissipated
 
 __all__ = [
     "add_constants",
     "add_friction",
-    "dissipated",
+    "dissipated_freely",
     "list_terms",
     "swinging",
     "swinging_alone",
@@ -93,27 +95,18 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, first
 
 
 @compiled
-def dissipated(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> float:
-    """(u + u_0).F (u - u_0) / 2 of the free response at the end u and at the start u_0 of the flow."""
-    p, c, phi, total = ints[FLOW_FREE], ints[FLOW_WAVES], ints[WORK_WAVES], 0.0
-    real = ints[ints[AFTER + LEVEL] + DISSIPATED]
-    imaginary = real + 2 * p * p
-    for j in range(p):
-        end = waves[c + j] * waves[phi + j]
-        scratch[j] = end - waves[c + j]
-        scratch[p + j] = end + waves[c + j]
-    for j in range(p):  # four sums that do not wait for each other
-        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
-        for k in range(p):
-            change = scratch[k]
-            first += numbers[real + k] * change.real
-            second += numbers[real + p + k] * change.imag
-            third += numbers[imaginary + k] * change.real
-            fourth += numbers[imaginary + p + k] * change.imag
-        total += (first + second) * scratch[p + j].real + (third + fourth) * scratch[p + j].imag
-        real += 2 * p
-        imaginary += 2 * p
-    return 0.5 * total
+def dissipated_freely(ints: Ints, numbers: Numbers, waves: Waves, duration: float) -> float:
+    """The work of damping on the free response alone, without powers of time (work_sums.py)."""
+    level, start = ints[AFTER + LEVEL], ints[WORK_NUMBERS]
+    r, response, c = ints[level + MODES], ints[level + RESPONSE], ints[FLOW_WAVES]
+    end, work = start + 2 * r, ints[WORK_WAVES] + ints[FLOW_COUNT]
+    for k in range(2):
+        state_of(ints, numbers, waves, response, c, k * duration, start + 2 * r * k, start + 2 * r * k + r, work)
+    for i in range(2 * r):
+        before = numbers[start + i]
+        numbers[start + i] += numbers[end + i]
+        numbers[end + i] -= before
+    return dissipated(numbers, ints[level + DISSIPATED], r, start, end)
 
 
 @compiled
