@@ -44,6 +44,7 @@ from multiphi_exudyn.events.arrays import (
     WORK_NUMBERS,
     WORKS_NOW,
 )
+from multiphi_exudyn.events.energies import pattern_work, potential
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
 __all__ = ["INFLATED", "dissipated", "work_of_segment"]
@@ -65,9 +66,9 @@ def work_of_segment(ints: Ints, numbers: Numbers, waves: Waves, duration: float)
         return 0
     if q > 0:
         list_coefficients(ints, numbers, waves, forms, ints[DRIVE_NEXT], first + size)
-    largest, swung = free_state(ints, numbers, CURRENT, forms, count, first), numbers[SWUNG]
+    free_state(ints, numbers, CURRENT, forms, count, first)
     free_state(ints, numbers, REACHED, forms, count, first + size)
-    if q > 0 and largest > INFLATED * swung:
+    if q > 0 and is_inflated(ints, numbers, first + count) == 1:
         return 0
     for i in range(size):
         numbers[sums + i] = numbers[first + size + i] + numbers[first + i]
@@ -120,20 +121,31 @@ def list_coefficients(ints: Ints, numbers: Numbers, waves: Waves, forms: int, te
 
 
 @compiled
-def free_state(ints: Ints, numbers: Numbers, state: int, forms: int, count: int, result: int) -> float:
-    """y behind the ``count`` coefficients of u; its |eta'|^2 + |omega eta|^2."""
-    level, total = ints[state + LEVEL], 0.0
-    r, row, whole = ints[level + MODES], ints[forms + DRIVEN_RESPONSE] if count > 0 else 0, 0.0
+def free_state(ints: Ints, numbers: Numbers, state: int, forms: int, count: int, result: int) -> None:
+    """y behind the ``count`` coefficients of u."""
+    r, row = ints[ints[state + LEVEL] + MODES], ints[forms + DRIVEN_RESPONSE] if count > 0 else 0
     for i in range(2 * r):
         value = numbers[ints[state + PLACE] + i] if i < r else numbers[ints[state + SPEED] + i - r]
-        factor = numbers[ints[level + FREQUENCIES] + i] if i < r else 1.0
-        whole += factor * value * factor * value
         for k in range(count):
-            value -= numbers[row + i * count + k] * numbers[result + k]
+            value -= numbers[row + k] * numbers[result + k]
         numbers[result + count + i] = value
-        total += factor * value * factor * value
-    numbers[SWUNG] = max(numbers[SWUNG], whole)
-    return total
+        row += count
+
+
+@compiled
+def is_inflated(ints: Ints, numbers: Numbers, free: int) -> int:
+    """1 where |eta'|^2 + |omega eta|^2 of y is much more than twice the largest energy so far."""
+    level, v, total, moving = ints[CURRENT + LEVEL], ints[CURRENT + SPEED], 0.0, 0.0
+    r = ints[level + MODES]
+    for i in range(r):
+        swing = numbers[ints[level + FREQUENCIES] + i] * numbers[free + i]
+        total += numbers[free + r + i] * numbers[free + r + i] + swing * swing
+        moving += numbers[v + i] * numbers[v + i]
+    numbers[SWUNG] = max(numbers[SWUNG], moving)
+    if total > INFLATED * numbers[SWUNG]:
+        energy = potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
+        numbers[SWUNG] = max(numbers[SWUNG], moving + 2.0 * abs(energy))
+    return 1 if total > INFLATED * numbers[SWUNG] else 0
 
 
 @compiled

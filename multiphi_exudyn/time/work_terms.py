@@ -6,6 +6,8 @@ D xi' (p, n), of what w_k and w_k' are multiplied by (p, 2 q), and of T_e and s_
 
 from __future__ import annotations
 
+import math
+
 from multiphi_exudyn.events.arrays import (
     AFTER,
     CHANNELS,
@@ -32,7 +34,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.response_arrays import SHAPES, state_of
+from multiphi_exudyn.mathematics.response_arrays import SHAPES
 from multiphi_exudyn.time.work_sums import dissipated
 
 __all__ = [
@@ -96,17 +98,28 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, first
 
 @compiled
 def dissipated_freely(ints: Ints, numbers: Numbers, waves: Waves, duration: float) -> float:
-    """The work of damping on the free response alone, without powers of time (work_sums.py)."""
-    level, start = ints[AFTER + LEVEL], ints[WORK_NUMBERS]
-    r, response, c = ints[level + MODES], ints[level + RESPONSE], ints[FLOW_WAVES]
-    end, work = start + 2 * r, ints[WORK_WAVES] + ints[FLOW_COUNT]
-    for k in range(2):
-        state_of(ints, numbers, waves, response, c, k * duration, start + 2 * r * k, start + 2 * r * k + r, work)
-    for i in range(2 * r):
-        before = numbers[start + i]
-        numbers[start + i] += numbers[end + i]
-        numbers[end + i] -= before
-    return dissipated(numbers, ints[level + DISSIPATED], r, start, end)
+    """The work of damping on the free response alone, without powers of time (work_sums.py).
+
+    Its change is summed from exp(lambda t) - 1: the difference of two states would be round-off in short segments.
+    """
+    level, sums, c = ints[AFTER + LEVEL], ints[WORK_NUMBERS], ints[FLOW_WAVES]
+    r, rates = ints[level + MODES], ints[ints[FLOW_BASIS] + RATES]
+    changes = sums + 2 * r
+    for i in range(4 * r):
+        numbers[sums + i] = 0.0
+    for j in range(ints[FLOW_FREE]):
+        rate, shape = waves[rates + j], ints[ints[level + RESPONSE] + SHAPES] + j * r
+        half, grown = math.sin(0.5 * rate.imag * duration), math.expm1(rate.real * duration)
+        turned = math.sin(rate.imag * duration) * (1.0 + grown)
+        change = waves[c + j] * complex(grown * (1.0 - 2.0 * half * half) - 2.0 * half * half, turned)
+        whole = 2.0 * waves[c + j] + change
+        for i in range(r):
+            place, speed = waves[shape + i], waves[shape + i] * rate
+            numbers[sums + i] += (place * whole).real
+            numbers[sums + r + i] += (speed * whole).real
+            numbers[changes + i] += (place * change).real
+            numbers[changes + r + i] += (speed * change).real
+    return dissipated(numbers, ints[level + DISSIPATED], r, sums, changes)
 
 
 @compiled

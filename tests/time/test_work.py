@@ -162,3 +162,14 @@ def test_works_are_those_of_one_run_where_another_had_the_arrays_meanwhile():
 def test_works_of_many_segments_lose_no_digits_in_their_sum():
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["harmonic"], t_end=400.0)
     assert abs(run.ledger.residual) < 1e-13 * run.ledger.work_of_loads
+
+
+def test_works_of_short_segments_are_no_differences_of_large_energies():
+    """A spring rides 20 m away on its belt: there a free response alone has 1e4 times the energy of the motion."""
+    belt = mp.Friction("belt", "m0", 0.24, stiffness=2e3, velocity=5.0)
+    model = mp.MultiPhiModel(chain(2, damping=np.diag([0.02, 0.05]), stiffness=1e-3), [belt], modes="all")
+    ridden = mp.simulate(model, 4.0, velocity=[5.0, 5.0])
+    pulse = mp.FunctionLoad("m0", lambda t: math.exp(-(((t - 4.001) / 2e-5) ** 2)), breaks=(4.0008, 4.0012))
+    run = mp.simulate(model, 4.002, loads=[pulse], start=ridden)
+    assert len(run.segments) > 1000
+    assert abs(run.ledger.residual) < 2e-12 * run.ledger.initial
