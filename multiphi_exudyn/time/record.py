@@ -37,7 +37,7 @@ STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 def _joined(name: str) -> property:
     """An array of a record."""
-    return property(lambda record: record.parts[name].whole)
+    return property(lambda record: record.whole(name))
 
 
 class Record:
@@ -92,13 +92,14 @@ class Record:
             taken += [part.bytes for part in self._parts.values()]
         return sum(taken)
 
-    @property
-    def parts(self) -> dict[str, Growing]:
-        """The arrays, each in the parts in which they were taken."""
-        if self._last or not self._parts:
+    def whole(self, name: str) -> np.ndarray:
+        """An array: what was taken, where that was taken at once."""
+        if not self._parts:
+            return self._last.get(name, EMPTY[name])
+        if self._last:
             part, self._last = self._last, {}
             self._add(part)
-        return self._parts
+        return self._parts[name].whole
 
     @property
     def eventless(self) -> bool:

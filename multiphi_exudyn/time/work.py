@@ -1,4 +1,4 @@
-"""Work of damping, of what varies in time and of friction over recorded segments, in closed form.
+"""Work of damping, of what varies in time and of friction over segments that the loop has left out, in closed form.
 
     damping   integral of xi'.D xi'
     varying   integral of sum_k  w_k a_k.xi' + w_k' (b_k.xi + c_k.xi' + d_k.xi'' + e_k)
@@ -9,7 +9,7 @@ f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so th
     f g = 1/2 Re sum_jk F_j G_k phi_j phi_k + F_j conj(G_k phi_k) phi_j
 
 and needs no exponentials but those at the end. Where no power of time is in the free response, its own share of damping
-is what a form that its level keeps has changed by (level_parts.primitive). A chain is a rate with its powers of time:
+is what a form that its level keeps has changed by (work_forms.primitive). A chain is a rate with its powers of time:
 the products of two chains are (t/T)^d exp(s t), s the sum of their rates, and d goes up to the sum of their degrees.
 """
 
