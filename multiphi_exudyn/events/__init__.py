@@ -33,5 +33,6 @@ The sentences themselves stand in decision, where an instant is decided: decide,
 Order: load_channels, excitation, pieces, channels, loaded_level, defect_forms, transition, state, exits, exit_table,
 loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact_sizes, impact, phases,
 changes, independence, bounces, rebounds, resting, striking, switching, at_rest, sticking, decision, waiting, start,
-channel_arrays, element_arrays, scratch_arrays, level_parts, level_records, level_tables, level_arrays, entering.
+channel_arrays, element_arrays, work_forms, scratch_arrays, level_parts, level_records, level_tables, level_arrays,
+entering.
 """

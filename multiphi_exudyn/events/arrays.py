@@ -14,8 +14,8 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
                                   (c, n + 1); energies as forms in xi, xi'; its response (response_arrays.py) and exits;
                                   the power of damping xi'.D xi', of what varies (q, 4 n + 1), and of friction
                                   f.xi', as in work.py, or -1 without any, and a primitive of that of damping in the
-                                  free response's coefficients (2 p, 2 p), or -1, with its speeds and what of it works
-                                  on w and w', (p, r + 2 q);
+                                  free response (2 r, 2 r), or -1, with its speeds and what of it works on w and w',
+                                  (p, r + 2 q), and primitives of the powers of what channels force (work_forms.py);
                                   its mobility F (r, r) where others hang on the structure, else -1 (impact.py)
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it;
@@ -74,6 +74,7 @@ SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # r
 COORDINATE_NUMBERS, COORDINATE_COUNT = 36, 37
 PHASE_INTS, PHASE_COUNT = 39, 40
 EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM = 42, 43, 44, 45
+LEFT_OUT, LEFT_OUT_COUNT = 71, 72  # segments of the record whose works are not summed
 
 # scratch memory: where it begins
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
@@ -81,6 +82,7 @@ FLOW_RECORD, FLOW_WAVES, FLOW_FORCED, FLOW_TERMS, FLOW_FROM = 53, 54, 55, 56, 57
 FLOW_STATE, FORCES, FORCED, FORCED_WORK, FORCED_ROOM, FORCED_WANTED, SCALED_TERM = range(
     105, 112
 )  # response to channels
+WORK_NUMBERS = 227  # of sums of works: u at the start and at the end, their sum, their difference, means
 SET_SIZES = 58  # of the terms of xi, xi' (2, n) after a map
 DRIVE, DRIVE_WAVES = (
     59,
@@ -107,7 +109,8 @@ FRICTIONS, STATIC_FRICTIONS = 212, 213  # of rigid contacts, zero of others
 PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; the state in which a contact closes
 COMPRESSED = 216  # a state, in all modes too: where an impact with friction and restitution has spent its first half
 UNMOVED = 224  # flags of elements that nothing lets move: nobody looks at their exits
-RUN_INTS = 225
+WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the segment under way are
+RUN_INTS = 228
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -117,8 +120,11 @@ TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-INDEPENDENCE = 44  # of directions of length one: what is left beside others, below which one follows from them
-RUN_NUMBERS = 45
+WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
+SWUNG = 47  # twice the largest energy so far, as far as it was looked for
+INDEPENDENCE = 48  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 49  # of the segment under way
+RUN_NUMBERS = 52
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -135,12 +141,13 @@ FREQUENCIES, PERIODS, MOTION, GAPS, SPEEDS, POTENTIAL, CARRIED, PATTERNS, HIGHES
 DISSIPATION, POWER, RUBBING = 20, 21, 22  # powers of damping, of what varies, of friction; zero while nobody asked
 RUBBINGS = 23  # how many forces of friction go with others in the last of them
 FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches that go with the force of a link, and their number
-DISSIPATED = 26  # form of what damping takes from the free response, -1 where there is none
+DISSIPATED = 26  # form in (eta, eta') of what damping takes from the free response, -1 where there is none
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
 FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
 STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
 SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
-LEVEL_INTS = 29
+DRIVEN = 29  # forms of the works of what channels force, -1 where there are none (work_forms.py)
+LEVEL_INTS = 30
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then
@@ -154,6 +161,9 @@ MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)
 STATE_INTS = 8
 
+DRIVEN_COUNT, NODE_COUNT, CARRIER_COUNT = 0, 1, 2  # N, nodes of a quadrature, carriers
+DRIVEN_RESPONSE, CHANGING_DAMPING, CHANGING_VARYING, LASTING_DAMPING, LASTING_VARYING, NODES, WEIGHTS = range(3, 10)
+CARRIERS = 10  # of each carrier its powers of time, and where its rate stands in the waves
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
 CHANGE_WIDTH = 3  # ints: element, state entered or SHARED, state left
 SHARED = -1
@@ -163,7 +173,7 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 8
 # ---------------------------------------------------------------------- answers
 
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
-NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM = 1, 2, 3, 4, 5
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM, NEED_POWERS = 1, 2, 3, 4, 5, 6
 NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE, MIXED, GAINING = range(1, 10)
 
 

@@ -17,12 +17,16 @@ PIECES_AT_ONCE = 1024  # packed when the loop comes to the end of those it knows
 
 
 class ChannelArrays:
-    """The channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece."""
+    """The channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece.
+
+    carriers: the same of each carrier by its rate, of the pieces packed so far.
+    """
 
     def __init__(self, levels: LoadedLevels) -> None:
         self._excitation, self._until = levels.excitation, levels.until
         self._pieces = Pieces(levels.excitation.histories, levels.drive.time, levels.until)
         self.terms = max((history.coefficients.shape[1] for history in levels.excitation.histories), default=0)
+        self.carriers: dict[complex, int] = {}
 
     def describe(self, buffers: Buffers) -> None:
         """How many there are, and memory for their values, in new buffers."""
@@ -46,6 +50,9 @@ class ChannelArrays:
         last = min(first + PIECES_AT_ONCE, len(all_))
         times = put("numbers", np.column_stack([all_.starts, all_.ends])[first:last])
         for places, terms in all_.terms(first, last):
+            for rates, given in terms:
+                for rate in np.unique(rates).tolist():
+                    self.carriers[rate] = max(self.carriers.get(rate, 0), given.shape[1])
             k, parts = len(places), [np.column_stack([rates, given.reshape(len(given), -1)]) for rates, given in terms]
             waves = np.hstack(parts)
             starts = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1] + np.arange(k)[:, None] * waves.shape[1]

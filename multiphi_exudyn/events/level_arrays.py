@@ -155,6 +155,7 @@ class LevelArrays:
                 a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * room),
                 a.COORDINATE_NUMBERS: ("numbers", 2 * n * room),
                 a.PHASE_INTS: ("ints", exits * room),
+                a.LEFT_OUT: ("ints", room),
                 a.EVENT_INTS: ("ints", a.EVENT_WIDTH * events),
                 a.EVENT_NUMBERS: ("numbers", a.EVENT_WIDTH_NUMBERS * events),
             }
@@ -164,6 +165,7 @@ class LevelArrays:
             self._let_others_go()
         ints = self.buffers.ints
         ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
+        ints[a.LEFT_OUT_COUNT] = 0
 
     def level(self, states: Sequence[int]) -> int:
         """Where the level of elements in these states stands in the ints, packed if it was not."""
@@ -193,6 +195,8 @@ class LevelArrays:
             self._add_entered(source, key[0])
         elif self.ints[a.NEEDED] == a.NEED_PIECES:
             self.channels.reserve(self.buffers)
+        elif self.ints[a.NEEDED] == a.NEED_POWERS:
+            self.add_powers(source)
         else:
             self._supply_room()
 
@@ -221,7 +225,7 @@ class LevelArrays:
     def add_powers(self, level: int) -> None:
         """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
-            put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
+            put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
 
     def add_sizes(self, level: int) -> None:
         """Pack what |y| is read from in a level that stands in the ints."""

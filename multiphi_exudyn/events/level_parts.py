@@ -10,12 +10,9 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 
-__all__ = ["base_parts", "from_base", "level_parts", "powers", "primitive", "swings"]
-
-LARGEST_PRIMITIVE = 1e3  # of the speeds in it, squared: what energies are made of is of their size; more is round-off
+__all__ = ["base_parts", "from_base", "level_parts", "powers"]
 
 
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
@@ -98,39 +95,3 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
     rubbing = np.array(pairs).reshape(-1, 4 * own.modes + 1)
     return damping, varying, -(level.pushes @ own.gap_rows), rubbing
-
-
-def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
-    """F (2 p, 2 p): u.F u / 2 grows by the work of damping in a free response; None where it has powers of time.
-
-    u = (Re z, Im z), z = c exp(lambda t) (p,). With the speeds S = V Lambda, in which eta' = Re S z,
-
-        eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
-
-    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
-    """
-    response, r = level.response, level.modes
-    rates, given = response.basis.rates, (damping[:r, :r] + damping[:r, :r].T) / 2
-    if np.any(response.basis.powers):
-        return None
-    speeds = response.shapes * rates
-    lengths, parts = np.linalg.norm(speeds, axis=0), []
-    for other, rate in ((speeds, rates), (speeds.conj(), rates.conj())):
-        power, sums = speeds.T @ given @ other, rates[:, None] + rate
-        if np.any(np.abs(power) > LARGEST_PRIMITIVE * np.outer(lengths, lengths) * np.abs(sums)):
-            return None
-        parts.append(np.divide(power, sums, out=np.zeros_like(power), where=power != 0))
-    a, b = parts
-    return np.block([[a.real + b.real, b.imag - a.imag], [-a.imag - b.imag, b.real - a.real]])
-
-
-def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
-    """Of each exponential of the free response, without powers of time (p, r + 2 q): eta', and what works on w and w'.
-
-    varying: the power of what varies (``powers``).
-    """
-    response, r, n = level.modal.response, level.modal.modes, level.level.modes
-    speeds = response.shapes * response.basis.rates
-    held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
-    moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)
-    return np.column_stack([speeds.T, (held @ speeds).T, moved.T])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -13,9 +13,10 @@ from multiphi_exudyn.events.defect_forms import factor, struck_defects
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import asked_state, signal_row, signals_of
-from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers, primitive, swings
+from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
+from multiphi_exudyn.events.work_forms import DrivenForms, driven_forms, primitive, swings
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics import basis_arrays, response_arrays
@@ -70,21 +71,35 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     return record
 
 
-def put_powers(buffers: Buffers, record: int, level: LoadedLevel) -> None:
-    """Give the record of a level the power of damping, of what varies and of friction."""
+def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapping[complex, int]) -> None:
+    """Give the record of a level the power of damping, of what varies and of friction, and their primitives."""
     damping, varying, rubbing, pairs = powers(level)
+    damping = (damping + damping.T) / 2
     dissipated = primitive(level.modal, damping)
     friction = np.append(rubbing, pairs)
     given = {
-        a.DISSIPATION: buffers.put("numbers", (damping + damping.T) / 2),
+        a.DISSIPATION: buffers.put("numbers", damping),
         a.POWER: buffers.put("numbers", varying),
         a.RUBBING: buffers.put("numbers", friction) if np.any(friction) else -1,
         a.RUBBINGS: len(pairs),
         a.DISSIPATED: -1 if dissipated is None or len(pairs) else buffers.put("numbers", dissipated),
         a.SWINGS: buffers.put("waves", swings(level, varying)),
+        a.DRIVEN: -1,
     }
+    if given[a.DISSIPATED] >= 0 and (forms := driven_forms(level, damping, varying, carriers)) is not None:
+        given[a.DRIVEN] = _put_driven(buffers, forms)
     for slot, value in given.items():
         buffers.ints[record + slot] = value
+
+
+def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
+    """The record of the forms of what channels force."""
+    arrays = (forms.response, *forms.changing, *forms.lasting, forms.nodes, forms.weights)
+    places = [buffers.put("numbers", array) for array in arrays]
+    rates = buffers.put("waves", list(forms.carriers))
+    carriers = [part for k, count in enumerate(forms.carriers.values()) for part in (count, rates + k)]
+    counts = [len(forms.lasting[0]) // 2, len(forms.nodes), len(forms.carriers)]
+    return buffers.put("ints", [*counts, *places, *carriers])
 
 
 def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:

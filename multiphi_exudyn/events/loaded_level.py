@@ -40,8 +40,8 @@ class StrainForm:
 
     def __call__(self, xi: np.ndarray) -> np.ndarray:
         """Of (n,) or of every column of (n, k)."""
-        stretched = (self.rows @ xi).T + self.offsets
-        return np.asarray((stretched * stretched) @ (0.5 * self.weights) + self.linear @ xi + self.constant)
+        stretched = self.rows.dot(xi).T + self.offsets
+        return np.asarray(0.5 * (stretched * stretched).dot(self.weights) + self.linear.dot(xi) + self.constant)
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ class LoadedLevel(Shown):
     def kinetic(self, velocity: np.ndarray) -> np.ndarray:
         """Kinetic energy [J] of (r + q,) or of every column."""
         moving = self.motion(velocity) if self._carries else self.split(velocity)[0]
-        return np.asarray(0.5 * (moving * moving).sum(axis=0))
+        return np.asarray(0.5 * np.add.reduce(moving * moving))
 
     @functools.cached_property
     def _carries(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.decision import ROUNDS
+from multiphi_exudyn.events.work_forms import MOST_COEFFICIENTS
 from multiphi_exudyn.mathematics import basis_arrays, zero_crossing
 from multiphi_exudyn.mathematics.complementarity import lay_out, problem_ints, problem_numbers
 
@@ -104,6 +105,7 @@ class ScratchArrays:
         return {
             "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
             | {a.ROWS: struck * wide, a.PUSHING: struck * wide if self._rough else 0, a.MOVED: wide, a.CHANGE: wide}
+            | {a.WORK_NUMBERS: 8 * n + 12 * MOST_COEFFICIENTS}
             | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
             | {a.CONSTANTS: signals, a.NOISES: signals}
             | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},

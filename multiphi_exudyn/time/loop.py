@@ -21,6 +21,7 @@ from multiphi_exudyn.events.arrays import (
     CURRENT,
     DECISIONS,
     DEFECTS,
+    DISSIPATION,
     DRIVE,
     DRIVE_NEXT,
     DRIVE_WAVES,
@@ -49,8 +50,10 @@ from multiphi_exudyn.events.arrays import (
     MODES,
     NEED,
     NEED_PIECES,
+    NEED_POWERS,
     NEED_ROOM,
     NEEDED,
+    NEEDED_FROM,
     NOISES,
     NOT_FINITE,
     OK,
@@ -68,6 +71,7 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     STARTING,
     STOP_AT_EVENT,
+    SUMMED,
     TIME,
     TOLD,
     TOO_LONG,
@@ -79,6 +83,7 @@ from multiphi_exudyn.events.arrays import (
     WINDOW,
     WORK,
     WORKED,
+    WORKING,
 )
 from multiphi_exudyn.events.bounces import only_bounces
 from multiphi_exudyn.events.changes import clear
@@ -95,6 +100,7 @@ from multiphi_exudyn.mathematics.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.zero_crossing import INSTANT, NONE, first_descent
 from multiphi_exudyn.time.loop_record import is_chatter, keep_events, keep_segment
+from multiphi_exudyn.time.work_sums import work_of_segment
 
 __all__ = ["advance"]
 
@@ -118,6 +124,8 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         status = OK
         if ints[PRESCRIBED] > 0 and numbers[TIME] >= piece_end(ints, numbers):
             status = next_piece(ints, numbers, waves, end)
+        if status >= 0 and ints[WORKING] == 1 and ints[ints[CURRENT + LEVEL] + DISSIPATION] == 0:
+            ints[NEEDED], ints[NEEDED_FROM], status = NEED_POWERS, ints[CURRENT + LEVEL], NEED
         if status >= 0:
             until = min(end, piece_end(ints, numbers)) if ints[PRESCRIBED] > 0 else end
             status = one_segment(ints, numbers, waves, until)
@@ -257,6 +265,7 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     if ints[PRESCRIBED] > 0:
         set_drive(ints, numbers, waves, ints[DRIVE_NEXT], reached, numbers[INSTANT_TIME], end)
     measure(ints, numbers, REACHED)
+    ints[SUMMED] = work_of_segment(ints, numbers, waves, reached) if ints[WORKING] == 1 else 0
     fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
     at_once = reached <= (INSTANT / fastest if fastest > 0.0 else 0.0)
     status = OK

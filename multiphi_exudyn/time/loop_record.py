@@ -22,6 +22,8 @@ from multiphi_exudyn.events.arrays import (
     EXIT_COUNT,
     INSTANT_TIME,
     KINETIC,
+    LEFT_OUT,
+    LEFT_OUT_COUNT,
     LEVEL,
     LOSSES,
     LOST,
@@ -42,11 +44,14 @@ from multiphi_exudyn.events.arrays import (
     SHARED,
     SPEED,
     STRAIN,
+    SUMMED,
     TIME,
     TOLD,
     TRUNCATED,
     WINDOW,
     WORK,
+    WORKS,
+    WORKS_NOW,
 )
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
@@ -82,6 +87,13 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) 
         numbers[kept + n + i] = numbers[ints[CURRENT + SPEED] + i]
     ints[COORDINATE_COUNT] += 2 * n
     ints[SEGMENT_COUNT] = k + 1
+    if ints[SUMMED] == 1:
+        numbers[WORKS + 1] += numbers[WORK]
+        for part in range(3):
+            numbers[WORKS + part] += numbers[WORKS_NOW + part]
+    else:
+        ints[ints[LEFT_OUT] + ints[LEFT_OUT_COUNT]] = k
+        ints[LEFT_OUT_COUNT] += 1
     numbers[TIME] = numbers[INSTANT_TIME]
     numbers[WORK] = 0.0
 

@@ -258,7 +258,10 @@ class _Worker:
 
     def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
         """A run on the thread's arrays."""
-        return Motion(self._arrays.get_or_build(levels, lambda: LevelArrays(levels)), start, compiled, self._loop)
+        arrays = self._arrays.get_or_build(levels, lambda: LevelArrays(levels))
+        motion = Motion(arrays, start, compiled, self._loop)
+        motion.sums_works = False  # an outcome has no ledger
+        return motion
 
     def _loop(self, *given: Any) -> Any:
         """The compiled loop, while others may go on."""

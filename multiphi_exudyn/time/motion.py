@@ -59,7 +59,8 @@ class Motion:
     """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
 
     compiled: False for the loop as plain Python. loop: what is called in its place. time [s]: how far it is. message:
-    why it goes no further, or "". start_loss: at a start without events. Nothing has happened before ``begin``, or
+    why it goes no further, or "". start_loss: at a start without events. sums_works: whether the loop sums the works
+    of segments, for a ledger; others are integrated when one is asked for. Nothing has happened before ``begin``, or
     ``advance``, is called.
     """
 
@@ -78,7 +79,7 @@ class Motion:
         self.time, self.message, self.start_loss = start.time, "", NOTHING
         self.record = Record(self.model.contacts, arrays)
         self._state: State | None = start.state
-        self._starting = True
+        self._starting = self.sums_works = True
         self._window, self._allowed = limits(self.model)
         self._kept = _Kept(self._at_first(start.time), 0, NO_RING, 0)
         self._evaluations = self._transitions = 0
@@ -109,6 +110,7 @@ class Motion:
         self.record = Record(self.model.contacts, self.arrays)
         numbers = self._kept.numbers.copy()
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
+        numbers[a.WORKS : a.WORKS + 3] = 0.0
         self._kept = _Kept(numbers, 0, NO_RING, self._kept.piece)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
@@ -130,7 +132,8 @@ class Motion:
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
         numbers = self._kept.numbers
-        segments = Recorded(self.record, float(numbers[a.DEFECTS]), float(numbers[a.TRUNCATED]))
+        defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
+        segments = Recorded(self.record, defects, truncated, tuple(works))
         events = Events(self.record)
         return Trajectory(
             model=self.model,
@@ -245,6 +248,7 @@ class Motion:
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
         ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
         ints[a.TRANSITIONS] = ints[a.GIVEN_UP] = 0
+        ints[a.WORKING] = int(self.sums_works)
         numbers[a.TIME] = self.time
         numbers[ints[a.FOUND] + 1] = 0.0
 

@@ -37,7 +37,7 @@ STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 def _joined(name: str) -> property:
     """An array of a record."""
-    return property(lambda record: record.parts[name].whole)
+    return property(lambda record: record.whole(name))
 
 
 class Record:
@@ -47,13 +47,14 @@ class Record:
     stand (-1: all armed).
     spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
     coordinates: xi, xi' of every start.
-    phases: of the starts at which some are not armed. kinds (m, 3): contact, state entered, or SHARED, state left.
+    phases: of the starts at which some are not armed. left_out: places of segments whose works the loop has not summed.
+    kinds (m, 3): contact, state entered, or SHARED, state left.
     amounts (m, 8): time [s], six losses [J], impulse [N s]. arrays: those of the loop.
     """
 
     def __init__(self, contacts: Sequence[Element], arrays: LevelArrays) -> None:
         self._contacts, self.arrays = contacts, arrays
-        self.count = 0  # of segments
+        self.count = self.left_out_count = 0  # of segments
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         self._parts: dict[str, Growing] = {}
@@ -61,6 +62,7 @@ class Record:
 
     rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
     phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
+    left_out = _joined("left_out")
 
     def take(self) -> None:
         """Take over what the loop has written."""
@@ -79,6 +81,7 @@ class Record:
         if "rows" in part:
             self._renumber(part["rows"][:, 0])
             self.count += len(part["rows"])
+            self.left_out_count += len(part.get("left_out", ()))
         vars(self).pop("places", None)
 
     @property
@@ -89,13 +92,14 @@ class Record:
             taken += [part.bytes for part in self._parts.values()]
         return sum(taken)
 
-    @property
-    def parts(self) -> dict[str, Growing]:
-        """The arrays, each in the parts in which they were taken."""
-        if self._last or not self._parts:
+    def whole(self, name: str) -> np.ndarray:
+        """An array: what was taken, where that was taken at once."""
+        if not self._parts:
+            return self._last.get(name, EMPTY[name])
+        if self._last:
             part, self._last = self._last, {}
             self._add(part)
-        return self._parts
+        return self._parts[name].whole
 
     @property
     def eventless(self) -> bool:
@@ -108,6 +112,8 @@ class Record:
             rows[:, 2] += parts["kinds"].count
             rows[:, 3] += parts["coordinates"].count
             rows[rows[:, 4] >= 0, 4] += parts["phases"].count
+            if "left_out" in part:
+                part["left_out"] += parts["rows"].count
         else:
             self._parts = parts = {name: Growing(empty) for name, empty in EMPTY.items()}
         for name, given in part.items():
@@ -186,24 +192,24 @@ class Record:
             total += found
         return total
 
-    def works(self) -> tuple[float, float, float]:
-        """Work [J] of damping, of what varies and of friction in all segments, and of what jumps at their starts."""
+    def works(self, places: np.ndarray) -> tuple[float, float, float]:
+        """Work [J] of damping, of what varies, jumps at their starts included, and of friction in segments (k,)."""
         total = np.zeros(3)
-        for offsets in self._packed(list(range(len(self.levels)))):
+        for offsets in self._packed(np.unique(self.rows[places, 0]).tolist()):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_powers(level)
             works = np.zeros(3)
-            while self._supply(works_of(*self._given(offsets), len(self.rows), self._work_memory(), works)):
+            while self._supply(works_of(*self._given(offsets), places, len(places), self._work_memory(), works)):
                 works[:] = 0.0
             total += works
         damping, varying, friction = total.tolist()
-        return damping, varying, friction - self._followed()
+        return damping, varying, friction - self._followed(places)
 
-    def _followed(self) -> float:
-        """What springs have taken up [J] in all segments in which their stretch goes with the force of a link."""
+    def _followed(self, places: np.ndarray) -> float:
+        """What springs have taken up [J] in segments (k,) in which their stretch goes with the force of a link."""
         given, total = [level.potential_form.follows for level in self.levels], 0.0
         for number in (k for k, rows in enumerate(given) if len(rows)):
-            own, n = np.flatnonzero(self.rows[:, 0] == number), given[number].shape[1] - 1
+            own, n = places[self.rows[places, 0] == number], given[number].shape[1] - 1
             for sign, after in ((-1, np.zeros(len(own))), (1, self.spans[own, 1] - self.spans[own, 0])):
                 x = self.states(own, after)[0][:, :n]
                 total += sign * 0.5 * float(np.sum((x @ given[number][:, :-1].T + given[number][:, -1]) ** 2))

@@ -51,12 +51,16 @@ class Made(Sequence[T], Generic[T]):
 
 
 class Recorded(Made[Segment], Segments):
-    """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments."""
+    """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments.
 
-    def __init__(self, record: Record, defects: float, truncated: float) -> None:
+    summed: works [J] of all that the record does not list as left out.
+    """
+
+    def __init__(self, record: Record, defects: float, truncated: float, summed: tuple[float, ...]) -> None:
         self._make, self._count, self._known = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
         self.defects, self.truncated = defects, truncated
+        self._summed, self._left_out = summed, record.left_out_count
 
     @functools.cached_property
     def starts(self) -> np.ndarray:
@@ -108,7 +112,11 @@ class Recorded(Made[Segment], Segments):
     @functools.cached_property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        return self._record.works()
+        damping, varying, friction = self._summed
+        if self._left_out:
+            further = self._record.works(self._record.left_out[: self._left_out])
+            damping, varying, friction = damping + further[0], varying + further[1], friction + further[2]
+        return damping, varying, friction
 
 
 class Events(Made[Event]):

@@ -16,6 +16,7 @@ EMPTY = {
     "spans": np.empty((0, a.SEGMENT_WIDTH_NUMBERS)),
     "coordinates": np.empty(0),
     "phases": np.empty(0, np.int64),
+    "left_out": np.empty(0, np.int64),
     "kinds": np.empty((0, a.EVENT_WIDTH), np.int64),
     "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
 }
@@ -25,21 +26,24 @@ PARTS = (  # where in the loop's arrays they begin, how many rows there are, how
     ("spans", a.SEGMENT_NUMBERS, a.SEGMENT_COUNT, a.SEGMENT_WIDTH_NUMBERS),
     ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT, 0),
     ("phases", a.PHASE_INTS, a.PHASE_COUNT, 0),
+    ("left_out", a.LEFT_OUT, a.LEFT_OUT_COUNT, 0),
     ("kinds", a.EVENT_INTS, a.EVENT_COUNT, a.EVENT_WIDTH),
     ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT, a.EVENT_WIDTH_NUMBERS),
 )
 EVENTS = PARTS[-2:]
+COUNTS = tuple(counted for _, _, counted, _ in PARTS)
 OF_NUMBERS = ("spans", "coordinates", "amounts")
 
 
 def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
     """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-    slots, parts = ints[: a.EVENT_ROOM + 1].tolist(), {}
+    slots, parts = ints[: a.LEFT_OUT_COUNT + 1].tolist(), {}
     for name, slot, counted, width in wanted:
         if rows := slots[counted]:
             start, buffer = slots[slot], numbers if name in OF_NUMBERS else ints
             part = buffer[start : start + rows * (width or 1)].copy()
             parts[name] = part.reshape(rows, width) if width else part
-    ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
+    for slot in COUNTS:
+        ints[slot] = 0
     return parts

@@ -1,8 +1,8 @@
 """Trajectory: what a simulation leaves, as analytic segments that can be asked at any time (eq. 38.4).
 
 Histories are asked for as histories.py says. Energies come from two independent sides: the ledger adds what was lost
-(impacts, truncation, damping, the last as a closed-form integral of eta'^T D eta') and what loads did; its residual is
-the difference to kinetic + strain.
+(impacts, truncation, damping, the last in closed form, work_sums.py) and what loads did; its residual is the
+difference to kinetic + strain.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ class Trajectory(ModelHistories):
             truncation_strain=losses.truncation_strain,
             damping=losses.damping + damped,
             friction=losses.friction + rubbed,
-            final=last.kinetic + float(last.level.strain(last.displacement)),
+            final=float(last.level.kinetic(last.velocity) + last.level.strain(last.displacement)),
         )
 
     def _static_work(self, last: State) -> float:

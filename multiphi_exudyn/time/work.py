@@ -1,4 +1,4 @@
-"""Work of damping, of what varies in time and of friction over recorded segments, in closed form.
+"""Work of damping, of what varies in time and of friction over segments that the loop has left out, in closed form.
 
     damping   integral of xi'.D xi'
     varying   integral of sum_k  w_k a_k.xi' + w_k' (b_k.xi + c_k.xi' + d_k.xi'' + e_k)
@@ -9,7 +9,7 @@ f(t) = Re sum_j F_j phi_j and g alike are sums of the flow's exponentials, so th
     f g = 1/2 Re sum_jk F_j G_k phi_j phi_k + F_j conj(G_k phi_k) phi_j
 
 and needs no exponentials but those at the end. Where no power of time is in the free response, its own share of damping
-is what a form that its level keeps has changed by (level_parts.primitive). A chain is a rate with its powers of time:
+is what a form that its level keeps has changed by (work_forms.primitive). A chain is a rate with its powers of time:
 the products of two chains are (t/T)^d exp(s t), s the sum of their rates, and d goes up to the sum of their degrees.
 """
 
@@ -43,10 +43,11 @@ from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES, expo
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import REACHED
 from multiphi_exudyn.time.resuming import resume
+from multiphi_exudyn.time.work_sums import INFLATED
 from multiphi_exudyn.time.work_terms import (
     add_constants,
     add_friction,
-    dissipated,
+    dissipated_freely,
     list_terms,
     swinging,
     swinging_alone,
@@ -56,7 +57,6 @@ from multiphi_exudyn.time.work_terms import (
 __all__ = ["integrate_works", "work_waves"]
 
 WIDEST = 1024.0  # times a segment's horizon, for a tenth of the terms
-INFLATED = 100.0  # times the largest energy of the motion, that of a free response: so much their difference loses
 UPWARDS_ABOVE = 0.5  # |s t| - d from which I_d follows from I_d-1: below, that loses d! / |s t|^d
 SERIES_ROUND_OFF = 1e-18  # of the first term of a power series: terms below it are left out
 
@@ -75,16 +75,19 @@ def integrate_works(
     spans: Numbers,
     coordinates: Numbers,
     offsets: Ints,
-    segments: int,
+    places: Ints,
+    count: int,
     scratch: Waves,
     works: Numbers,
 ) -> int:
     """Adds the works (3,) [J] of damping, of what varies with what jumped at the starts, and of friction; OK or NEED.
 
+    Of the segments ``places`` (count,), as far as their levels have offsets.
     scratch: ``work_waves`` of them.
     """
     largest = 0.0
-    for i in range(segments):
+    for which in range(count):
+        i = places[which]
         level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
         if level == 0:
             continue
@@ -103,7 +106,7 @@ def integrate_works(
         apart = 0  # terms whose products need no integral
         if ints[level + DISSIPATED] >= 0:
             apart = ints[FLOW_FREE]
-            works[0] += dissipated(ints, numbers, waves, scratch)
+            works[0] += dissipated_freely(ints, numbers, waves, duration)
         if apart == p and q == 0:
             continue
         list_terms(ints, numbers, waves, scratch, apart if ints[level + RUBBING] < 0 else 0)

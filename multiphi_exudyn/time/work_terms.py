@@ -6,6 +6,8 @@ D xi' (p, n), of what w_k and w_k' are multiplied by (p, 2 q), and of T_e and s_
 
 from __future__ import annotations
 
+import math
+
 from multiphi_exudyn.events.arrays import (
     AFTER,
     CHANNELS,
@@ -27,16 +29,18 @@ from multiphi_exudyn.events.arrays import (
     RUBBINGS,
     SPEED,
     SWINGS,
+    WORK_NUMBERS,
     WORK_WAVES,
 )
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import SHAPES
+from multiphi_exudyn.time.work_sums import dissipated
 
 __all__ = [
     "add_constants",
     "add_friction",
-    "dissipated",
+    "dissipated_freely",
     "list_terms",
     "swinging",
     "swinging_alone",
@@ -93,27 +97,29 @@ def list_terms(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves, first
 
 
 @compiled
-def dissipated(ints: Ints, numbers: Numbers, waves: Waves, scratch: Waves) -> float:
-    """(u + u_0).F (u - u_0) / 2 of the free response at the end u and at the start u_0 of the flow."""
-    p, c, phi, total = ints[FLOW_FREE], ints[FLOW_WAVES], ints[WORK_WAVES], 0.0
-    real = ints[ints[AFTER + LEVEL] + DISSIPATED]
-    imaginary = real + 2 * p * p
-    for j in range(p):
-        end = waves[c + j] * waves[phi + j]
-        scratch[j] = end - waves[c + j]
-        scratch[p + j] = end + waves[c + j]
-    for j in range(p):  # four sums that do not wait for each other
-        first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
-        for k in range(p):
-            change = scratch[k]
-            first += numbers[real + k] * change.real
-            second += numbers[real + p + k] * change.imag
-            third += numbers[imaginary + k] * change.real
-            fourth += numbers[imaginary + p + k] * change.imag
-        total += (first + second) * scratch[p + j].real + (third + fourth) * scratch[p + j].imag
-        real += 2 * p
-        imaginary += 2 * p
-    return 0.5 * total
+def dissipated_freely(ints: Ints, numbers: Numbers, waves: Waves, duration: float) -> float:
+    """The work of damping on the free response alone, without powers of time (work_sums.py).
+
+    Its change is summed from exp(lambda t) - 1: the difference of two states would be round-off in short segments.
+    """
+    level, sums, c = ints[AFTER + LEVEL], ints[WORK_NUMBERS], ints[FLOW_WAVES]
+    r, rates = ints[level + MODES], ints[ints[FLOW_BASIS] + RATES]
+    changes = sums + 2 * r
+    for i in range(4 * r):
+        numbers[sums + i] = 0.0
+    for j in range(ints[FLOW_FREE]):
+        rate, shape = waves[rates + j], ints[ints[level + RESPONSE] + SHAPES] + j * r
+        half, grown = math.sin(0.5 * rate.imag * duration), math.expm1(rate.real * duration)
+        turned = math.sin(rate.imag * duration) * (1.0 + grown)
+        change = waves[c + j] * complex(grown * (1.0 - 2.0 * half * half) - 2.0 * half * half, turned)
+        whole = 2.0 * waves[c + j] + change
+        for i in range(r):
+            place, speed = waves[shape + i], waves[shape + i] * rate
+            numbers[sums + i] += (place * whole).real
+            numbers[sums + r + i] += (speed * whole).real
+            numbers[changes + i] += (place * change).real
+            numbers[changes + r + i] += (speed * change).real
+    return dissipated(numbers, ints[level + DISSIPATED], r, sums, changes)
 
 
 @compiled

@@ -11,6 +11,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays
 from multiphi_exudyn.time import record
 from multiphi_exudyn.time.segment import Listed, listed
+from multiphi_exudyn.time.simulate import Run
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
 RIGID = (mp.UnilateralContact("below", "m2", 0.1), mp.UnilateralContact("above", {"m0": -1.0}, 0.15))
@@ -41,9 +42,12 @@ def run_of(damping, contacts, loads, t_end=5.0, start=(0.03, 0.06, -0.09)):
 
 
 def assert_works_of_segments(run):
+    """Of those that the loop has summed, and all integrated afterwards."""
     found, expected = listed(run.segments).works, Listed(tuple(run.segments)).works
+    integrated = run.segments._record.works(np.arange(len(run.segments)))
     size = np.max(np.abs(run.energy(np.linspace(0, run.t_end, 101)))) + abs(expected[1])
     assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
+    assert_allclose(integrated, expected, rtol=0, atol=1e-12 * size)
     assert abs(run.ledger.residual) <= 1e-12 * size
 
 
@@ -65,7 +69,7 @@ def test_works_of_samples_take_no_more_terms_than_a_straight_line_has():
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["samples"], t_end=3.97)
     series = run.segments.arrays.ints[arrays.FLOW_COUNT]
     assert_works_of_segments(run)
-    listed(run.segments)._record.works()
+    listed(run.segments)._record.works(np.arange(len(run.segments)))
     assert run.segments.arrays.ints[arrays.FLOW_COUNT] == 3 + 2 < series
 
 
@@ -103,9 +107,69 @@ def test_plain_python_gives_the_same(monkeypatch):
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["two carriers"])
     expected = run.segments.works
     monkeypatch.setattr(record, "works_of", record.works_of.function)
-    assert_allclose(run.segments._record.works(), expected, rtol=1e-13)
+    assert_allclose(run.segments._record.works(np.arange(len(run.segments))), expected, rtol=1e-13)
 
 
 def test_a_run_without_modes_does_no_work():
     run = mp.simulate(oscillator(), 1.0)
     assert run.segments.works == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
+@pytest.mark.parametrize("loads", [name for name in LOADS if name != "function"])
+def test_the_loop_sums_the_works_of_all_segments_under_the_usual_loads(loads, elements):
+    run = run_of(DAMPINGS["coupled"], elements, LOADS[loads])
+    assert len(run.segments._record.left_out) == 0
+
+
+def test_segments_at_resonance_are_left_out_and_integrated_when_asked_for():
+    omega = float(mp.MultiPhiModel(chain(3, stiffness=10.0), [], modes="all").level(()).omega[1])
+    run = run_of(DAMPINGS["none"], COMPLIANT, [mp.HarmonicLoad("m1", 2.0, omega / (2 * math.pi))])
+    assert len(run.segments._record.left_out) > 0
+    assert_works_of_segments(run)
+
+
+def test_plain_python_sums_the_same():
+    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), FRICTION, modes="all")
+    loads = [*LOADS["two carriers"], *LOADS["samples"]]
+    compiled, plain = (mp.simulate(model, 2.0, loads=loads, compiled=one).segments for one in (None, False))
+    assert_allclose(plain.works, compiled.works, rtol=1e-10)
+
+
+def test_a_run_asked_on_the_way_keeps_its_ledger_when_it_goes_on():
+    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), COMPLIANT, modes="all")
+    for loads in (LOADS["samples"], LOADS["function"]):
+        motion = Run(model, 3.0, np.array([0.03, 0.06, -0.09]), loads=loads).begun()
+        motion.advance(1.0)
+        early = motion.trajectory(1.0)
+        motion.advance(3.0)
+        late = motion.trajectory(3.0)
+        for run in (late, early):
+            assert_allclose(run.segments.works, Listed(tuple(run.segments)).works, rtol=0, atol=1e-12)
+            assert abs(run.ledger.residual) < 1e-12
+
+
+def test_works_are_those_of_one_run_where_another_had_the_arrays_meanwhile():
+    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), COMPLIANT, modes="all")
+    one, other = (Run(model, 3.0, factor * np.array([0.3, 0.6, -0.9]), loads=[]).begun() for factor in (1.0, 0.5))
+    for end in (1.0, 2.0, 3.0):
+        one.advance(end)
+        other.advance(end)
+    for motion in (one, other):
+        assert abs(motion.trajectory(3.0).ledger.residual) < 1e-13
+
+
+def test_works_of_many_segments_lose_no_digits_in_their_sum():
+    run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["harmonic"], t_end=400.0)
+    assert abs(run.ledger.residual) < 1e-13 * run.ledger.work_of_loads
+
+
+def test_works_of_short_segments_are_no_differences_of_large_energies():
+    """A spring rides 20 m away on its belt: there a free response alone has 1e4 times the energy of the motion."""
+    belt = mp.Friction("belt", "m0", 0.24, stiffness=2e3, velocity=5.0)
+    model = mp.MultiPhiModel(chain(2, damping=np.diag([0.02, 0.05]), stiffness=1e-3), [belt], modes="all")
+    ridden = mp.simulate(model, 4.0, velocity=[5.0, 5.0])
+    pulse = mp.FunctionLoad("m0", lambda t: math.exp(-(((t - 4.001) / 2e-5) ** 2)), breaks=(4.0008, 4.0012))
+    run = mp.simulate(model, 4.002, loads=[pulse], start=ridden)
+    assert len(run.segments) > 1000
+    assert abs(run.ledger.residual) < 2e-12 * run.ledger.initial

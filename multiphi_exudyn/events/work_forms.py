@@ -1,0 +1,214 @@
+"""Primitives of the powers in a level: forms whose changes over a segment are its works (time/work_sums.py).
+
+y = (eta, eta') of the free response, y' = A y, and a (N,) the coefficients of the channels' carriers at an instant,
+
+    w(t + s) = Re sum_j exp(mu_j s) sum_d a_jd s^d,   a' = M a
+
+(M a)_jd = mu_j a_jd + (d + 1) a_j,d+1. What channels force is Re G a, with G M = A G + B. A power of both,
+
+    Re(a.W y) + Re(a.Q a + a.Q~ conj(a)) / 2,   is d/dt of   Re(a.R y) + Re(a.P a + a.P~ conj(a)) / 2
+    M^T R + R A = W,   M^T P + P M = Q,   M^T P~ + P~ conj(M) = Q~
+
+row by row of R, element by element of P; where two rates cancel each other, products of their a are polynomials of
+time, which Gauss-Legendre quadrature integrates exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.level import Level
+
+__all__ = ["MOST_COEFFICIENTS", "DrivenForms", "driven_forms", "primitive", "swings"]
+
+LARGEST_PRIMITIVE = 1e3  # of the speeds in it, squared: what energies are made of is of their size; more is round-off
+MOST_COEFFICIENTS = 16  # N, of more it is not worth while
+NEARLY_CANCELLED = 1e-6  # of two rates: their sum, unless it is zero; primitives would be large differences
+
+
+@dataclass(frozen=True)
+class DrivenForms:
+    """Real forms in u = (Re a, Im a, y), (s,).
+
+    carriers: powers (D + 1) of time by their rates. response: G (2 r, 2 N). Of damping and of what varies changing:
+    rows a of the primitives (2 N, s); lasting: powers without one (2 N, 2 N). nodes, weights: on [0, 1], for these.
+    """
+
+    carriers: Mapping[complex, int]
+    response: np.ndarray
+    changing: Sequence[np.ndarray]
+    lasting: Sequence[np.ndarray]
+    nodes: np.ndarray
+    weights: np.ndarray
+
+
+def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
+    """F (2 r, 2 r): y.F y grows by the work of damping in a free response; None where it has powers of time.
+
+    Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, in which eta' = Re S z,
+
+        eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
+
+    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
+    """
+    response, r = level.response, level.modes
+    rates, given = response.basis.rates, (damping[:r, :r] + damping[:r, :r].T) / 2
+    if np.any(response.basis.powers):
+        return None
+    speeds = response.shapes * rates
+    lengths, parts = np.linalg.norm(speeds, axis=0), []
+    for other, rate in ((speeds, rates), (speeds.conj(), rates.conj())):
+        power, sums = speeds.T @ given @ other, rates[:, None] + rate
+        if np.any(np.abs(power) > LARGEST_PRIMITIVE * np.outer(lengths, lengths) * np.abs(sums)):
+            return None
+        parts.append(np.divide(power, sums, out=np.zeros_like(power), where=power != 0))
+    z = np.hstack([response.from_displacement, response.from_velocity])
+    parted = np.vstack([z.real, z.imag])
+    return np.asarray(parted.T @ _real(*parts) @ parted)
+
+
+def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
+    """Of each exponential of the free response, without powers of time (p, r + 2 q): eta', and what works on w and w'.
+
+    varying: the power of what varies (``powers``).
+    """
+    response, r, n = level.modal.response, level.modal.modes, level.level.modes
+    speeds = response.shapes * response.basis.rates
+    held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
+    moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)
+    return np.column_stack([speeds.T, (held @ speeds).T, moved.T])
+
+
+def driven_forms(
+    level: LoadedLevel, damping: np.ndarray, varying: np.ndarray, carriers: Mapping[complex, int]
+) -> DrivenForms | None:
+    """The forms of a level without powers of time, damping (n, n) and varying (q, 4 n + 1) as ``powers`` has them.
+
+    None where a carrier meets a pole, or there are too many.
+    """
+    q, r, n = level.excitation.prescribed, level.modal.modes, level.level.modes
+    if not 0 < sum(carriers.values()) * q <= MOST_COEFFICIENTS:
+        return None
+    chains, damped = _Chains(carriers, q), level.modal.damping_matrix
+    stiffness = np.diag(level.modal.squares) + level.modal.coupling
+    try:
+        with np.errstate(all="ignore"):
+            places = np.zeros((n, chains.count), complex)
+            places[:r] = chains.response(level, stiffness, damped)
+            places[r : r + q] = chains.values
+            speeds, drives = places @ chains.motion, np.vstack([chains.values, chains.values @ chains.motion])
+            a, b, c, d = (varying[:q, k * n : (k + 1) * n] for k in range(4))
+            pushed = np.vstack([a @ speeds, b @ places + c @ speeds + d @ (speeds @ chains.motion)])
+            on_place = np.vstack([np.zeros((q, r)), b[:, :r] - d[:, :r] @ stiffness])
+            on_speed = np.vstack([a[:, :r], c[:, :r] - d[:, :r] @ damped])
+            still = np.zeros((chains.count, r))
+            crossed = [
+                chains.crossed(still, 2 * speeds.T @ damping[:, :r], stiffness, damped),
+                chains.crossed(drives.T @ on_place, drives.T @ on_speed, stiffness, damped),
+            ]
+            squared = [chains.squared(speeds, damping @ speeds), chains.squared(drives, pushed)]
+    except np.linalg.LinAlgError:
+        return None
+    response = np.vstack([places[:r], speeds[:r]])
+    of_channels = np.hstack([response.real, -response.imag])
+    changing = [
+        np.hstack([form, np.vstack([rows.real, -rows.imag])]) for (form, _), rows in zip(squared, crossed, strict=True)
+    ]
+    lasting = [rest for _, rest in squared]
+    if not all(np.all(np.isfinite(part)) for part in (of_channels, *changing, *lasting)):
+        return None
+    nodes, weights = np.polynomial.legendre.leggauss(max(carriers.values()))
+    return DrivenForms(dict(carriers), of_channels, changing, lasting, (nodes + 1) / 2, weights / 2)
+
+
+class _Chains:
+    """The a (N,) of carriers with their powers, of q channels: carrier by carrier, power by power."""
+
+    def __init__(self, carriers: Mapping[complex, int], q: int) -> None:
+        self._q = q
+        self._terms = [(rate, d) for rate, count in carriers.items() for d in range(count)]
+        self.count = q * len(self._terms)
+        one, motion = np.eye(q), np.zeros((len(self._terms), len(self._terms)), complex)
+        for k, (rate, d) in enumerate(self._terms):
+            motion[k, k] = rate
+            if d:
+                motion[k - 1, k] = d
+        self.motion = np.kron(motion, one)  # M
+        self.values = np.kron([float(d == 0) for _, d in self._terms], one)  # w = Re values a
+
+    def _columns(self, k: int) -> slice:
+        return slice(k * self._q, (k + 1) * self._q)
+
+    def response(self, level: LoadedLevel, stiffness: np.ndarray, damped: np.ndarray) -> np.ndarray:
+        """The upper half (r, N) of G: eta'' + D eta' + S eta = P w + Q w'."""
+        r, channels = len(stiffness), level.channels
+        drives = self.values @ self.motion
+        pushes = channels.force[:, : self._q] @ self.values + channels.force_rate[:, : self._q] @ drives
+        found = np.zeros((r, self.count), complex)
+        for k, (rate, d) in enumerate(self._terms):
+            given = pushes[:, self._columns(k)]
+            if d:
+                given = given - d * (2 * rate * np.eye(r) + damped) @ found[:, self._columns(k - 1)]
+            if d > 1:
+                given = given - d * (d - 1) * found[:, self._columns(k - 2)]
+            found[:, self._columns(k)] = np.linalg.solve(_dynamic(rate, stiffness, damped), given)
+        return found
+
+    def crossed(
+        self, on_place: np.ndarray, on_speed: np.ndarray, stiffness: np.ndarray, damped: np.ndarray
+    ) -> np.ndarray:
+        """R (N, 2 r) of W = (on_place, on_speed)."""
+        r = len(stiffness)
+        found = np.zeros((self.count, 2 * r), complex)
+        for k, (rate, d) in enumerate(self._terms):
+            own = self._columns(k)
+            place, speed = on_place[own], on_speed[own]
+            if d:
+                before = d * found[self._columns(k - 1)]
+                place, speed = place - before[:, :r], speed - before[:, r:]
+            turned = np.linalg.solve(_dynamic(-rate, stiffness, damped).T, (rate * speed - place).T).T
+            found[own, r:] = turned
+            found[own, :r] = speed - turned @ (rate * np.eye(r) - damped)
+        return found
+
+    def squared(self, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of the power Re(one a).Re(other a), (k, N) each: its primitive in (Re a, Im a), and what of it has none."""
+        found, rest = self._primitive(one.T @ other, np.asarray)
+        mirrored, further = self._primitive(one.T @ other.conj(), np.conj)
+        return _real(found, mirrored), _real(rest, further)
+
+    def _primitive(self, power: np.ndarray, turned: Callable[[complex], Any]) -> tuple[np.ndarray, np.ndarray]:
+        """P (N, N) of Q, the rates of its second index ``turned``, and what of Q has none."""
+        found, rest = np.zeros_like(power), np.zeros_like(power)
+        for k, (rate, d) in enumerate(self._terms):
+            for j, (other, e) in enumerate(self._terms):
+                rows, columns, total = self._columns(k), self._columns(j), complex(rate + turned(other))
+                if total == 0:
+                    rest[rows, columns] = power[rows, columns]
+                    continue
+                if abs(total) < NEARLY_CANCELLED * (abs(rate) + abs(other)):
+                    raise np.linalg.LinAlgError("rates that nearly cancel")
+                given = power[rows, columns]
+                if d:
+                    given = given - d * found[self._columns(k - 1), columns]
+                if e:
+                    given = given - e * found[rows, self._columns(j - 1)]
+                found[rows, columns] = given / total
+        return found, rest
+
+
+def _dynamic(rate: complex, stiffness: np.ndarray, damped: np.ndarray) -> np.ndarray:
+    """rate^2 + D rate + S."""
+    return np.asarray(rate * (rate * np.eye(len(stiffness)) + damped) + stiffness)
+
+
+def _real(power: np.ndarray, conjugated: np.ndarray) -> np.ndarray:
+    """The form of Re(a.P a + a.P~ conj(a)) / 2 in (Re a, Im a)."""
+    upper = np.hstack([power.real + conjugated.real, conjugated.imag - power.imag])
+    lower = np.hstack([-power.imag - conjugated.imag, conjugated.real - power.real])
+    return 0.5 * np.vstack([upper, lower])
