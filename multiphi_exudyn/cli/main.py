@@ -127,7 +127,8 @@ def parser() -> argparse.ArgumentParser:
         "needs",
         _needs,
         "show what the reduced run of a scene needs: levels, coordinates, packages, memory",
-        "",
+        "Runs its first reduced model and prints how many of the possible levels it built, how many coordinates its "
+        "largest level has, its peak memory without M and K, and how much it imported.",
         "needs paper-rig bed-of-stops",
     )
     needs.add_argument("scenes", metavar="SCENE", nargs="*", help="shipped scenes or TOML files (default: all shipped)")

@@ -184,7 +184,8 @@ class MultiPhiModel(SharedBase, Shown):
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "degrees of freedom", str(self.structure.n)
         yield "contacts", names([contact.name for contact in self.contacts])
-        yield "modes", "to be chosen" if self.modes is None else str(self.modes)
+        chosen = f"{self.most_modes or 'all'}, chosen" if self.levels_built else "chosen at first use"
+        yield "modes", chosen if self.modes is None else str(self.modes)
         yield "levels built", f"{self.levels_built} of {self.levels_possible}"
 
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:

@@ -78,7 +78,7 @@ def simulate(
         A trajectory of the same model: its final state is handed on whole, what friction holds and what contacts wait
         for included, so that a truncated model too moves as it would have without the break. Time and the time of the
         loads go on from its t_end; the loads are not part of it: give them again, or others, which then begin with a
-        jump. Or an ``MultiPhiModel.equilibrium``: at rest there, with the springs of friction stretched; its forces are
+        jump. Or a ``MultiPhiModel.equilibrium``: at rest there, with the springs of friction stretched; its forces are
         not part of it.
 
     Returns

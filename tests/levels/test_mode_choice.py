@@ -39,6 +39,12 @@ def test_friction_takes_no_more_modes_than_a_rigid_contact(stiffness, modes):
 
 
 class TestDefault:
+    def test_is_shown_once_it_is_chosen(self):
+        model = rig(1e6)
+        assert "modes chosen at first use" in repr(model)
+        model.level(())
+        assert f"modes {model.most_modes}, chosen" in repr(model)
+
     @pytest.mark.parametrize("n", [4, 30])
     def test_all_modes_of_a_small_structure(self, n):
         model = mp.MultiPhiModel(chain(n), [stop(stiffness=1e3)])

@@ -222,7 +222,7 @@ def test_many_failures_are_cut_short_and_counted(monkeypatch):
     rows = [row("a", setting={"modes": i}, status="failed", message="why") for i in range(5)]
     text = text_of(render_study(result_of(rows)))
     assert text.count("failed why") == 2
-    assert "3 more are in the CSV file" in text
+    assert "3 more are in runs.csv" in text
 
 
 def test_how_it_was_measured_is_told_with_its_numbers(page):
@@ -273,7 +273,7 @@ def test_many_points_are_cut_short_and_counted():
     given = result_of(rows, [timing("a", 1.0, {"load": 7.0})])
     assert shown_points(given) == [{"load": 7.0}]
     assert len(shown_points(result_of(rows))) == 6
-    assert "Of 9 points of the scene's axes the sections by point show 1" in text_of(render_study(given))
+    assert "The sections below show 1 of the 9 points of the scene's axes" in text_of(render_study(given))
 
 
 def test_every_method_keeps_its_colour_and_marker_and_full_models_are_neutral(result):

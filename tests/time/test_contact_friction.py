@@ -328,7 +328,7 @@ class TestUniqueness:
                 tried.append(str(failure))
         assert len(tried) == 1
         share = 1 - 1.4 * 3 * 2 / (1 + 4 + 3)  # 1 - mu 3 sin cos / (1 + 3 cos^2)
-        assert f"leaves h.M^-1 (h - s mu h_t) = {share:.6g} h.M^-1 h" in tried[0]
+        assert f"h.M^-1 (h - s mu h_t) is {share:.6g} of h.M^-1 h" in tried[0]
 
 
 class TestRigidLevels:

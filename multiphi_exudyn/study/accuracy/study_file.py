@@ -28,8 +28,8 @@ class MethodSpec(Table):
     """One method: a model as in a scene file (without a name), and the axes of its settings."""
 
     name: Annotated[str, Field(min_length=1)]
-    model: dict[str, Any]
-    axes: dict[str, Values] = Field(default_factory=dict)
+    model: dict[str, Any]  # as an entry of models in a scene
+    axes: dict[str, Values] = Field(default_factory=dict)  # field of the model -> values, in every combination
     nearby: dict[str, Factors] = Field(default_factory=dict)  # field -> factors on its value
     refine: str | None = None  # field whose smaller values are finer: a setting lasts if all finer ones hold too
     quick: dict[str, Values] = Field(default_factory=dict)  # axes of the short form, in place of those of the same name
@@ -38,14 +38,14 @@ class MethodSpec(Table):
 class BudgetSpec(Table):
     """The ladder from the full model to the reduced one, one run a rung."""
 
-    modes: Annotated[int, Field(ge=1)] = 6
+    modes: Annotated[int, Field(ge=1)] = 6  # of the truncated models
 
 
 class QuickSpec(Table):
     """What the short form of a study changes."""
 
-    change: dict[str, Any] = Field(default_factory=dict)
-    axes: dict[str, Values] = Field(default_factory=dict)
+    change: dict[str, Any] = Field(default_factory=dict)  # field of the scene -> value
+    axes: dict[str, Values] = Field(default_factory=dict)  # place in the scene -> values, in place of the same axis
 
 
 class StudyFile(Table):
@@ -60,17 +60,17 @@ class StudyFile(Table):
     setting, beside the reference's.
     """
 
-    title: Annotated[str, Field(min_length=1)]
-    scene: str
-    change: dict[str, Any] = Field(default_factory=dict)
-    axes: dict[str, Values] = Field(default_factory=dict)
+    title: Annotated[str, Field(min_length=1)]  # the heading of its report
+    scene: str  # a shipped scene, or a TOML file beside the study
+    change: dict[str, Any] = Field(default_factory=dict)  # field of the scene -> value, for all runs
+    axes: dict[str, Values] = Field(default_factory=dict)  # place in the scene -> values
     reference: dict[str, Any] | None = None
     coarser: dict[str, Any] | None = None
     methods: tuple[MethodSpec, ...] = ()
     budget: BudgetSpec | None = None
-    window: Positive | None = None
+    window: Positive | None = None  # s; errors are ranked from 0 to here
     tolerances: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.1, 0.05, 0.02, 0.01)
-    time_limit_s: Positive = 300.0
+    time_limit_s: Positive = 300.0  # s, wall clock of one run
     timing: bool = True
     histories: bool = False
     maps: tuple[str, ...] = ()

@@ -26,7 +26,7 @@ from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
 __all__ = ["Needs", "needs_of", "needs_table"]
 
-HEADS = ("scene", "model", "levels", "coordinates", "memory", "own modules", "packages")
+HEADS = ("scene", "model", "levels built", "coordinates", "peak memory", "modules", "packages imported")
 
 
 @dataclass(frozen=True)

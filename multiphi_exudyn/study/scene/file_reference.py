@@ -18,6 +18,7 @@ __all__ = ["file_reference"]
 
 REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
 LIMITS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+MANY = 5  # kinds of values from which a field is said to take any
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
 
 
@@ -86,7 +87,8 @@ def _type(field: Mapping[str, Any]) -> str:
         return "table"
     options = field.get("anyOf") or field.get("oneOf")
     if options:
-        return " or ".join(dict.fromkeys(text for option in options if (text := _type(option)) != "none"))
+        words = dict.fromkeys(text for option in options if (text := _type(option)) != "none")
+        return " or ".join(words) if len(words) < MANY else "value"
     if "enum" in field or "const" in field:
         return " or ".join(f"`{value}`" for value in field.get("enum", [field.get("const")]))
     kind = field.get("type")
@@ -96,5 +98,5 @@ def _type(field: Mapping[str, Any]) -> str:
     if kind == "object":
         values = field.get("additionalProperties")
         return f"{{name: {_type(values)}}}" if isinstance(values, dict) else "table"
-    limits = "".join(f" {sign} {field[limit]:g}" for limit, sign in LIMITS.items() if limit in field)
+    limits = " and".join(f" {sign} {field[limit]:g}" for limit, sign in LIMITS.items() if limit in field)
     return f"{WORDS.get(str(kind), 'value')}{limits}"

@@ -22,7 +22,7 @@ class _Law(Table):
     """What every law has."""
 
     name: Name
-    at: Place
+    at: Place  # a point, or {point = coefficient, ...}
 
 
 class _FollowedLaw(_Law):
@@ -30,7 +30,7 @@ class _FollowedLaw(_Law):
 
     span: tuple[Finite, Finite]  # m, of q; beyond it the last segments go on
     tolerance: float | None = None  # of the largest force on the span
-    segments: int | None = None
+    segments: int | None = None  # number of straight segments; either this or a tolerance
 
 
 class TableLawSpec(_Law):

@@ -30,7 +30,7 @@ class HarmonicCourse(Table):
 
     kind: Literal["harmonic"]
     amplitude: Finite
-    frequency_hz: NotNegative
+    frequency_hz: NotNegative  # Hz
     phase: Finite = 0.0  # rad
 
 
@@ -56,9 +56,9 @@ class SweepCourse(Table):
 
     kind: Literal["sweep"]
     amplitude: Finite
-    start_hz: Positive
-    end_hz: Positive
-    duration: Positive
+    start_hz: Positive  # Hz
+    end_hz: Positive  # Hz
+    duration: Positive  # s
     law: Literal["linear", "logarithmic"] = "linear"
     tolerance: Annotated[float, Field(ge=1e-12, lt=1)] = 1e-6  # of a reduced model's response, of its largest value
 
@@ -71,26 +71,26 @@ class ConstantLoadSpec(Table):
     """A constant force [N] from t = 0 on."""
 
     kind: Literal["constant"]
-    at: Place
-    force: Finite
+    at: Place  # a point, or {point = coefficient, ...}
+    force: Finite  # N
 
 
 class HarmonicLoadSpec(HarmonicCourse):
     """A harmonic force; amplitude in N."""
 
-    at: Place
+    at: Place  # a point, or {point = coefficient, ...}
 
 
 class SampledLoadSpec(SampledCourse):
     """A sampled force; values in N."""
 
-    at: Place
+    at: Place  # a point, or {point = coefficient, ...}
 
 
 class SweepLoadSpec(SweepCourse):
     """A swept force; amplitude in N."""
 
-    at: Place
+    at: Place  # a point, or {point = coefficient, ...}
 
 
 class GravitySpec(Table):
@@ -105,16 +105,16 @@ class StopMotionSpec(Table):
     """A contact whose stop moves: its way [m] is taken from the gap."""
 
     kind: Literal["stop-motion"]
-    contact: Name
-    course: CourseSpec
+    contact: Name  # its name
+    course: CourseSpec  # z(t) [m], as a load is given
 
 
 class BaseMotionSpec(Table):
     """A base that moves; displacements are then relative to it, stops move with it unless they are named."""
 
     kind: Literal["base-motion"]
-    course: SmoothCourse
-    fixed_stops: tuple[Name, ...] = ()
+    course: SmoothCourse  # z(t) [m], harmonic or sweep
+    fixed_stops: tuple[Name, ...] = ()  # contacts whose stops do not move with the base
     direction: Place | None = None  # unit rigid-body motion of the base; a beam knows its own
 
 

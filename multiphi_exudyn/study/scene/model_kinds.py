@@ -116,7 +116,7 @@ class UserObjectModel(_Levels):
 
     kind: Literal["user-object"]
     step: Positive  # s
-    modes: Annotated[int, Field(ge=1)] | None = None
+    modes: Annotated[int, Field(ge=1)] | None = None  # none given: the scene's
 
 
 class FullModel(_Model):
@@ -126,7 +126,7 @@ class FullModel(_Model):
     beam: Literal["ancf", "geometrically-exact"] = "ancf"
     elements: Annotated[int, Field(ge=1)]  # of each beam
     step: Positive  # s
-    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0  # of generalised-alpha; 1: the trapezoidal rule
     newton_tolerance: Positive = 1e-5  # relative and absolute
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
@@ -173,7 +173,7 @@ class CraigBamptonModel(_Model):
     modes: Annotated[int, Field(ge=0)]  # with the interface held
     step: Positive  # s
     newton_tolerance: Positive = 1e-6  # relative and absolute
-    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0  # of generalised-alpha; 1: the trapezoidal rule
 
     lacks: ClassVar[tuple[Lack, ...]] = (no_sparse, no_loads, no_friction, no_damping, no_laws, single_points)
     penalty: ClassVar[bool] = True
@@ -183,9 +183,9 @@ class StepwiseModel(_Model):
     """The reduced equations of a Multi-Phi model integrated by scipy's solve_ivp; compliant contacts only."""
 
     kind: Literal["solve-ivp"]
-    modes: Modes | None = None
-    method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
-    rtol: RelativeTolerance
+    modes: Modes | None = None  # none given: the scene's
+    method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]  # of solve_ivp
+    rtol: RelativeTolerance  # its relative tolerance
 
     lacks: ClassVar[tuple[Lack, ...]] = (no_loads, no_friction, no_damping, no_laws)
     penalty: ClassVar[bool] = True

@@ -42,17 +42,17 @@ class ContactSpec(Table):
     """A contact, g = direction . x + gap, or ``count`` of them: "{i}" in the names stands for 1, 2, ... count."""
 
     name: Name
-    direction: Place
+    direction: Place  # a point, or {point = coefficient, ...}
     gap: Finite  # m, at x = 0
     stiffness: Stiffness  # N/m, or "rigid"
     damping: NotNegative = 0.0  # N s/m, of a compliant contact; it never pulls
     restitution: NotNegative = 0.0  # of a rigid contact, up to 1
     friction: NotNegative = 0.0  # mu, along ``tangential``, where it slides
-    tangential: Place | None = None
+    tangential: Place | None = None  # a point, or {point = coefficient, ...}; needed with friction
     static_friction: Positive | None = None  # up to which it sticks; none given: the same
     tangential_stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
     tangential_velocity: Finite = 0.0  # m/s, of the counter-surface along it
-    count: Annotated[int, Field(ge=1)] = 1
+    count: Annotated[int, Field(ge=1)] = 1  # how many contacts of this kind
 
     @property
     def row(self) -> tuple[ContactSpec, ...]:
@@ -72,7 +72,7 @@ class FrictionSpec(Table):
     """Dry friction along a direction: |T| <= limit, T = stiffness times the stretch of a spring in series."""
 
     name: Name
-    direction: Place
+    direction: Place  # a point, or {point = coefficient, ...}
     limit: Positive  # N, while it slips
     static_limit: Positive | None = None  # N, at which it begins to; none given: the same
     stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
@@ -82,16 +82,16 @@ class FrictionSpec(Table):
 class DisplacedStart(Table):
     """Static load at ``load_at``, as large as moves ``measured_at`` by ``displacement`` [m]."""
 
-    load_at: Name
-    measured_at: Name
-    displacement: NotZero
+    load_at: Name  # a point
+    measured_at: Name  # a point
+    displacement: NotZero  # m
 
 
 class LoadedStart(Table):
     """Static load ``force`` [N] at ``load_at``."""
 
-    load_at: Name
-    force: NotZero
+    load_at: Name  # a point
+    force: NotZero  # N
 
 
 StartSpec = Annotated[
@@ -103,15 +103,15 @@ StartSpec = Annotated[
 class ModalDampingSpec(Table):
     """Damping ratios of the open level's modes, lowest first, as fractions."""
 
-    modal_ratios: tuple[NotNegative, ...]
-    beyond: NotNegative | None = None
+    modal_ratios: tuple[NotNegative, ...]  # 0.01 is 1 %
+    beyond: NotNegative | None = None  # of all further modes; none given: undamped
 
 
 class RayleighDampingSpec(Table):
     """C = alpha M + beta K."""
 
-    alpha: NotNegative
-    beta: NotNegative
+    alpha: NotNegative  # 1/s
+    beta: NotNegative  # s
 
 
 DampingSpec = Annotated[
@@ -134,7 +134,7 @@ class OutputSpec(Table):
 class ComparisonSpec(Table):
     """Which model plays which part."""
 
-    reference: Name
+    reference: Name  # the model that all others are measured against
     coarser: Name | None = None  # its difference to the reference is the reference's own uncertainty
     cheapest: tuple[Name, ...] = ()  # the full model at its cheapest fair setting, at nearby steps
 
@@ -142,8 +142,8 @@ class ComparisonSpec(Table):
 class SceneFile(Table):
     """A whole scene file."""
 
-    title: Annotated[str, Field(min_length=1)]
-    modes: Annotated[int, Field(ge=1)] = 6
+    title: Annotated[str, Field(min_length=1)]  # the heading of its report
+    modes: Annotated[int, Field(ge=1)] = 6  # of each reduced model that has no number of its own
     structure: StructureSpec
     contacts: tuple[ContactSpec, ...] = ()
     force_laws: tuple[LawSpec, ...] = ()

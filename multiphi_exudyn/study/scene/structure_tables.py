@@ -38,7 +38,7 @@ TieSpec = Annotated[dict[Name, NotZero], Field(min_length=1, max_length=2)]  # t
 class RigStructure(Table):
     """The paper's rig by one of its parameter sets, with its support, its clamp and its measured damping."""
 
-    rig: Literal["measured-free", "printed-pinned", "as-published"]
+    rig: Literal["measured-free", "printed-pinned", "as-published"]  # the parameter set
     support_stiffness: Stiffness  # N/m
     clamp_translation: Stiffness = math.inf  # N/m
     clamp_rotation: Stiffness = math.inf  # N m/rad
@@ -47,41 +47,41 @@ class RigStructure(Table):
 class RectangleSection(Table):
     """A piece of rectangular beam, ``height`` along z."""
 
-    start: Finite
-    end: Finite
-    width: Positive
-    height: Positive
-    youngs_modulus: Positive
-    density: Positive
+    start: Finite  # m
+    end: Finite  # m
+    width: Positive  # m
+    height: Positive  # m
+    youngs_modulus: Positive  # Pa
+    density: Positive  # kg/m3
     poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
 
 
 class GeneralSection(Table):
     """A piece of beam by its section values."""
 
-    start: Finite
-    end: Finite
-    area: Positive
-    second_moment: Positive
-    youngs_modulus: Positive
-    density: Positive
-    shear_modulus: Positive
-    shear_factor: Positive = 5 / 6
+    start: Finite  # m
+    end: Finite  # m
+    area: Positive  # m2
+    second_moment: Positive  # m4
+    youngs_modulus: Positive  # Pa
+    density: Positive  # kg/m3
+    shear_modulus: Positive  # Pa
+    shear_factor: Positive = 5 / 6  # k in the shear stiffness k G A
 
 
 class MassSpec(Table):
     """A point mass with rotary inertia."""
 
-    at: Finite
-    mass: NotNegative
-    inertia: NotNegative = 0.0
+    at: Finite  # m
+    mass: NotNegative  # kg
+    inertia: NotNegative = 0.0  # kg m2
 
 
 class ClampSpec(Table):
     """Stiffness of the beam's first end; infinite is ideally rigid."""
 
-    translation: NotNegative | Stiffness = math.inf
-    rotation: NotNegative | Stiffness = math.inf
+    translation: NotNegative | Stiffness = math.inf  # N/m
+    rotation: NotNegative | Stiffness = math.inf  # N m/rad
 
 
 SectionSpec = Annotated[
@@ -93,8 +93,8 @@ SectionSpec = Annotated[
 class PointRow(Table):
     """``count`` points at equal distances; "{i}" in their name stands for 1, 2, ... count."""
 
-    first: Finite
-    last: Finite
+    first: Finite  # m
+    last: Finite  # m
     count: Annotated[int, Field(ge=2)]
 
 
@@ -102,7 +102,7 @@ class BeamSpec(Table):
     """A straight planar beam in full."""
 
     sections: Annotated[tuple[SectionSpec, ...], Field(min_length=1)]
-    points: Annotated[dict[Name, Finite | PointRow], Field(min_length=1)]
+    points: Annotated[dict[Name, Finite | PointRow], Field(min_length=1)]  # name = x [m]
     masses: tuple[MassSpec, ...] = ()
     clamp: ClampSpec = ClampSpec()
 
