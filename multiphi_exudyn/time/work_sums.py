@@ -145,7 +145,7 @@ def is_inflated(ints: Ints, numbers: Numbers, free: int) -> int:
     if total > INFLATED * numbers[SWUNG]:
         energy = potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
         numbers[SWUNG] = max(numbers[SWUNG], moving + 2.0 * abs(energy))
-    return 1 if total > INFLATED * numbers[SWUNG] else 0
+    return 0 if total <= INFLATED * numbers[SWUNG] else 1
 
 
 @compiled
