@@ -161,9 +161,9 @@ MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)
 STATE_INTS = 8
 
-DRIVEN_COUNT, NODE_COUNT, CARRIER_COUNT = 0, 1, 2  # N, nodes of a quadrature, carriers
+DRIVEN_COUNT, NODE_COUNT, CARRIER_COUNT = 0, 1, 2  # coefficients, nodes of a quadrature, carriers
 DRIVEN_RESPONSE, CHANGING_DAMPING, CHANGING_VARYING, LASTING_DAMPING, LASTING_VARYING, NODES, WEIGHTS = range(3, 10)
-CARRIERS = 10  # of each carrier its powers of time, and where its rate stands in the waves
+CARRIERS, CARRIER_WIDTH = 10, 3  # of each its powers of time, where its rate stands in the waves, 2 for one not real
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
 CHANGE_WIDTH = 3  # ints: element, state entered or SHARED, state left
 SHARED = -1

@@ -97,8 +97,9 @@ def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
     arrays = (forms.response, *forms.changing, *forms.lasting, forms.nodes, forms.weights)
     places = [buffers.put("numbers", array) for array in arrays]
     rates = buffers.put("waves", list(forms.carriers))
-    carriers = [part for k, count in enumerate(forms.carriers.values()) for part in (count, rates + k)]
-    counts = [len(forms.lasting[0]) // 2, len(forms.nodes), len(forms.carriers)]
+    parts = [1 + bool(rate.imag) for rate in forms.carriers]  # real, and imaginary
+    carriers = np.column_stack([list(forms.carriers.values()), rates + np.arange(len(parts)), parts]).ravel().tolist()
+    counts = [len(forms.lasting[0]), len(forms.nodes), len(forms.carriers)]
     return buffers.put("ints", [*counts, *places, *carriers])
 
 

@@ -33,10 +33,10 @@ NEARLY_CANCELLED = 1e-6  # of two rates: their sum, unless it is zero; primitive
 
 @dataclass(frozen=True)
 class DrivenForms:
-    """Real forms in u = (Re a, Im a, y), (s,).
+    """Real forms in u = (b, y), (s,), b (k,) of each carrier Re a, and Im a where its rate is not real.
 
-    carriers: powers (D + 1) of time by their rates. response: G (2 r, 2 N). Of damping and of what varies changing:
-    rows a of the primitives (2 N, s); lasting: powers without one (2 N, 2 N). nodes, weights: on [0, 1], for these.
+    carriers: powers (D + 1) of time by their rates. response: G (2 r, k). Of damping and of what varies changing: rows
+    b of the primitives (k, s); lasting: powers without one (k, k). nodes, weights: on [0, 1], for these.
     """
 
     carriers: Mapping[complex, int]
@@ -115,11 +115,13 @@ def driven_forms(
     except np.linalg.LinAlgError:
         return None
     response = np.vstack([places[:r], speeds[:r]])
-    of_channels = np.hstack([response.real, -response.imag])
+    kept = chains.kept
+    of_channels = np.hstack([response.real, -response.imag])[:, kept]
     changing = [
-        np.hstack([form, np.vstack([rows.real, -rows.imag])]) for (form, _), rows in zip(squared, crossed, strict=True)
+        np.hstack([form[:, kept], np.vstack([rows.real, -rows.imag])])[kept]
+        for (form, _), rows in zip(squared, crossed, strict=True)
     ]
-    lasting = [rest for _, rest in squared]
+    lasting = [rest[kept][:, kept] for _, rest in squared]
     if not all(np.all(np.isfinite(part)) for part in (of_channels, *changing, *lasting)):
         return None
     nodes, weights = np.polynomial.legendre.leggauss(max(carriers.values()))
@@ -130,7 +132,7 @@ class _Chains:
     """The a (N,) of carriers with their powers, of q channels: carrier by carrier, power by power."""
 
     def __init__(self, carriers: Mapping[complex, int], q: int) -> None:
-        self._q = q
+        self._q, self._carriers = q, carriers
         self._terms = [(rate, d) for rate, count in carriers.items() for d in range(count)]
         self.count = q * len(self._terms)
         one, motion = np.eye(q), np.zeros((len(self._terms), len(self._terms)), complex)
@@ -140,6 +142,16 @@ class _Chains:
                 motion[k - 1, k] = d
         self.motion = np.kron(motion, one)  # M
         self.values = np.kron([float(d == 0) for _, d in self._terms], one)  # w = Re values a
+
+    @property
+    def kept(self) -> list[int]:
+        """Which of (Re a, Im a) are in b, in their order there."""
+        kept, first = list[int](), 0
+        for rate, count in self._carriers.items():
+            own = range(first, first + count * self._q)
+            kept += [*own, *(self.count + k for k in own if rate.imag)]
+            first += count * self._q
+        return kept
 
     def _columns(self, k: int) -> slice:
         return slice(k * self._q, (k + 1) * self._q)

@@ -1,6 +1,6 @@
 """Works of a segment as it ends, by what the primitives of its powers have changed by (events/work_forms.py).
 
-    damping   y.F y + the change of Re(a.R y) + Re(a.P a + a.P~ conj(a)) / 2
+    damping   y.F y + Re(a.R y) + Re(a.P a + a.P~ conj(a)) / 2
     varying   the same without F, and what is constant in it times what w has changed by
     friction  its constant forces times what xi has changed by
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
     CARRIER_COUNT,
+    CARRIER_WIDTH,
     CARRIERS,
     CHANGING_DAMPING,
     CHANGING_VARYING,
@@ -59,7 +60,7 @@ def work_of_segment(ints: Ints, numbers: Numbers, waves: Waves, duration: float)
     r, forms = ints[level + MODES], ints[level + DRIVEN]
     if ints[level + DISSIPATED] < 0 or (q > 0 and forms < 0):
         return 0
-    count = 2 * ints[forms + DRIVEN_COUNT] if q > 0 else 0
+    count = ints[forms + DRIVEN_COUNT] if q > 0 else 0
     size = count + 2 * r
     first, sums, changes = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + 2 * size, ints[WORK_NUMBERS] + 3 * size
     if q > 0 and list_coefficients(ints, numbers, waves, forms, ints[DRIVE_WAVES], first) == 0:
@@ -99,21 +100,23 @@ def work_of_segment(ints: Ints, numbers: Numbers, waves: Waves, duration: float)
 
 @compiled
 def list_coefficients(ints: Ints, numbers: Numbers, waves: Waves, forms: int, terms: int, result: int) -> int:
-    """a of the present piece's terms, (Re a, Im a); 0 where they are of other carriers than the forms, else 1."""
-    count, q, piece = ints[forms + DRIVEN_COUNT], ints[PRESCRIBED], ints[PIECE_NOW]
-    for i in range(2 * count):
+    """b of the present piece's terms; 0 where they are of other carriers than the forms, else 1."""
+    q, piece = ints[PRESCRIBED], ints[PIECE_NOW]
+    for i in range(ints[forms + DRIVEN_COUNT]):
         numbers[result + i] = 0.0
     for term in range(ints[piece + PIECE_TERMS]):
         wanted, rate = ints[piece + TERM_INTS + 2 * term], waves[ints[piece + TERM_INTS + 2 * term + 1]]
         place, found = result, 0
         for c in range(ints[forms + CARRIER_COUNT]):
-            powers = ints[forms + CARRIERS + 2 * c]
-            if waves[ints[forms + CARRIERS + 2 * c + 1]] == rate and powers >= wanted:
+            carrier = forms + CARRIERS + c * CARRIER_WIDTH
+            size, parts = ints[carrier] * q, ints[carrier + 2]
+            if waves[ints[carrier + 1]] == rate and ints[carrier] >= wanted:
                 found = 1
                 for k in range(wanted * q):
                     numbers[place + k] = waves[terms + k].real
-                    numbers[place + count + k] = waves[terms + k].imag
-            place += powers * q
+                    if parts == 2:
+                        numbers[place + size + k] = waves[terms + k].imag
+            place += parts * size
         if found == 0:
             return 0
         terms += wanted * q
@@ -124,12 +127,14 @@ def list_coefficients(ints: Ints, numbers: Numbers, waves: Waves, forms: int, te
 def free_state(ints: Ints, numbers: Numbers, state: int, forms: int, count: int, result: int) -> None:
     """y behind the ``count`` coefficients of u."""
     r, row = ints[ints[state + LEVEL] + MODES], ints[forms + DRIVEN_RESPONSE] if count > 0 else 0
-    for i in range(2 * r):
-        value = numbers[ints[state + PLACE] + i] if i < r else numbers[ints[state + SPEED] + i - r]
-        for k in range(count):
-            value -= numbers[row + k] * numbers[result + k]
-        numbers[result + count + i] = value
-        row += count
+    for part in range(2):
+        given, free = ints[state + PLACE + part], result + count + part * r
+        for i in range(r):
+            value = numbers[given + i]
+            for k in range(count):
+                value -= numbers[row + k] * numbers[result + k]
+            numbers[free + i] = value
+            row += count
 
 
 @compiled
@@ -145,7 +150,7 @@ def is_inflated(ints: Ints, numbers: Numbers, free: int) -> int:
     if total > INFLATED * numbers[SWUNG]:
         energy = potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
         numbers[SWUNG] = max(numbers[SWUNG], moving + 2.0 * abs(energy))
-    return 1 if total > INFLATED * numbers[SWUNG] else 0
+    return 0 if total <= INFLATED * numbers[SWUNG] else 1
 
 
 @compiled
@@ -167,7 +172,7 @@ def dissipated(numbers: Numbers, form: int, r: int, sums: int, changes: int) -> 
 
 @compiled
 def changed(numbers: Numbers, rows: int, count: int, size: int, sums: int, changes: int) -> float:
-    """What a.B u changes by, B (count, size), from the sum and the difference of u."""
+    """What b.B u changes by, B (count, size), from the sum and the difference of u."""
     total = 0.0
     for i in range(count):
         of_change, of_sum = 0.0, 0.0
@@ -181,24 +186,23 @@ def changed(numbers: Numbers, rows: int, count: int, size: int, sums: int, chang
 
 @compiled
 def shift(ints: Ints, numbers: Numbers, forms: int, delay: float, given: int, result: int) -> None:
-    """a as it is a delay [s] later, but for what its carriers turn by: synthetic division."""
-    q, count = ints[PRESCRIBED], 2 * ints[forms + DRIVEN_COUNT]
-    for i in range(count):
+    """b as it is a delay [s] later, but for what its carriers turn by: synthetic division."""
+    q, place = ints[PRESCRIBED], result
+    for i in range(ints[forms + DRIVEN_COUNT]):
         numbers[result + i] = numbers[given + i]
-    for part in range(2):
-        place = result + part * (count // 2)
-        for c in range(ints[forms + CARRIER_COUNT]):
-            powers = ints[forms + CARRIERS + 2 * c]
-            for lowest in range(powers - 1):
-                for d in range(powers - 2, lowest - 1, -1):
+    for c in range(ints[forms + CARRIER_COUNT]):
+        carrier = forms + CARRIERS + c * CARRIER_WIDTH
+        for _ in range(ints[carrier + 2]):
+            for lowest in range(ints[carrier] - 1):
+                for d in range(ints[carrier] - 2, lowest - 1, -1):
                     for k in range(q):
                         numbers[place + d * q + k] += delay * numbers[place + (d + 1) * q + k]
-            place += powers * q
+            place += ints[carrier] * q
 
 
 @compiled
 def squared(numbers: Numbers, form: int, count: int, given: int) -> float:
-    """a.Z a, Z (count, count)."""
+    """b.Z b, Z (count, count)."""
     total = 0.0
     for i in range(count):
         part = 0.0
