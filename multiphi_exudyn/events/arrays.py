@@ -117,8 +117,9 @@ TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
 LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-INDEPENDENCE = 44  # of directions of length one: what is left beside others, below which one follows from them
-RUN_NUMBERS = 45
+GIVEN_ENERGY = 44  # kinetic and strain energy [J] that the run was given, less the potential of static loads
+INDEPENDENCE = 45  # of directions of length one: what is left beside others, below which one follows from them
+RUN_NUMBERS = 46
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 

@@ -137,7 +137,7 @@ class LevelArrays:
     def chatter(self) -> tuple[int, np.ndarray]:
         """The decisions so far, and what stands in the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
-        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
+        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
     @property

@@ -5,7 +5,7 @@ constant or vary in time. A record keeps what the loop has done; a trajectory sa
 loop's own flow. What its truncated modes could not hold, and what to distrust in it, is read off it.
 
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, resuming,
-sampling, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, start, model_histories, trajectory,
-defects, truncation, chatter, loop_record, loop, going_on, failures, motion, refinement, rubbing, known_warnings,
-reliability, simulate, many.
+sampling, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, start, model_histories, ending,
+trajectory, defects, truncation, chatter, loop_record, loop, going_on, failures, motion, refinement, rubbing,
+known_warnings, reliability, simulate, many.
 """

@@ -79,7 +79,8 @@ class Record:
         if "rows" in part:
             self._renumber(part["rows"][:, 0])
             self.count += len(part["rows"])
-        vars(self).pop("places", None)
+        if "kinds" in part:
+            vars(self).pop("places", None)
 
     @property
     def bytes(self) -> int:

@@ -158,13 +158,13 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
 
 def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance | None) -> list[str]:
     """Of the energy that truncation took, whatever its sign at an instant, and of the motion that it did."""
-    samples, found = Samples(segments, trajectory.t_end), list[str]()
-    at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
-    at_events = segments.truncated
+    at_start, at_events = trajectory.ending.truncated_at_start, segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
     lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
-    if lost > 0 and lost > ENERGY_SHARE * abs(given := trajectory.initial_energy):
+    samples = Samples(segments, trajectory.t_end)
+    found: list[str] = []
+    if lost > 0 and lost > ENERGY_SHARE * abs(given := _given_energy(trajectory)):
         alone = _left_alone(trajectory, segments)
         found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
     if defects != 0:
@@ -173,6 +173,11 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
         if not samples.amplitude_exceeds(size / least, math.sqrt(y.dot(y)) - size):
             found += _truncation(trajectory, indicator(defects, samples), tolerance)
     return found
+
+
+def _given_energy(trajectory: Trajectory) -> float:
+    """Kinetic and strain energy [J] at the start."""
+    return trajectory.ending.given_energy + float(trajectory.load.dot(trajectory.start.displacement))
 
 
 def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
