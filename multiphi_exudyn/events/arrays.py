@@ -119,7 +119,8 @@ LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
 GIVEN_ENERGY = 44  # kinetic and strain energy [J] that the run was given, less the potential of static loads
 INDEPENDENCE = 45  # of directions of length one: what is left beside others, below which one follows from them
-RUN_NUMBERS = 46
+MEAN_SQUARE, LARGEST_ENERGY = 46, 47  # of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 48
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -140,7 +141,8 @@ DISSIPATED = 26  # form of what damping takes from the free response, -1 where t
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
 FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
 STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
-SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
+SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|, then the row (n + 1,) with
+#             which static loads work on y; zero while nobody asked
 LEVEL_INTS = 29
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6

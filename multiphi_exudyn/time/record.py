@@ -18,7 +18,7 @@ from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
-from multiphi_exudyn.time.sampling import sample_rows, sample_squares, sample_states
+from multiphi_exudyn.time.sampling import sample_rows, sample_sizes, sample_states
 from multiphi_exudyn.time.segment import Segment, owners
 from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
@@ -27,7 +27,7 @@ __all__ = ["PHASES", "Record"]
 
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
-states_of, values_of, squares_of = entry(sample_states), entry(sample_rows), entry(sample_squares)
+states_of, values_of, sizes_of = entry(sample_states), entry(sample_rows), entry(sample_sizes)
 works_of = entry(integrate_works)
 
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
@@ -176,16 +176,17 @@ class Record:
                 pass
         return result
 
-    def mean_square(self, end: float, count: int) -> float:
-        """Mean of |y|^2 up to ``end`` [s], see ``Segments``."""
-        total = 0.0
+    def sizes(self, end: float, count: int) -> tuple[float, float]:
+        """Mean of |y|^2 and largest energy up to ``end`` [s], see ``Segments``."""
+        square, largest = 0.0, 0.0
         for offsets in self._packed(list(range(len(self.levels)))):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_sizes(level)
-            while (found := squares_of(*self._given(offsets), len(self.rows), end, count)) < 0:
-                self.arrays.supply()
-            total += found
-        return total
+            while self._supply(sizes_of(*self._given(offsets), len(self.rows), end, count)):
+                pass
+            square += float(self.arrays.numbers[a.MEAN_SQUARE])
+            largest = max(largest, float(self.arrays.numbers[a.LARGEST_ENERGY]))
+        return square, largest
 
     def works(self) -> tuple[float, float, float]:
         """Work [J] of damping, of what varies and of friction in all segments, and of what jumps at their starts."""

@@ -83,7 +83,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         found += _slow_mode(segments, known.slowest, span)
     if model.general:
         found += rubbing_warnings(segments, model)
-    if excitation.histories and excitation.effort(trajectory.t_end) > MANY_PIECES:
+    if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
         found.append(_load_pieces(excitation, trajectory.t_end))
     return tuple(found)
 
@@ -182,8 +182,8 @@ def _given_energy(trajectory: Trajectory) -> float:
 
 def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
     """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
-    excitation, model = segments.levels[0].excitation, trajectory.model
-    return not (excitation.histories or np.any(excitation.static) or model.general or model.overrides)
+    model = trajectory.model
+    return segments.levels[0].excitation.nothing and not (model.general or model.overrides)
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
@@ -213,7 +213,7 @@ def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]
 
     p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    if any(np.any(level.excitation.static) or level.excitation.histories for level in segments.levels):
+    if not all(level.excitation.nothing for level in segments.levels):
         share = min(1.0, LEFT / (slowest * span)) ** 2
         yield (
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "

@@ -135,7 +135,9 @@ def warned(given: Run) -> Trajectory:
     trajectory = run.trajectory()
     outside = outside_of(run, trajectory.model)
     found = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *outside)
-    return replace(trajectory, warnings=found) if found else trajectory
+    if found:
+        object.__setattr__(trajectory, "warnings", found)  # nobody has seen it without them
+    return trajectory
 
 
 def outside_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
