@@ -94,10 +94,6 @@ class Samples:
     def __init__(self, segments: Segments, end: float) -> None:
         self._segments, self._end = segments, end
 
-    def amplitude_exceeds(self, limit: float, first: float) -> bool:
-        """Whether the amplitude is larger, which |y| at the first time, or less than it, may tell already."""
-        return (first > 0 and first**2 > 2 * SAMPLES * limit**2) or self.amplitude > limit
-
     @property
     def amplitude(self) -> float:
         """Root of the mean of |y|^2 [m sqrt(kg)]."""
@@ -111,6 +107,15 @@ class Samples:
     @functools.cached_property
     def _sizes(self) -> tuple[float, float]:
         return self._segments.sizes(self._end, SAMPLES)
+
+
+def is_small(lost: float, limit: float, start: np.ndarray) -> bool:
+    """Whether the indicator of a sum of |defect|^2 is below a limit, as y (m,) at the start tells already.
+
+    A defect has changed it there by no more than its size; it is the first of the samples, which count by half.
+    """
+    first = math.sqrt(start.dot(start)) - math.sqrt(lost)
+    return first > 0 and limit**2 * first**2 > 2 * SAMPLES * lost
 
 
 def indicator(lost: float, samples: Samples) -> float:

@@ -136,7 +136,7 @@ class Motion:
         """A failure ends the run, with its instant and its cause."""
         try:
             self._take_over()
-            self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
+            self.arrays.buffers.ints[a.STOP_AT_EVENT] = to_change
             answer = self._run(end)
             self._leave()
             if answer == a.FAILED:
@@ -239,7 +239,7 @@ class Motion:
         self.record.take()
         self._ending = self._reached()
         self.time = float(self._ending.numbers[a.TIME])
-        if not self.arrays.ints[a.STARTING]:
+        if not self.arrays.buffers.ints[a.STARTING]:
             self._starting = False
 
     def failure(self) -> Exception:

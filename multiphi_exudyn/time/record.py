@@ -116,13 +116,14 @@ class Record:
 
     def _renumber(self, numbers: np.ndarray) -> None:
         """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
-        packed, known = numbers.tolist(), {}
+        packed, known, other = numbers.tolist(), {}, False
         for number in dict.fromkeys(packed):
             level = self.arrays.loaded[number]
-            known[number] = self._numbers.setdefault(level.states, len(self.levels))
-            if known[number] == len(self.levels):
+            own = known[number] = self._numbers.setdefault(level.states, len(self.levels))
+            if own == len(self.levels):
                 self.levels.append(level)
-        if list(known) != list(known.values()):
+            other = other or own != number
+        if other:
             numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property

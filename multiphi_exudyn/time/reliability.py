@@ -38,7 +38,7 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import Samples, indicator, total_defect
+from multiphi_exudyn.time.defects import Samples, indicator, is_small, total_defect
 from multiphi_exudyn.time.known_warnings import (
     REMEDY,
     cluster_warnings,
@@ -162,16 +162,18 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
     lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
-    samples = Samples(segments, trajectory.t_end)
-    found: list[str] = []
-    if lost > 0 and lost > ENERGY_SHARE * abs(given := _given_energy(trajectory)):
+    given = abs(_given_energy(trajectory)) if lost > 0 else 0.0
+    least = min(INDICATOR, tolerance.error) if tolerance else INDICATOR
+    much = lost > ENERGY_SHARE * given
+    far = defects > 0 and not is_small(defects, least, trajectory.start.displacement)
+    if not (much or far):
+        return []
+    samples, found = Samples(segments, trajectory.t_end), list[str]()
+    if much:
         alone = _left_alone(trajectory, segments)
-        found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
-    if defects != 0:
-        y, size = trajectory.start.displacement, math.sqrt(defects)
-        least = min(INDICATOR, tolerance.error if tolerance else INDICATOR)
-        if not samples.amplitude_exceeds(size / least, math.sqrt(y.dot(y)) - size):
-            found += _truncation(trajectory, indicator(defects, samples), tolerance)
+        found += _energy_warning(lost, given if alone else max(samples.largest_energy, given))
+    if far:
+        found += _truncation(trajectory, indicator(defects, samples), tolerance)
     return found
 
 

@@ -251,7 +251,7 @@ def test_a_warm_run_without_events_is_made_by_few_calls():
         mp.simulate(model, 1e-3, displacement=start)
     finally:
         sys.setprofile(None)
-    assert len(calls) < 92
+    assert len(calls) < 90
 
 
 def test_a_run_stops_at_its_next_event_if_asked():
