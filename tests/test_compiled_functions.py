@@ -456,7 +456,7 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "integrate_works",
         "measure",
         "sample_rows",
-        "sample_squares",
+        "sample_sizes",
         "sample_states",
         "step_is_clear",
     ]

@@ -67,14 +67,14 @@ NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which lev
 CAUSE, CAUSED_BY = 20, 21  # of a failure; flags of elements that take part in it
 TRANSITIONS, TRANSITIONS_NOW, CHANGED = 22, 23, 24  # in the run, in the decision under way; whether the last had events
 CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the decision under way: ints, numbers
-FIRST_CHANGE = 41  # of the decision: those before it are impacts of the start
+FIRST_CHANGE = 72  # of the decision: those before it are impacts of the start
 WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, where their ring begins
-STOP_AT_EVENT, STARTING = 31, 38  # whether the run has still to begin: FRESH, from GIVEN, or GOING_ON, from CURRENT
+STOP_AT_EVENT, STARTING = 31, 71  # whether the run has still to begin: FRESH, from GIVEN, or GOING_ON, from CURRENT
 SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
 COORDINATE_NUMBERS, COORDINATE_COUNT = 36, 37
 PHASE_INTS, PHASE_COUNT = 39, 40
 EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM = 42, 43, 44, 45
-LEFT_OUT, LEFT_OUT_COUNT = 71, 72  # segments of the record whose works are not summed
+LEFT_OUT, LEFT_OUT_COUNT = 38, 41  # segments of the record whose works are not summed
 
 # scratch memory: where it begins
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; exponentials of the free response, and of all
@@ -122,9 +122,11 @@ LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
 WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
 SWUNG = 47  # twice the largest energy so far, as far as it was looked for
-INDEPENDENCE = 48  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 49  # of the segment under way
-RUN_NUMBERS = 52
+GIVEN_ENERGY = 48  # kinetic and strain energy [J] that the run was given, less the potential of static loads
+INDEPENDENCE = 49  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 50  # of the segment under way
+MEAN_SQUARE, LARGEST_ENERGY = 53, 54  # of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 55
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -145,7 +147,8 @@ DISSIPATED = 26  # form in (eta, eta') of what damping takes from the free respo
 SWINGS = 27  # in the waves, of the free response: speeds, and what w, w' of what varies are multiplied by
 FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, where channels are functions of time
 STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
-SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|; zero while nobody asked
+SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|, then the row (n + 1,) with
+#             which static loads work on y; zero while nobody asked
 DRIVEN = 29  # forms of the works of what channels force, -1 where there are none (work_forms.py)
 LEVEL_INTS = 30
 

@@ -31,7 +31,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.signals import gap
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
-__all__ = ["kinetic", "lose", "pattern_work", "potential"]
+__all__ = ["energy", "kinetic", "lose", "pattern_work", "potential"]
 
 
 @compiled
@@ -93,6 +93,12 @@ def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
         total += value * numbers[x + r + k]
         row += r + q + 1
     return total
+
+
+@compiled
+def energy(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Kinetic and strain energy less the potential of static loads [J]."""
+    return kinetic(ints, numbers, state) + potential(ints, numbers, state) + pattern_work(ints, numbers, state)
 
 
 @compiled

@@ -30,17 +30,14 @@ def set_start(
     base = arrays.base
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
     m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[base + a.STATES])
-    for i, state in enumerate(key):
-        ints[states + i] = state
+    ints[states : states + len(key)] = key
     ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = base, a.FRESH
-    drive = int(ints[a.DRIVE])
-    for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0 * held))):
-        start = int(ints[a.GIVEN + part])
-        numbers[start : start + m] = values
-        if q:
-            numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
-        if len(held):
-            numbers[start + m + q : start + m + q + len(held)] = placed
+    place, speed = ints[a.GIVEN + a.PLACE : a.GIVEN + a.SPEED + 1].tolist()
+    numbers[place : place + m], numbers[speed : speed + m] = displacement, velocity
+    for start, number, values in ((place, 0, held), (speed, 1, 0.0 * held)) if q or len(held) else ():
+        drive = int(ints[a.DRIVE]) + number * q
+        numbers[start + m : start + m + q] = numbers[drive : drive + q]
+        numbers[start + m + q : start + m + q + len(held)] = values
     numbers[a.GIVEN_SPRINGS] = _springs(arrays, sprung) if sprung else 0.0
 
 

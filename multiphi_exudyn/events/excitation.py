@@ -112,7 +112,7 @@ class Excitation:
             stops = np.hstack([stops, np.eye(len(model.links))[:, list(model.held)]])
         rate_of = *channels.rate_of, *(-1 for _ in model.held)
         found = cls(channels.static, patterns, stops, tuple(channels.histories), rate_of, end, channels.steady)
-        if found.effort(end) > MOST_EFFORT:
+        if found.most_effort > MOST_EFFORT:
             raise MultiPhiValueError(
                 f"loads: got {found.pieces(end)} pieces in {end:g} s, need at most {MOST_EFFORT}, or of sweeps "
                 f"{MOST_EFFORT // CARRIER_EFFORT}: fewer samples, a larger tolerance or a shorter run"
@@ -149,6 +149,16 @@ class Excitation:
         """The pieces up to ``end`` [s], those of a run with changing carriers counted as often as they cost more."""
         carriers = max((len(np.unique(history.rates)) for history in self.histories), default=0)
         return self.pieces(end) * (CARRIER_EFFORT if carriers > 1 else 1)
+
+    @functools.cached_property
+    def nothing(self) -> bool:
+        """Whether there is no load, and nothing varies."""
+        return not (self.histories or np.any(self.static))
+
+    @functools.cached_property
+    def most_effort(self) -> int:
+        """The effort up to its end."""
+        return self.effort(self.end)
 
     @functools.cached_property
     def highest_frequency(self) -> float:

@@ -81,13 +81,12 @@ class LevelArrays:
     @property
     def full(self) -> bool:
         """Whether the arrays are too large; those that their model keeps beside them go first."""
-        self._let_others_go()
-        return self.buffers.size > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
+        if self.buffers.size != self._weighed:
+            self._let_others_go()
+        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
 
     def _let_others_go(self) -> None:
-        """Of all that a model keeps the least recently used goes, until there is room; looked at where this grows."""
-        if self.buffers.size == self._weighed:
-            return
+        """Of all that a model keeps the least recently used goes, until there is room."""
         self._weighed = self.buffers.size
         loaded = dict.fromkeys(levels for _, levels in self.levels.model.loaded.items())  # some by two keys
         others = [(levels, arrays) for levels in loaded for arrays in levels.kept_arrays if arrays is not self]
@@ -137,7 +136,7 @@ class LevelArrays:
     def chatter(self) -> tuple[int, np.ndarray]:
         """The decisions so far, and what stands in the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
-        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1) if decisions else 0
+        count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
     @property
@@ -228,7 +227,7 @@ class LevelArrays:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
 
     def add_sizes(self, level: int) -> None:
-        """Pack what |y| is read from in a level that stands in the ints."""
+        """Pack what |y| and the work of static loads are read from in a level that stands in the ints."""
         if not self.ints[level + a.SIZES]:
             put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 

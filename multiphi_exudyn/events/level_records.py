@@ -104,11 +104,12 @@ def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
 
 
 def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
-    """Give the record of a level what |y| is read from."""
-    rows = factor(np.column_stack([level.level.vectors, level.asymptotic.configuration]))
-    square = np.zeros((rows.shape[1], rows.shape[1]))
-    square[: len(rows)] = rows
-    buffers.ints[record + a.SIZES] = buffers.put("numbers", square)
+    """Give the record of a level what |y| and the work of static loads on y are read from."""
+    motion = np.column_stack([level.level.vectors, level.asymptotic.configuration])
+    rows, n = factor(motion), motion.shape[1]
+    given = np.zeros((n + 1, n))
+    given[: len(rows)], given[-1] = rows, level.excitation.static @ motion
+    buffers.ints[record + a.SIZES] = buffers.put("numbers", given)
 
 
 def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:

@@ -7,6 +7,8 @@ A sum is judged by the sizes of its own terms, so other units of time, length an
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 __all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
@@ -20,7 +22,7 @@ CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does
 
 def all_finite(values: np.ndarray) -> bool:
     """Whether no value (k,) is NaN or infinite."""
-    return bool(np.count_nonzero(np.isfinite(values)) == values.size)
+    return math.isfinite(values.dot(values)) or bool(np.count_nonzero(np.isfinite(values)) == values.size)
 
 
 def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:

@@ -16,6 +16,7 @@ __all__ = ["Matrix", "did_you_mean", "is_real", "no_text", "one_of", "real_array
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 
+FLOAT = np.dtype(float)
 REAL_KINDS = "biufO"  # numpy's codes of what may be converted: numbers, and objects that know how
 SHOWN = 12  # names that an error lists
 
@@ -29,6 +30,8 @@ def is_real(value: Any) -> bool:
 
 def real_array(name: str, given: Any, needed: str) -> Matrix:
     """A copy of ``given`` as real numbers, sparse if it is; text and complex numbers are not converted."""
+    if type(given) is np.ndarray and given.dtype == FLOAT:
+        return given.copy("K")
     if scipy.sparse.issparse(given) and given.dtype.kind in REAL_KINDS:
         return scipy.sparse.csr_array(given, dtype=float)
     try:

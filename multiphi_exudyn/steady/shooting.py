@@ -119,7 +119,7 @@ class Shooting:
         r, given = own.level.modal.modes, np.zeros(own.level.excitation.prescribed)
         xi = own.displacement + np.concatenate([change[:r], given, change[2 * r :]])
         xi_t = own.velocity + np.concatenate([change[r : 2 * r], given, 0 * own.held])
-        return replace(self.start, final=replace(own, displacement=xi, velocity=xi_t))
+        return self.start.ending_in(replace(own, displacement=xi, velocity=xi_t))
 
     def _run(self, place: np.ndarray) -> Trajectory | None:
         """A run over the periods of the order, None where it fails or cannot start."""

@@ -18,7 +18,6 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,35 +94,28 @@ class Samples:
     def __init__(self, segments: Segments, end: float) -> None:
         self._segments, self._end = segments, end
 
-    def amplitude_exceeds(self, limit: float, first: float) -> bool:
-        """Whether the amplitude is larger, which |y| at the first time, or less than it, may tell already."""
-        return (first > 0 and first**2 > 2 * SAMPLES * limit**2) or self.amplitude > limit
-
-    @functools.cached_property
+    @property
     def amplitude(self) -> float:
         """Root of the mean of |y|^2 [m sqrt(kg)]."""
-        return math.sqrt(self._segments.mean_square(self._end, SAMPLES))
+        return math.sqrt(self._sizes[0])
 
-    @functools.cached_property
+    @property
     def largest_energy(self) -> float:
         """The largest kinetic + strain energy [J], without its sign."""
-        energies = [level.kinetic(eta_t.T) + level.strain(eta.T) for level, eta, eta_t in self._by_level()]
-        return float(np.max(np.abs(np.concatenate(energies))))
+        return self._sizes[1]
 
     @functools.cached_property
-    def _states(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers (k,) of the levels at the times, and the states there (2, k, n)."""
-        segments = self._segments
-        times = np.linspace(segments.starts[0], self._end, SAMPLES)
-        owners = segments.owners(times)
-        return segments.numbers[owners], segments.states(owners, times - segments.starts[owners])
+    def _sizes(self) -> tuple[float, float]:
+        return self._segments.sizes(self._end, SAMPLES)
 
-    def _by_level(self) -> Iterator[tuple[LoadedLevel, np.ndarray, np.ndarray]]:
-        """The levels at the times, with eta and eta' (k, r) there."""
-        numbers, states = self._states
-        for number in dict.fromkeys(numbers.tolist()):
-            level, own = self._segments.levels[number], numbers == number
-            yield level, *states[:, own, : level.width]
+
+def is_small(lost: float, limit: float, start: np.ndarray) -> bool:
+    """Whether the indicator of a sum of |defect|^2 is below a limit, as y (m,) at the start tells already.
+
+    A defect has changed it there by no more than its size; it is the first of the samples, which count by half.
+    """
+    first = math.sqrt(start.dot(start)) - math.sqrt(lost)
+    return first > 0 and limit**2 * first**2 > 2 * SAMPLES * lost
 
 
 def indicator(lost: float, samples: Samples) -> float:

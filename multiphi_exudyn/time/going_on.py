@@ -67,7 +67,7 @@ def nudged(trajectory: Trajectory, velocity: np.ndarray) -> Trajectory:
     r = _modes(state.level)
     vectors = state.level.level.vectors[:, :r]
     given = vectors.T @ (velocity - _carried(state.level, state.velocity[r:]))
-    return replace(trajectory, final=replace(state, velocity=np.concatenate([given, state.velocity[r:]])))
+    return trajectory.ending_in(replace(state, velocity=np.concatenate([given, state.velocity[r:]])))
 
 
 def stops_moved(state: State) -> np.ndarray:

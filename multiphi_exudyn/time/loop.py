@@ -37,6 +37,8 @@ from multiphi_exudyn.events.arrays import (
     FRESH,
     FULL,
     GIVEN,
+    GIVEN_ENERGY,
+    GIVEN_SPRINGS,
     GIVEN_UP,
     HIGHEST_FREQUENCY,
     HORIZON,
@@ -90,7 +92,7 @@ from multiphi_exudyn.events.changes import clear
 from multiphi_exudyn.events.decision import decide, decide_jump
 from multiphi_exudyn.events.defect_sums import add_defect, add_start_defect
 from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_drive
-from multiphi_exudyn.events.energies import kinetic, pattern_work, potential
+from multiphi_exudyn.events.energies import energy, kinetic, pattern_work, potential
 from multiphi_exudyn.events.flow import expand, state_at
 from multiphi_exudyn.events.maps import find_map
 from multiphi_exudyn.events.start import begin
@@ -151,6 +153,7 @@ def set_out(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     for k in range(LOSSES):  # what no event carries
         numbers[LOST_AT_START + k] = numbers[LOST + k] if ints[CHANGE_COUNT] == 0 else 0.0
     numbers[WORK] = pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, GIVEN)
+    numbers[GIVEN_ENERGY] = energy(ints, numbers, GIVEN) + numbers[GIVEN_SPRINGS]
     copy_state(ints, numbers, WORKED, CURRENT)
     add_start_defect(ints, numbers)
     ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
@@ -164,6 +167,7 @@ def go_on(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
     OK, NEED or FAILED.
     """
+    numbers[GIVEN_ENERGY] = energy(ints, numbers, CURRENT)
     copy_state(ints, numbers, CURRENT, REACHED)
     status = given_up(ints, decide_jump(ints, numbers, waves))
     if status < 0:
@@ -194,7 +198,7 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     if ints[PIECE] + 1 >= ints[PIECE_COUNT]:
         ints[NEEDED] = NEED_PIECES
         return NEED
-    energy = kinetic(ints, numbers, CURRENT) + potential(ints, numbers, CURRENT) + pattern_work(ints, numbers, CURRENT)
+    before = energy(ints, numbers, CURRENT)
     ints[PIECE] += 1
     load_piece(ints, waves)
     set_drive(ints, numbers, waves, ints[DRIVE_WAVES], 0.0, numbers[TIME], min(end, piece_end(ints, numbers)))
@@ -212,7 +216,7 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         ints[PIECE] -= 1
         return NEED if status == NEED else FULL
     after = REACHED if status != EVENT else WORKED
-    work = kinetic(ints, numbers, REACHED) + potential(ints, numbers, REACHED) - energy
+    work = kinetic(ints, numbers, REACHED) + potential(ints, numbers, REACHED) - before
     numbers[WORK] += work + pattern_work(ints, numbers, after)
     copy_state(ints, numbers, after, CURRENT)
     numbers[AGE] = 0.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,51 +17,33 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.entering import Measure, set_start, set_state
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import Loss, Phase, State
+from multiphi_exudyn.events.state import Loss, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mathematics.round_off import all_finite
-from multiphi_exudyn.time.balance import Statistics
 from multiphi_exudyn.time.chatter import limits
+from multiphi_exudyn.time.ending import Ending
 from multiphi_exudyn.time.failures import NOT_FINITE, failure
 from multiphi_exudyn.time.loop import advance
-from multiphi_exudyn.time.record import PHASES, Record
+from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.recorded import Events, Recorded
 from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Again, Trajectory
 
-__all__ = ["NUMBERS", "Motion", "carry", "measured", "motion_of"]
-
-NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
-
+__all__ = ["Motion", "carry", "measured", "motion_of"]
 
 RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
-NOTHING = Loss()
-NO_RING = np.zeros(0)
 
 carry, measured = entry(advance), entry(measure)
 quiet = np.errstate(all="ignore")  # as compiled: what is not finite is found, and told
-
-
-class _Kept(NamedTuple):
-    """What a run keeps while another one has the arrays: its own of their first numbers, and the chatter check's.
-
-    piece: which of the channels.
-    """
-
-    numbers: np.ndarray
-    decisions: int
-    ring: np.ndarray
-    piece: int
 
 
 class Motion:
     """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
 
     compiled: False for the loop as plain Python. loop: what is called in its place. time [s]: how far it is. message:
-    why it goes no further, or "". start_loss: at a start without events. sums_works: whether the loop sums the works
-    of segments, for a ledger; others are integrated when one is asked for. Nothing has happened before ``begin``, or
-    ``advance``, is called.
+    why it goes no further, or "". sums_works: whether the loop sums the works of segments, for a ledger; others are
+    integrated when one is asked for. Nothing has happened before ``begin``, or ``advance``, is called.
     """
 
     def __init__(
@@ -76,13 +58,12 @@ class Motion:
         self._measured: Measure = measure if compiled is False else measured
         self.levels = arrays.levels
         self.model = self.levels.model
-        self.time, self.message, self.start_loss = start.time, "", NOTHING
+        self.time, self.message = start.time, ""
         self.record = Record(self.model.contacts, arrays)
-        self._state: State | None = start.state
-        self._starting = self.sums_works = True
         self._window, self._allowed = limits(self.model)
-        self._kept = _Kept(self._at_first(start.time), 0, NO_RING, 0)
-        self._evaluations = self._transitions = 0
+        ending = Ending(self._at_first(start.time), self.record)
+        self._ending = ending if start.state is None else ending.at(start.state)
+        self._starting = self.sums_works = True
         self._unavailable: Exception | None = None
 
     def _at_first(self, time: float) -> np.ndarray:
@@ -100,18 +81,24 @@ class Motion:
     @property
     def state(self) -> State:
         """Where it is; there is none after a failure at the start."""
-        assert self._state is not None, self.message
-        return self._state
+        state = self._ending.state
+        assert state is not None, self.message
+        return state
+
+    @property
+    def start_loss(self) -> Loss:
+        """Energies [J] that its start took, where no event carries them."""
+        return self._ending.start_loss
 
     def go_on_from(self, state: State, time: float) -> None:
         """Forget what has been collected, and go on from a state and a time [s]."""
-        self._state, self.time, self.message, self.start_loss = state, time, "", NOTHING
-        self._starting = False
+        self.time, self.message, self._starting = time, "", False
         self.record = Record(self.model.contacts, self.arrays)
-        numbers = self._kept.numbers.copy()
+        numbers, piece = self._ending.numbers.copy(), self._ending.piece
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
+        numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES] = 0.0
         numbers[a.WORKS : a.WORKS + 3] = 0.0
-        self._kept = _Kept(numbers, 0, NO_RING, self._kept.piece)
+        self._ending = Ending(numbers, self.record, piece=piece).at(state)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
@@ -131,32 +118,18 @@ class Motion:
 
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
-        numbers = self._kept.numbers
+        numbers = self._ending.numbers
         defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
-        segments = Recorded(self.record, defects, truncated, tuple(works))
-        events = Events(self.record)
         return Trajectory(
             model=self.model,
-            segments=segments,
-            events=events,
+            segments=Recorded(self.record, defects, truncated, tuple(works)),
+            events=Events(self.record),
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",
             message=self.message,
             start=self.start,
-            start_loss=self.start_loss,
-            final=self._state if self.record.count else None,
-            final_work=float(numbers[a.WORK]),
+            ending=self._ending,
             load=self.levels.excitation.static,
-            stats=Statistics(
-                levels_built=self.model.levels_built,
-                levels_possible=self.model.levels_possible,
-                transitions=self._transitions,
-                events=len(events),
-                segments=self.record.count,
-                function_evaluations=self._evaluations,
-                record_bytes=self.record.bytes,
-                array_bytes=self.arrays.buffers.size,
-            ),
             again=again,
         )
 
@@ -166,12 +139,12 @@ class Motion:
         """A failure ends the run, with its instant and its cause."""
         try:
             self._take_over()
-            self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
+            self.arrays.buffers.ints[a.STOP_AT_EVENT] = to_change
             answer = self._run(end)
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if self._state is not None and not all_finite(self._state.displacement):
+            if not all_finite(self._ending.displacement):
                 raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
@@ -218,63 +191,60 @@ class Motion:
     # ------------------------------------------------------------------ the state in the arrays
 
     def _take_over(self) -> None:
-        """Get the arrays from the run that has them."""
-        owner = self.arrays.owner() if self.arrays.owner else None
-        if owner is not self:
-            if owner is not None:
-                owner.give_up_arrays()
+        """Get the arrays from the run that has them, and has left them."""
+        if self.arrays.owner is None or self.arrays.owner() is not self:
             self._enter()
             self.arrays.owner = weakref.ref(self)
 
-    def give_up_arrays(self) -> None:
-        """Keep what stands in the arrays alone: another run takes them over."""
-        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
-        self._kept = _Kept(numbers[: a.OF_A_RUN].copy(), *self.arrays.chatter, int(ints[a.PIECE]))
+    def _reached(self) -> Ending:
+        """Where the loop stands, copied: another run may take the arrays over."""
+        arrays, before = self.arrays, self._ending
+        ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
+        state = before.level, before.displacement, before.velocity, before.phases
+        if not ints[a.STARTING]:
+            record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
+            level, exits = arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
+            n = level.level.modes
+            phases = (a.ARMED,) * exits if settled else tuple(ints[waits : waits + exits].tolist())
+            state = level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases
+        return Ending(
+            numbers[: a.OF_A_RUN].copy(),
+            self.record,
+            *state,
+            *arrays.chatter,
+            int(ints[a.PIECE]),
+            float(numbers[ints[a.FOUND] + 1]),
+            int(ints[a.TRANSITIONS]),
+            self.model.levels_built,
+            arrays.buffers.size,
+        )
 
     def _enter(self) -> None:
         """The present state, or the start, into the arrays."""
-        arrays, state, (kept, decisions, ring, piece) = self.arrays, self._state, self._kept
-        level = 0 if state is None else arrays.level(state.level.states)
+        arrays, ending = self.arrays, self._ending
+        level = 0 if ending.level is None else arrays.level(ending.level.states)
         arrays.begin_record()
-        arrays.set_chatter(self._window, decisions, ring)
-        arrays.buffers.numbers[: a.OF_A_RUN] = kept
-        arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
-        if state is None:
+        arrays.set_chatter(self._window, ending.decisions, ending.ring)
+        arrays.buffers.numbers[: a.OF_A_RUN] = ending.numbers
+        arrays.channels.set(arrays.buffers, ending.piece, float(ending.numbers[a.AGE]), self.time)
+        if ending.level is None:
             start = self.start
             set_start(arrays, start.displacement, start.velocity, start.states, start.held, start.penetrating)
         else:
-            phases = [NUMBERS[phase] for phase in state.phases]
-            set_state(arrays, level, state.displacement, state.velocity, phases, self._measured)
+            set_state(arrays, level, ending.displacement, ending.velocity, ending.phases, self._measured)
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
         ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-        ints[a.TRANSITIONS] = ints[a.GIVEN_UP] = 0
+        ints[a.TRANSITIONS], ints[a.GIVEN_UP] = ending.transitions, 0
         ints[a.WORKING] = int(self.sums_works)
-        numbers[a.TIME] = self.time
-        numbers[ints[a.FOUND] + 1] = 0.0
+        numbers[a.TIME], numbers[ints[a.FOUND] + 1] = self.time, ending.evaluations
 
     def _leave(self) -> None:
         """The state that the loop has come to, and what it has recorded."""
-        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
         self.record.take()
-        self.give_up_arrays()
-        self.time = float(numbers[a.TIME])
-        if not ints[a.STARTING]:
-            if self._starting:
-                lost = numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist()
-                self.start_loss = Loss(*lost) if any(lost) else NOTHING
-            self._state, self._starting = self._state_reached(), False
-        samples = ints[a.FOUND] + 1
-        self._evaluations += int(numbers[samples])
-        self._transitions += int(ints[a.TRANSITIONS])
-        ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
-
-    def _state_reached(self) -> State:
-        ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
-        record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
-        level, exits = self.arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
-        phases = (Phase.ARMED,) * exits if settled else tuple(PHASES[k] for k in ints[waits : waits + exits].tolist())
-        n = level.level.modes
-        return State(level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases)
+        self._ending = self._reached()
+        self.time = float(self._ending.numbers[a.TIME])
+        if not self.arrays.buffers.ints[a.STARTING]:
+            self._starting = False
 
     def failure(self) -> Exception:
         """What has stopped the loop."""

@@ -18,7 +18,7 @@ from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
-from multiphi_exudyn.time.sampling import sample_rows, sample_squares, sample_states
+from multiphi_exudyn.time.sampling import sample_rows, sample_sizes, sample_states
 from multiphi_exudyn.time.segment import Segment, owners
 from multiphi_exudyn.time.taken import EMPTY, EVENTS, PARTS, taken
 from multiphi_exudyn.time.work import integrate_works, work_waves
@@ -27,7 +27,7 @@ __all__ = ["PHASES", "Record"]
 
 PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.LANDING)  # in the order of their numbers
 
-states_of, values_of, squares_of = entry(sample_states), entry(sample_rows), entry(sample_squares)
+states_of, values_of, sizes_of = entry(sample_states), entry(sample_rows), entry(sample_sizes)
 works_of = entry(integrate_works)
 
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
@@ -82,7 +82,8 @@ class Record:
             self._renumber(part["rows"][:, 0])
             self.count += len(part["rows"])
             self.left_out_count += len(part.get("left_out", ()))
-        vars(self).pop("places", None)
+        if "kinds" in part:
+            vars(self).pop("places", None)
 
     @property
     def bytes(self) -> int:
@@ -121,13 +122,14 @@ class Record:
 
     def _renumber(self, numbers: np.ndarray) -> None:
         """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
-        packed, known = numbers.tolist(), {}
+        packed, known, other = numbers.tolist(), {}, False
         for number in dict.fromkeys(packed):
             level = self.arrays.loaded[number]
-            known[number] = self._numbers.setdefault(level.states, len(self.levels))
-            if known[number] == len(self.levels):
+            own = known[number] = self._numbers.setdefault(level.states, len(self.levels))
+            if own == len(self.levels):
                 self.levels.append(level)
-        if list(known) != list(known.values()):
+            other = other or own != number
+        if other:
             numbers[:] = [known[number] for number in packed]
 
     @functools.cached_property
@@ -181,16 +183,17 @@ class Record:
                 pass
         return result
 
-    def mean_square(self, end: float, count: int) -> float:
-        """Mean of |y|^2 up to ``end`` [s], see ``Segments``."""
-        total = 0.0
+    def sizes(self, end: float, count: int) -> tuple[float, float]:
+        """Mean of |y|^2 and largest energy up to ``end`` [s], see ``Segments``."""
+        square, largest = 0.0, 0.0
         for offsets in self._packed(list(range(len(self.levels)))):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_sizes(level)
-            while (found := squares_of(*self._given(offsets), len(self.rows), end, count)) < 0:
-                self.arrays.supply()
-            total += found
-        return total
+            while self._supply(sizes_of(*self._given(offsets), len(self.rows), end, count)):
+                pass
+            square += float(self.arrays.numbers[a.MEAN_SQUARE])
+            largest = max(largest, float(self.arrays.numbers[a.LARGEST_ENERGY]))
+        return square, largest
 
     def works(self, places: np.ndarray) -> tuple[float, float, float]:
         """Work [J] of damping, of what varies, jumps at their starts included, and of friction in segments (k,)."""

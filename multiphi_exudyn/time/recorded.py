@@ -90,9 +90,9 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``."""
         return self._record.values(times, side, row)
 
-    def mean_square(self, end: float, count: int) -> float:
+    def sizes(self, end: float, count: int) -> tuple[float, float]:
         """See ``Segments``."""
-        return self._record.mean_square(end, count)
+        return self._record.sizes(end, count)
 
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray

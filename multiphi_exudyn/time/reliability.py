@@ -38,7 +38,7 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import Samples, indicator, total_defect
+from multiphi_exudyn.time.defects import Samples, indicator, is_small, total_defect
 from multiphi_exudyn.time.known_warnings import (
     REMEDY,
     cluster_warnings,
@@ -83,7 +83,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         found += _slow_mode(segments, known.slowest, span)
     if model.general:
         found += rubbing_warnings(segments, model)
-    if excitation.histories and excitation.effort(trajectory.t_end) > MANY_PIECES:
+    if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
         found.append(_load_pieces(excitation, trajectory.t_end))
     return tuple(found)
 
@@ -158,27 +158,34 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
 
 def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance | None) -> list[str]:
     """Of the energy that truncation took, whatever its sign at an instant, and of the motion that it did."""
-    samples, found = Samples(segments, trajectory.t_end), list[str]()
-    at_start = trajectory.start_loss.truncation_kinetic + trajectory.start_loss.truncation_strain
-    at_events = segments.truncated
+    at_start, at_events = trajectory.ending.truncated_at_start, segments.truncated
     if math.isnan(at_events):
         at_events = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
     lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
-    if lost > 0 and lost > ENERGY_SHARE * abs(given := trajectory.initial_energy):
+    given = abs(_given_energy(trajectory)) if lost > 0 else 0.0
+    least = min(INDICATOR, tolerance.error) if tolerance else INDICATOR
+    much = lost > ENERGY_SHARE * given
+    far = defects > 0 and not is_small(defects, least, trajectory.start.displacement)
+    if not (much or far):
+        return []
+    samples, found = Samples(segments, trajectory.t_end), list[str]()
+    if much:
         alone = _left_alone(trajectory, segments)
-        found += _energy_warning(lost, abs(given) if alone else max(samples.largest_energy, abs(given)))
-    if defects != 0:
-        y, size = trajectory.start.displacement, math.sqrt(defects)
-        least = min(INDICATOR, tolerance.error if tolerance else INDICATOR)
-        if not samples.amplitude_exceeds(size / least, math.sqrt(y.dot(y)) - size):
-            found += _truncation(trajectory, indicator(defects, samples), tolerance)
+        found += _energy_warning(lost, given if alone else max(samples.largest_energy, given))
+    if far:
+        found += _truncation(trajectory, indicator(defects, samples), tolerance)
     return found
+
+
+def _given_energy(trajectory: Trajectory) -> float:
+    """Kinetic and strain energy [J] at the start."""
+    return trajectory.ending.given_energy + float(trajectory.load.dot(trajectory.start.displacement))
 
 
 def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
     """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
-    excitation, model = segments.levels[0].excitation, trajectory.model
-    return not (excitation.histories or np.any(excitation.static) or model.general or model.overrides)
+    model = trajectory.model
+    return segments.levels[0].excitation.nothing and not (model.general or model.overrides)
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
@@ -208,7 +215,7 @@ def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]
 
     p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    if any(np.any(level.excitation.static) or level.excitation.histories for level in segments.levels):
+    if not all(level.excitation.nothing for level in segments.levels):
         share = min(1.0, LEFT / (slowest * span)) ** 2
         yield (
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "

@@ -19,6 +19,8 @@ from multiphi_exudyn.events.arrays import (
     FLOW_FORCED,
     FLOW_FREE,
     FLOW_WAVES,
+    LARGEST_ENERGY,
+    MEAN_SQUARE,
     MODES,
     NEED,
     OK,
@@ -32,13 +34,14 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     WORK_WAVES,
 )
+from multiphi_exudyn.events.energies import energy
 from multiphi_exudyn.events.flow import state_at
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import SHAPES
 from multiphi_exudyn.time.resuming import resume
 
-__all__ = ["sample_rows", "sample_squares", "sample_states"]
+__all__ = ["sample_rows", "sample_sizes", "sample_states"]
 
 RESTART = 32  # samples after which exponentials begin anew: as many round-offs
 EVEN = 4e-16  # of the last time, by which evenly spaced times may be off
@@ -124,7 +127,7 @@ def sample_rows(
 
 
 @compiled
-def sample_squares(
+def sample_sizes(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
@@ -135,12 +138,13 @@ def sample_squares(
     segments: int,
     end: float,
     count: int,
-) -> float:
-    """Integral of |y|^2 from the first start to ``end`` [s] over that time, of a polygon through ``count`` instants.
+) -> int:
+    """MEAN_SQUARE of |y| from the first start to ``end`` [s], of a polygon through ``count`` even instants.
 
-    Less than zero where there is no room for a response.
+    LARGEST_ENERGY: the largest kinetic and strain energy at these, without its sign. OK or NEED.
     """
-    total, i, flowing, first = 0.0, -1, -1, spans[0]
+    i, flowing, first = -1, -1, spans[0]
+    numbers[MEAN_SQUARE] = numbers[LARGEST_ENERGY] = 0.0
     for k in range(count):
         t = first + (end - first) * k / (count - 1)
         i = owner_of(spans, segments, t, 0, i)
@@ -148,7 +152,7 @@ def sample_squares(
         if level == 0:
             continue
         if flowing != i and resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
-            return -1.0
+            return NEED
         flowing, n, row = i, ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
         state_at(ints, numbers, waves, level, t - spans[i * SEGMENT_WIDTH_NUMBERS], x, ints[AFTER + SPEED])
         square = 0.0
@@ -158,8 +162,12 @@ def sample_squares(
                 size += numbers[row + c] * numbers[x + c]
             square += size * size
             row += n + 1
-        total += square / (count - 1) * (0.5 if k == 0 or k == count - 1 else 1.0)
-    return total
+        numbers[MEAN_SQUARE] += square / (count - 1) * (0.5 if k == 0 or k == count - 1 else 1.0)
+        strained = energy(ints, numbers, AFTER) + numbers[row + n]
+        for c in range(n):
+            strained += numbers[row + c] * numbers[x + c]
+        numbers[LARGEST_ENERGY] = max(numbers[LARGEST_ENERGY], abs(strained))
+    return OK
 
 
 @compiled

@@ -154,8 +154,11 @@ class Segments(Sequence[Segment], ABC):
         """
 
     @abstractmethod
-    def mean_square(self, end: float, count: int) -> float:
-        """Mean of |y|^2 [m2 kg] from the first start to ``end`` [s], of a polygon through ``count`` even instants."""
+    def sizes(self, end: float, count: int) -> tuple[float, float]:
+        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], of ``count`` even instants.
+
+        The mean is that of a polygon through them; energy: kinetic and strain, without its sign.
+        """
 
     @property
     @abstractmethod
@@ -238,14 +241,18 @@ class Listed(Segments):
             found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
         return found
 
-    def mean_square(self, end: float, count: int) -> float:
+    def sizes(self, end: float, count: int) -> tuple[float, float]:
         """See ``Segments``."""
         times = np.linspace(self.starts[0], end, count)
-        places, squares = self.owners(times), np.empty(count)
-        x = self.states(places, times - self.starts[places])[0]
+        places, squares, energies = self.owners(times), np.empty(count), np.empty(count)
+        states = self.states(places, times - self.starts[places])
         for k, number in enumerate(self.numbers[places].tolist()):
-            squares[k] = np.sum(self.levels[number].configuration(x[k, : self.levels[number].width]) ** 2)
-        return float((np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (count - 1))
+            level = self.levels[number]
+            x, v = states[:, k, : level.width]
+            squares[k] = np.sum(level.configuration(x) ** 2)
+            energies[k] = level.kinetic(v) + level.strain(x)
+        square = (np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (count - 1)
+        return float(square), float(np.max(np.abs(energies)))
 
     @property
     def works(self) -> tuple[float, float, float]:

@@ -135,7 +135,9 @@ def warned(given: Run) -> Trajectory:
     trajectory = run.trajectory()
     outside = outside_of(run, trajectory.model)
     found = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *outside)
-    return replace(trajectory, warnings=found) if found else trajectory
+    if found:
+        object.__setattr__(trajectory, "warnings", found)  # nobody has seen it without them
+    return trajectory
 
 
 def outside_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
@@ -224,10 +226,13 @@ class Run:
 
     def _first(self, levels: LoadedLevels) -> Start:
         """The start from the vectors that were given."""
-        given = {"displacement": self.displacement, "velocity": self.velocity}
-        base, vector = self.model.base, self.model.structure.vector
-        y, v = [None if x is None else base.coordinates(vector(name, x)) for name, x in given.items()]
+        y = self._coordinates("displacement", self.displacement)
+        v = self._coordinates("velocity", self.velocity)
         return first_start(levels, self.t_end, y, v, self.stretches or {})
+
+    def _coordinates(self, name: str, given: np.ndarray | None) -> np.ndarray | None:
+        """A vector (n,) in base coordinates (m,)."""
+        return None if given is None else self.model.base.coordinates(self.model.structure.vector(name, given))
 
     def _levels(self, finer: float) -> LoadedLevels:
         """The levels under the loads, which the model keeps where nobody can change what the loads are."""

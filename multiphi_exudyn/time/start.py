@@ -57,13 +57,15 @@ class Start(Shown):
 
 @dataclass(frozen=True)
 class _Scales:
-    """What the gaps (l,) of starts in some levels are judged by, whatever the start; stops, speeds: where stops are.
+    """What the gaps (l,) of starts in some levels are judged by, whatever the start; directions: h (m, l).
 
+    stops, speeds: where stops are.
     touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
     moves a mode at most, (m,) [s]. apart: the start of elements of which none touches, None where some have states of
     their own even then.
     """
 
+    directions: np.ndarray
     stops: np.ndarray
     speeds: np.ndarray
     touching: np.ndarray
@@ -79,9 +81,13 @@ class _Scales:
         return zeros
 
     @functools.cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """a, b (l,): none touches where h.y > a |y| + b, as the terms of h.y are no more than |h| |y|."""
-        return 2 * TOUCHING * self.sizes, self.touching - self.stops
+    def clear(self) -> tuple[np.ndarray, np.ndarray]:
+        """u (m, l), b (l,): none touches where u.y - b > a |y|, a twice ``TOUCHING``.
+
+        u = h / |h|, as the terms of h.y are no more than |h| |y|; zero where |h| is.
+        """
+        sizes = np.where(self.sizes > 0, self.sizes, 1.0)
+        return self.directions / sizes, (self.touching - self.stops) / sizes
 
     @classmethod
     def of(cls, levels: LoadedLevels, end: float) -> _Scales:
@@ -94,7 +100,8 @@ class _Scales:
         lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + float(np.max(gaps, initial=0.0))
         moved, speeds = map(excitation.moved, levels.drive.values[:2])
         apart = None if model.general or model.force_laws else (OPEN,) * len(model.contacts)
-        return cls(base.gaps - moved, speeds, TOUCHING * ways + UNSEEN * lengths * sizes, sizes, times, apart)
+        near = TOUCHING * ways + UNSEEN * lengths * sizes
+        return cls(base.directions, base.gaps - moved, speeds, near, sizes, times, apart)
 
     def near(self, terms: np.ndarray, length: float) -> np.ndarray:
         """Gaps (l,) [m] below which a contact is in touch: by the terms (l,) of h.y, by where the motion goes."""
@@ -111,16 +118,16 @@ def first_start(
     base = levels.model.base
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
     y = scales.nowhere if y is None else y
-    moved, length = y.dot(base.directions), math.sqrt(y.dot(y))
+    length = math.sqrt(y.dot(y))
     if v is None:
         v = scales.nowhere
     else:
         moving = v * scales.times
         length += math.sqrt(moving.dot(moving))
-    slope, constant = scales.bounds
-    if scales.apart is not None and all((moved > slope * length + constant).tolist()):
+    units, bounds = scales.clear
+    if scales.apart is not None and min((y.dot(units) - bounds).tolist(), default=math.inf) > 2 * TOUCHING * length:
         return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
-    gaps, near = moved + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
+    gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
     return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), stretches)
 
 

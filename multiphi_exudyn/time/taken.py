@@ -31,19 +31,21 @@ PARTS = (  # where in the loop's arrays they begin, how many rows there are, how
     ("amounts", a.EVENT_NUMBERS, a.EVENT_COUNT, a.EVENT_WIDTH_NUMBERS),
 )
 EVENTS = PARTS[-2:]
-COUNTS = tuple(counted for _, _, counted, _ in PARTS)
+COUNTS = tuple({counted for _, _, counted, _ in PARTS})
+FIRST = a.SEGMENT_INTS  # of the slots that tell of a record
 OF_NUMBERS = ("spans", "coordinates", "amounts")
 
 
 def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
     """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-    slots, parts = ints[: a.LEFT_OUT_COUNT + 1].tolist(), {}
+    slots, parts = ints[FIRST : a.EVENT_ROOM + 1].tolist(), {}
     for name, slot, counted, width in wanted:
-        if rows := slots[counted]:
-            start, buffer = slots[slot], numbers if name in OF_NUMBERS else ints
-            part = buffer[start : start + rows * (width or 1)].copy()
-            parts[name] = part.reshape(rows, width) if width else part
+        if rows := slots[counted - FIRST]:
+            start, buffer = slots[slot - FIRST], numbers if name in OF_NUMBERS else ints
+            part = parts[name] = buffer[start : start + rows * (width or 1)].copy()
+            if width:
+                part.shape = rows, width
     for slot in COUNTS:
         ints[slot] = 0
     return parts

@@ -24,6 +24,7 @@ from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table,
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.time.balance import Ledger, Statistics
+from multiphi_exudyn.time.ending import Ending
 from multiphi_exudyn.time.histories import INSTANTS
 from multiphi_exudyn.time.model_histories import ModelHistories
 from multiphi_exudyn.time.saved import save
@@ -63,16 +64,10 @@ class Trajectory(ModelHistories):
         The cause of a failure.
     start : Start
         Displacement, velocity and states that it begins with, in base coordinates.
-    start_loss : Loss
-        Energies [J] that the start itself took.
-    final : State
-        The state it ends in, after whatever happened at that instant; None for a run that never began.
-    final_work : float
-        Work [J] that varying loads and stops have done on the final state.
+    ending : Ending
+        Where the loop has stopped.
     load : array (m,)
         The static load in base coordinates.
-    stats : Statistics
-        Levels built, transitions, events, segments, function evaluations, bytes.
     warnings : tuple of str
         What to distrust in this answer and what to do about it, one sentence each that begins with its kind and a
         colon: truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
@@ -105,11 +100,8 @@ class Trajectory(ModelHistories):
     status: str
     message: str
     start: Start
-    start_loss: Loss
-    final: State | None
-    final_work: float
+    ending: Ending
     load: np.ndarray
-    stats: Statistics
     warnings: tuple[str, ...] = ()
     again: Again | None = field(default=None, repr=False, compare=False)
 
@@ -127,6 +119,30 @@ class Trajectory(ModelHistories):
     def t_start(self) -> float:
         """When it begins [s]."""
         return self.start.time
+
+    @property
+    def start_loss(self) -> Loss:
+        """Energies [J] that the start itself took."""
+        return self.ending.start_loss
+
+    @functools.cached_property
+    def final(self) -> State | None:
+        """The state it ends in, after whatever happened at that instant; None for a run that never began."""
+        return self.ending.state if self.segments else None
+
+    def ending_in(self, state: State) -> Trajectory:
+        """The same with another final state."""
+        return dataclasses.replace(self, ending=self.ending.at(state))
+
+    @property
+    def final_work(self) -> float:
+        """Work [J] that varying loads and stops have done on the final state."""
+        return self.ending.work
+
+    @property
+    def stats(self) -> Statistics:
+        """Levels built, transitions, events, segments, function evaluations, bytes."""
+        return self.ending.statistics(len(self.segments), len(self.events), self.model.levels_possible)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.

@@ -144,7 +144,7 @@ def test_a_ball_on_its_last_bounce_lands_for_good(loads):
     model = mp.MultiPhiModel(structure, [mp.UnilateralContact("floor", "ball", 0.0, restitution=0.5)], modes="all")
     weight = mp.ConstantLoad("ball", -9.81)
     first = mp.simulate(model, 0.6, displacement=[1.0], loads=[weight])
-    last = dataclasses.replace(first, final=dataclasses.replace(first.final, phases=(Phase.LANDING,)))
+    last = first.ending_in(dataclasses.replace(first.final, phases=(Phase.LANDING,)))
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     items = CreateMultiPhiBody(mbs, model, start=last, loads=[weight, *loads])

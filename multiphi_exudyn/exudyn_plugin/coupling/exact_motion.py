@@ -19,7 +19,8 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Event, State
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting, HeldForces, Inertia
 from multiphi_exudyn.time.chatter import limits
-from multiphi_exudyn.time.motion import NUMBERS, Motion, carry, measured
+from multiphi_exudyn.time.ending import NUMBERS
+from multiphi_exudyn.time.motion import Motion, carry, measured
 from multiphi_exudyn.time.record import PHASES, Record
 from multiphi_exudyn.time.recorded import Events
 
