@@ -122,9 +122,10 @@ LOST_AT_START = 36
 DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
 WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
 SWUNG = 47  # twice the largest energy so far, as far as it was looked for
-INDEPENDENCE = 48  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 49  # of the segment under way
-RUN_NUMBERS = 52
+LOST_SO_FAR = 48  # energies lost at events
+INDEPENDENCE = 54  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 55  # of the segment under way
+RUN_NUMBERS = 58
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 

@@ -103,6 +103,11 @@ class Motion:
         assert self._state is not None, self.message
         return self._state
 
+    @property
+    def events(self) -> Events:
+        """What has happened so far."""
+        return Events(self.record, self._kept.numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES])
+
     def go_on_from(self, state: State, time: float) -> None:
         """Forget what has been collected, and go on from a state and a time [s]."""
         self._state, self.time, self.message, self.start_loss = state, time, "", NOTHING
@@ -110,7 +115,7 @@ class Motion:
         self.record = Record(self.model.contacts, self.arrays)
         numbers = self._kept.numbers.copy()
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
-        numbers[a.WORKS : a.WORKS + 3] = 0.0
+        numbers[a.WORKS : a.WORKS + 3] = numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES] = 0.0
         self._kept = _Kept(numbers, 0, NO_RING, self._kept.piece)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
@@ -133,8 +138,7 @@ class Motion:
         """What has been collected; again: see Trajectory."""
         numbers = self._kept.numbers
         defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
-        segments = Recorded(self.record, defects, truncated, tuple(works))
-        events = Events(self.record)
+        segments, events = Recorded(self.record, defects, truncated, tuple(works)), self.events
         return Trajectory(
             model=self.model,
             segments=segments,
