@@ -123,10 +123,11 @@ DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not know
 WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
 SWUNG = 47  # twice the largest energy so far, as far as it was looked for
 GIVEN_ENERGY = 48  # kinetic and strain energy [J] that the run was given, less the potential of static loads
-INDEPENDENCE = 49  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 50  # of the segment under way
-MEAN_SQUARE, LARGEST_ENERGY = 53, 54  # of samples of a run that is over (time/sampling.py)
-RUN_NUMBERS = 55
+LOST_SO_FAR = 49  # energies lost at events
+INDEPENDENCE = 55  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 56  # of the segment under way
+MEAN_SQUARE, LARGEST_ENERGY = 59, 60  # of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 61
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 

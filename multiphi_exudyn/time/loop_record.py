@@ -27,6 +27,7 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     LOSSES,
     LOST,
+    LOST_SO_FAR,
     MODES,
     NUMBER,
     PHASE_COUNT,
@@ -111,7 +112,9 @@ def keep_events(ints: Ints, numbers: Numbers) -> None:
         ints[row + 1] = entered
         numbers[given] = numbers[TIME]
         for part in range(LOSSES):
-            numbers[given + 1 + part] = numbers[LOST + part] if first == 1 and entered != SHARED else 0.0
+            lost = numbers[LOST + part] if first == 1 and entered != SHARED else 0.0
+            numbers[given + 1 + part] = lost
+            numbers[LOST_SO_FAR + part] += lost
         numbers[given + 1 + LOSSES] = numbers[ints[CHANGE_IMPULSES] + k]
         if entered != SHARED:
             numbers[TRUNCATED] += abs(numbers[LOST + KINETIC] + numbers[LOST + STRAIN]) if first == 1 else 0.0

@@ -90,6 +90,11 @@ class Motion:
         """Energies [J] that its start took, where no event carries them."""
         return self._ending.start_loss
 
+    @property
+    def events(self) -> Events:
+        """What has happened so far."""
+        return Events(self.record, self._ending.numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES])
+
     def go_on_from(self, state: State, time: float) -> None:
         """Forget what has been collected, and go on from a state and a time [s]."""
         self.time, self.message, self._starting = time, "", False
@@ -97,7 +102,7 @@ class Motion:
         numbers, piece = self._ending.numbers.copy(), self._ending.piece
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
         numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES] = 0.0
-        numbers[a.WORKS : a.WORKS + 3] = 0.0
+        numbers[a.WORKS : a.WORKS + 3] = numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES] = 0.0
         self._ending = Ending(numbers, self.record, piece=piece).at(state)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
@@ -123,7 +128,7 @@ class Motion:
         return Trajectory(
             model=self.model,
             segments=Recorded(self.record, defects, truncated, tuple(works)),
-            events=Events(self.record),
+            events=self.events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",
             message=self.message,

@@ -120,17 +120,16 @@ class Recorded(Made[Segment], Segments):
 
 
 class Events(Made[Event]):
-    """The events of a record so far."""
+    """The events of a record so far; lost (6,): the energies [J] that left at all of them."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Record, lost: np.ndarray) -> None:
         self._make, self._count, self._known = record.event, 0 if record.eventless else len(record.places), {}
-        self._record = record
+        self._record, self._lost = record, lost
 
     @property
     def loss(self) -> Loss:
         """The energies [J] that left at all of them."""
-        amounts = self._record.amounts
-        return Loss(*np.ones(len(amounts)).dot(amounts)[1:-1].tolist())
+        return Loss(*self._lost.tolist())
 
     def impulse(self, contact: str, first: float, last: float) -> float:
         """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""

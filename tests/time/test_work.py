@@ -137,9 +137,9 @@ def test_plain_python_sums_the_same():
 
 
 def test_a_run_asked_on_the_way_keeps_its_ledger_when_it_goes_on():
-    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), COMPLIANT, modes="all")
+    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), RIGID, modes="all")
     for loads in (LOADS["samples"], LOADS["function"]):
-        motion = Run(model, 3.0, np.array([0.03, 0.06, -0.09]), loads=loads).begun()
+        motion = Run(model, 3.0, np.array([0.03, 0.06, -0.09]), loads=[*loads, mp.ConstantLoad("m2", -2.0)]).begun()
         motion.advance(1.0)
         early = motion.trajectory(1.0)
         motion.advance(3.0)

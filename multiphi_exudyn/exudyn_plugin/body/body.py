@@ -40,7 +40,6 @@ from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.time.motion import Motion, motion_of
-from multiphi_exudyn.time.recorded import Events
 from multiphi_exudyn.time.reliability import warnings_of_body
 
 __all__ = ["MultiPhiBody"]
@@ -139,7 +138,7 @@ class MultiPhiBody:
         self.coordinates = Coordinates(self.items, stepped, state.held, layout, most, matched)
         q, q_t, _ = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
         self.start = q, q_t
-        self._given_events = tuple(Events(motion.record))
+        self._given_events = tuple(motion.events)
         self._events = list(self._given_events)
 
     @property
