@@ -275,7 +275,9 @@ class Instants:
             s = level.signals @ later + level.signal_inputs @ w
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
             for value, i, size in zip(s, level.turns, sizes, strict=True):
-                if (i in resting and share > 0) or (i >= first and (share > 0 or state[i] == "stick")):
+                if (i in resting and share > 0) or (
+                    i >= first and (share > 0 or self._pressed(i - first, state, y, t))
+                ):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2
@@ -284,3 +286,12 @@ class Instants:
                         size = self.speed * self.levels.rate_of_all * share * tau
                     worst = max(worst, -value / size if size else 0.0)
         return worst
+
+    def _pressed(self, e, level, y, t):
+        """Whether a slider has a limit that is more than round-off, which that of a contact that closes is."""
+        slider = self.levels.system.sliders[e]
+        stop = None if slider.contact is None else self.levels.system.stops[slider.contact]
+        if stop is None or np.isinf(stop.stiffness) or stop.damping:
+            return True
+        most = level.limits[0][e] @ y + level.limits[1][e] @ self.levels.inputs(np.array([t]))[0]
+        return most > slider.static_limit * stop.stiffness * 10 * self.touch * self.length * np.sum(np.abs(stop.row))

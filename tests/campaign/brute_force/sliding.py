@@ -139,7 +139,7 @@ class Sliding:
         those that do not hold, the ones that had slipped fall first to their limits, and all is looked at once more.
         """
         level, falls, held = self.levels.level(before), {}, set(touching)
-        rests = [e for e, own in enumerate(options) if len(own) == 3]
+        rests = [e for e, own in enumerate(options) if len(own) == 3 and before[self.first + e] != "off"]
         pressed = any(self.all[e].contact in self.levels.rigid for e in rests)  # its limit is no number yet
         if not rests or pressed or len(rests) + len(held) < 2:
             return None
