@@ -267,7 +267,7 @@ class UnilateralContact:
         if math.isinf(self.tangential_stiffness):
             back = Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),))
         else:
-            ratio, firmness = self.friction / self.tangential_stiffness, TAKEN_FALLING if self.drop else TAKEN_ONCE
+            ratio, firmness = self.friction / self.tangential_stiffness, ALWAYS_TAKEN if self.drop else TAKEN_ONCE
             back = Exit("stick", rate=ratio * self.stiffness, firmness=firmness, further=(Share(1, rate=s),))
         return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), rubs=(link, s * self.friction))
 

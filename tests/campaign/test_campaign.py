@@ -89,8 +89,34 @@ def test_a_body_that_passes_its_rest_is_not_taken_for_one_that_somebody_has_move
     assert [verdict for verdict, _ in judged("rigid", 2176)[0]] == ["ok"]
 
 
+def test_a_free_body_that_a_load_moves_from_rest_is_not_taken_for_one_that_somebody_has_moved():
+    """It swings by nothing, but goes far: what the solver's iterations leave of that way is no hand."""
+    assert judged("friction free", 142102)[0] == [("ok", "")]
+
+
 def test_a_dip_that_brute_force_steps_over_is_seen_with_shorter_steps():
     assert [verdict for verdict, _ in judged("moving redundant", 2062)[0]] == ["ok"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [
+        ("rigid friction", 162141),  # a block elsewhere that every impact moves comes to rest as well
+        ("friction units", 150071),  # so does the friction of the other contact, which then holds up to a static limit
+    ],
+)
+def test_endless_impacts_end_with_all_that_they_move_at_rest(kind, number):
+    """Brute force ended those of the contacts alone: a slip too slow to be seen decided what followed."""
+    assert judged(kind, number)[0] == [("ok", "")]
+
+
+def test_a_spring_falls_from_its_static_limit_and_sticks_again():
+    """Brute force knew stick at the static limit and slip alone, of which neither was admissible, and gave up."""
+    assert judged("contact friction", 162068)[0] == [("ok", "")]
+
+
+def test_a_run_that_says_that_it_is_not_unique_may_differ():
+    assert [verdict for verdict, _ in judged("contact friction", 162054)[0]] == ["told"]
 
 
 def test_a_load_whose_numbers_are_large_hides_no_impact():

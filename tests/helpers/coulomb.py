@@ -129,8 +129,8 @@ class Coulomb:
             self.settle(t, z, i)
         else:
             self.modes[i] = what
-            slides = self.slip_end(i, what)
-            if c.most > c.friction and slides(t, z) < 0 and slides(t, z + 1e-6 * self.slope(t, z)) < slides(t, z):
+            sprung = math.isfinite(c.tangential_stiffness)
+            if sprung and c.most > c.friction and self.slip_end(i, what)(t, z) < 0:
                 self.change(t, z, i, "stick")  # the force has fallen, and its patch would slide back
 
     def run(self, t_end, x, v, times):

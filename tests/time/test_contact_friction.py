@@ -1,5 +1,6 @@
 """Contacts with friction: flutter, its boundary, belts, lift-off, and random systems against the law alone."""
 
+import itertools
 import math
 import warnings
 
@@ -236,8 +237,8 @@ def test_random_systems_move_as_an_integrator_says(seed):
     against_the_law(model, 4.0, x, v, np.linspace(0, 4, 101), loads, force)
 
 
-def test_a_spring_that_lets_go_while_the_pressure_falls_faster_sticks_again_at_once():
-    """Its patch would slide back: the force has fallen from the static limit, and the motion goes on without a slip."""
+def sprung_floor_model():
+    """A floor that gives way beneath a block, which rubs by a spring and has a static limit."""
     mass = np.diag([1.0, 0.6, 1.2])
     stiffness = np.array([[8.0, -3.0, 0.8], [-3.0, 9.0, 1.0], [0.8, 1.0, 12.0]])
     damping = np.diag([0.05, 0.03, 0.025]) + 0.02 * stiffness
@@ -245,9 +246,13 @@ def test_a_spring_that_lets_go_while_the_pressure_falls_faster_sticks_again_at_o
     floor = mp.UnilateralContact(
         "floor", "y", 0.0, 80.0, friction=0.3, static_friction=0.5, tangential="x", tangential_stiffness=60.0
     )
-    model = mp.MultiPhiModel(structure, [floor], modes="all")
+    return mp.MultiPhiModel(structure, [floor], modes="all")
+
+
+def test_a_spring_that_lets_go_while_the_pressure_falls_faster_sticks_again_at_once():
+    """Its patch would slide back: the force has fallen from the static limit, and the motion goes on without a slip."""
     run = against_the_law(
-        model, 6.0, np.array([0.4, 0.6, -0.08]), np.array([0.3, 0.0, 0.0]), np.linspace(0, 6, 201),
+        sprung_floor_model(), 6.0, np.array([0.4, 0.6, -0.08]), np.array([0.3, 0.0, 0.0]), np.linspace(0, 6, 201),
         [mp.ConstantLoad("y", -1.5)], lambda t: np.array([0.0, 0.0, -1.5]),
     )  # fmt: skip
     first, second = run.events[:2]
@@ -258,6 +263,20 @@ def test_a_spring_that_lets_go_while_the_pressure_falls_faster_sticks_again_at_o
     assert after == pytest.approx(0.3 * run.contact_force("floor", first.time), rel=1e-12)
     assert first.loss.friction == pytest.approx((before**2 - after**2) / (2 * 60.0), rel=1e-12)
     assert first.state == "slip+"
+
+
+@pytest.mark.parametrize(
+    ("x", "v"),
+    [([0.2, 0.1, -0.07], [1.4, 0.4, -0.7]), ([-0.25, 0.2, -0.2], [1.6, -0.3, -0.4])],
+)
+def test_and_where_its_patch_would_slide_back_ever_more_slowly(x, v):
+    """It does not wait, in a slip against its direction, until that has come to rest."""
+    run = against_the_law(
+        sprung_floor_model(), 3.0, np.array(x), np.array(v), np.linspace(0, 3, 101),
+        [mp.ConstantLoad("y", -1.5)], lambda t: np.array([0.0, 0.0, -1.5]),
+    )  # fmt: skip
+    at_once = [b for a, b in itertools.pairwise(run.events) if (a.kind, b.kind, a.time) == ("slip", "stick", b.time)]
+    assert at_once
 
 
 @pytest.mark.parametrize(("static", "spring"), [(None, math.inf), (0.6, 40.0)])

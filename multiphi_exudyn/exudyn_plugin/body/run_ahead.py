@@ -141,7 +141,8 @@ class RunAhead:
         here, way = self._body.coordinates, self._way
         if here.slips:  # what stays where it is held moves its modes by nothing
             way += float(np.linalg.norm(here.stepped.loaded.channels.shapes @ here.held))
-        apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
+        far = float(np.max(np.abs(expected), initial=0.0))  # more than they swing where they are free
+        apart, limit = q - expected, CHANGED * max(largest, far, UNSEEN * way)
         if not apart.dot(apart) <= limit * limit:
             raise MultiPhiValueError(
                 f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set, need "

@@ -11,7 +11,6 @@ from brute_force.system import NoAnswer
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
 SOONER = (1e-5, 1e-7)  # the same where no set is admissible: a slip may be over before
-SLOW = 1e-7  # of the scene's speeds: what endless impacts end with
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
@@ -34,6 +33,9 @@ class Instants:
             best, worst = self._least_violating(before, resting, y, t, moment)
             if worst <= ZERO:
                 break
+        fallen = self.levels.sliding.fallen(before, y, w)
+        if worst > ZERO and fallen is not y:  # sticks again with the limit that it has fallen to
+            best, worst = self._least_violating(before, resting, fallen, t, MOMENT)
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
         answer.rubbed += self.levels.sliding.let_go(before, best[0], y, w)
@@ -60,13 +62,22 @@ class Instants:
                     best, worst = (state, after), violation
         return best, worst
 
-    def at_rest(self, y, t):
-        """y behind ever faster impacts of several contacts in turn, which end at rest at all of them."""
+    def at_rest(self, before, y, t, slow):
+        """y behind ever faster impacts of several contacts in turn, which end at rest at all of them.
+
+        slow: of the scene's speeds, at which they do. So does what rubs without a spring, there or elsewhere, that
+        every impact has moved, and that is as slow.
+        """
         w = self.levels.inputs(np.array([t]))[0]
-        slow = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= SLOW * self.speed]
-        if not slow:
+        struck = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= slow * self.speed]
+        if not struck:
             return y
-        rows, u = self.rows[slow], np.array([self._rate(i, y, w) for i in slow])
+        sliders, first = self.levels.system.sliders, self.levels.sliding.first
+        rubs = [e for e in range(len(sliders)) if before[first + e] != "off" or sliders[e].contact in struck]
+        rubs = [e for e in rubs if self.levels.sliding.rigid(e)]
+        rubs = [e for e in rubs if abs(self._passing(e, y, w)) <= slow * self.speed * np.sum(np.abs(sliders[e].row))]
+        rows = np.array([self.rows[i] for i in struck] + [sliders[e].row for e in rubs])
+        u = np.array([self._rate(i, y, w) for i in struck] + [self._passing(e, y, w) for e in rubs])
         impulses = -np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ u
         y = y.copy()
         y[self.n : 2 * self.n] += self.inverse @ rows.T @ impulses
@@ -264,7 +275,9 @@ class Instants:
             s = level.signals @ later + level.signal_inputs @ w
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
             for value, i, size in zip(s, level.turns, sizes, strict=True):
-                if (i in resting and share > 0) or (i >= first and (share > 0 or state[i] == "stick")):
+                if (i in resting and share > 0) or (
+                    i >= first and (share > 0 or self._pressed(i - first, state, y, t))
+                ):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2
@@ -273,3 +286,12 @@ class Instants:
                         size = self.speed * self.levels.rate_of_all * share * tau
                     worst = max(worst, -value / size if size else 0.0)
         return worst
+
+    def _pressed(self, e, level, y, t):
+        """Whether a slider has a limit that is more than round-off, which that of a contact that closes is."""
+        slider = self.levels.system.sliders[e]
+        stop = None if slider.contact is None else self.levels.system.stops[slider.contact]
+        if stop is None or np.isinf(stop.stiffness) or stop.damping:
+            return True
+        most = level.limits[0][e] @ y + level.limits[1][e] @ self.levels.inputs(np.array([t]))[0]
+        return most > slider.static_limit * stop.stiffness * 10 * self.touch * self.length * np.sum(np.abs(stop.row))

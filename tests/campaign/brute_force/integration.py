@@ -14,23 +14,24 @@ TOUCH = (
 )
 SOON = 1e-7  # of a step: after which a signal that an instant has left at zero has a sign
 LEAST, BLOCK = 8, 64  # steps between two looks at the signs
-MOST_EVENTS = 600  # more are given up
+MOST_EVENTS = 2000  # more are given up
 MOST_ROCKING = 6  # instants close together: an end of endless impacts
+SLOW = 1e-7  # of the scene's speeds: what they end with
 FINE = 17  # places in two steps at which a dip is looked for
 
 
-def solved(system, displacement, velocity, times, touch=TOUCH, finer=1, rocking=MOST_ROCKING):
+def solved(system, displacement, velocity, times, touch=TOUCH, finer=1, rocking=MOST_ROCKING, slow=SLOW):
     """Motion from t = 0 at times (k,), ascending; touch: of the scene's lengths, see TOUCH.
 
     finer: steps, and with them the looks at signs, are so many times as short: a shorter dip is seen.
-    rocking: instants close together after which endless impacts are ended.
+    rocking: instants close together after which endless impacts are ended. slow: of the scene's speeds, with which.
     """
-    return _Integration(system, np.asarray(times, float), touch, finer, rocking).run(displacement, velocity)
+    return _Integration(system, np.asarray(times, float), touch, finer, rocking, slow).run(displacement, velocity)
 
 
 class _Integration:
-    def __init__(self, system, times, touch, finer, rocking):
-        self.times, self.touch, self.rocking = times, touch, rocking
+    def __init__(self, system, times, touch, finer, rocking, slow):
+        self.times, self.touch, self.rocking, self.slow = times, touch, rocking, slow
         self.levels = Levels(system, times, finer)
         self.n = self.levels.n
 
@@ -69,7 +70,7 @@ class _Integration:
                 rocking = rocking + 1 if t - before <= 100 * instants.moment(t) else 0
                 before = t
                 if rocking > self.rocking:
-                    y = instants.at_rest(y, t)
+                    y = instants.at_rest(state, y, t, self.slow)
                 state, y = instants.settled(state, y, t, answer)
         if shown < len(self.times):
             answer.displacement[:, shown:], answer.velocity[:, shown:] = (

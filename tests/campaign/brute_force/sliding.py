@@ -139,7 +139,7 @@ class Sliding:
         those that do not hold, the ones that had slipped fall first to their limits, and all is looked at once more.
         """
         level, falls, held = self.levels.level(before), {}, set(touching)
-        rests = [e for e, own in enumerate(options) if len(own) == 3]
+        rests = [e for e, own in enumerate(options) if len(own) == 3 and before[self.first + e] != "off"]
         pressed = any(self.all[e].contact in self.levels.rigid for e in rests)  # its limit is no number yet
         if not rests or pressed or len(rests) + len(held) < 2:
             return None
@@ -220,6 +220,18 @@ class Sliding:
             return ["stick", state], True
         tight = [sign for sign, s in SIGNS.items() if s * tension >= most * (1 - ZERO)]
         return ["stick", *tight], bool(tight)
+
+    def fallen(self, before, y, w):
+        """y where springs at their static limits have fallen to their smaller ones; y itself where none have."""
+        level, after = self.levels.level(before), y
+        for e, slider in enumerate(self.all):
+            sprung = before[self.first + e] == "stick" and not self.rigid(e) and slider.static_limit > slider.limit
+            tension = level.tensions[0][e] @ y + level.tensions[1][e] @ w
+            most = level.limits[0][e] @ y + level.limits[1][e] @ w
+            if sprung and abs(tension) >= most * (1 - ZERO):
+                after = y.copy() if after is y else after
+                after[self.tension + e] *= slider.limit / slider.static_limit
+        return after
 
     def let_go(self, before, state, y, w):
         """Energy [J] that springs lose where their sliders begin to slip, from a static limit to a smaller one."""
