@@ -7,5 +7,5 @@ loop's own flow. What its truncated modes could not hold, and what to distrust i
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, resuming,
 sampling, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, start, model_histories, trajectory,
 defects, truncation, chatter, loop_record, loop, going_on, failures, motion, refinement, rubbing, known_warnings,
-reliability, simulate, many.
+reliability, several, simulate, workers, many.
 """

@@ -14,7 +14,8 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.entering import Measure, set_start, set_state
+from multiphi_exudyn.events.entering import Measure, enter_start, set_start, set_state
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Loss, Phase, State
@@ -39,7 +40,7 @@ RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a lapto
 NOTHING = Loss()
 NO_RING = np.zeros(0)
 
-carry, measured = entry(advance), entry(measure)
+carry, measured, entered = entry(advance), entry(measure), entry(enter_start)
 quiet = np.errstate(all="ignore")  # as compiled: what is not finite is found, and told
 
 
@@ -73,6 +74,7 @@ class Motion:
         self.arrays, self.start = arrays, start
         self._loop: Callable[..., Any] = loop or (quiet(advance) if compiled is False else carry)
         self._measured: Measure = measure if compiled is False else measured
+        self._entered: Callable[..., None] = enter_start if compiled is False else entered
         self.levels = arrays.levels
         self.model = self.levels.model
         self.time, self.message, self.start_loss = start.time, "", NOTHING
@@ -162,7 +164,7 @@ class Motion:
     def _carry(self, end: float, to_change: bool = False) -> None:
         """A failure ends the run, with its instant and its cause."""
         try:
-            self._take_over()
+            self.take_over()
             self.arrays.ints[a.STOP_AT_EVENT] = int(to_change)
             answer = self._run(end)
             self._leave()
@@ -214,7 +216,7 @@ class Motion:
 
     # ------------------------------------------------------------------ the state in the arrays
 
-    def _take_over(self) -> None:
+    def take_over(self) -> None:
         """Get the arrays from the run that has them."""
         owner = self.arrays.owner() if self.arrays.owner else None
         if owner is not self:
@@ -238,7 +240,8 @@ class Motion:
         arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
-            set_start(arrays, start.displacement, start.velocity, start.states, start.held, start.penetrating)
+            given = start.displacement, start.velocity, start.states, start.held, start.penetrating
+            set_start(arrays, *given, self._entered)
         else:
             phases = [NUMBERS[phase] for phase in state.phases]
             set_state(arrays, level, state.displacement, state.velocity, phases, self._measured)
@@ -256,13 +259,33 @@ class Motion:
         self.time = float(numbers[a.TIME])
         if not ints[a.STARTING]:
             if self._starting:
-                lost = numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist()
-                self.start_loss = Loss(*lost) if any(lost) else NOTHING
+                self._tell_start(numbers)
             self._state, self._starting = self._state_reached(), False
         samples = ints[a.FOUND] + 1
         self._evaluations += int(numbers[samples])
         self._transitions += int(ints[a.TRANSITIONS])
         ints[a.TRANSITIONS], numbers[samples] = 0, 0.0
+
+    def _tell_start(self, numbers: np.ndarray) -> None:
+        lost = numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist()
+        self.start_loss = Loss(*lost) if any(lost) else NOTHING
+
+    def land(self, part: dict[str, np.ndarray], told: np.ndarray) -> None:
+        """Be where several.py has brought it: its record, of which the last segment is its final state.
+
+        told: numbers of a run at its end, evaluations, transitions. It goes no further: its chatter check begins anew.
+        """
+        rows, spans = part["rows"], part["spans"]
+        number, piece, _, start, waits = rows[-1].tolist()
+        level = self.arrays.loaded[number]
+        n, exits = level.level.modes, len(exits_of(level))
+        phases = part["phases"][waits : waits + exits].tolist() if waits >= 0 else [0] * exits
+        x = part["coordinates"][start : start + 2 * n]
+        self._state, self._starting = State(level, x[:n], x[n:], tuple(PHASES[k] for k in phases)), False
+        self.record.keep(part | {"rows": rows[:-1], "spans": spans[:-1]})
+        self._kept, self.time = _Kept(told[: a.OF_A_RUN], 0, NO_RING, piece), float(told[a.TIME])
+        self._evaluations, self._transitions = map(int, told[a.OF_A_RUN :].tolist())
+        self._tell_start(told)
 
     def _state_reached(self) -> State:
         ints, numbers = self.arrays.buffers.ints, self.arrays.buffers.numbers
