@@ -7,44 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.arrays import (
-    CHANNELS,
-    COORDINATES,
-    DRIVE,
-    ELEMENTS,
-    GIVEN,
-    LEVEL,
-    PLACE,
-    PRESCRIBED,
-    SPEED,
-    STATES,
-)
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.state_arrays import measure
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
-__all__ = ["Measure", "enter_start", "set_start", "set_state"]
+__all__ = ["Measure", "set_start", "set_state"]
 
 Measure = Callable[[np.ndarray, np.ndarray, int], None]
-
-
-@compiled
-def enter_start(ints: Ints, numbers: Numbers, states: Ints, given: Numbers, k: int) -> None:
-    """GIVEN becomes the k-th start: states (c,) of elements; y, y' (m,) and the places (h,) that links hold."""
-    m, q, here = ints[COORDINATES], ints[PRESCRIBED], ints[ints[GIVEN + LEVEL] + STATES]
-    held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
-    start = k * (2 * m + held)
-    for i in range(ints[ELEMENTS]):
-        ints[here + i] = states[k * ints[ELEMENTS] + i]
-    for i in range(m):
-        numbers[place + i] = given[start + i]
-        numbers[speed + i] = given[start + m + i]
-    for i in range(q):
-        numbers[place + m + i] = numbers[ints[DRIVE] + i]
-        numbers[speed + m + i] = numbers[ints[DRIVE] + q + i]
-    for i in range(held):
-        numbers[place + m + q + i] = given[start + 2 * m + i]
-        numbers[speed + m + q + i] = 0.0
 
 
 def set_start(
@@ -54,16 +22,25 @@ def set_start(
     key: Sequence[int],
     held: np.ndarray,
     sprung: Sequence[int],
-    entered: Callable[..., None] = enter_start,
 ) -> None:
     """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
 
-    held: places (h,) that links hold. sprung: links that hold by their springs. entered: ``enter_start``, or compiled.
+    held: places (h,) that links hold. sprung: links that hold by their springs.
     """
     base = arrays.base
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
+    m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[base + a.STATES])
+    for i, state in enumerate(key):
+        ints[states + i] = state
     ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = base, a.FRESH
-    entered(ints, numbers, np.array(key, np.int64), np.concatenate([displacement, velocity, held]), 0)
+    drive = int(ints[a.DRIVE])
+    for k, (part, values, placed) in enumerate(((a.PLACE, displacement, held), (a.SPEED, velocity, 0.0 * held))):
+        start = int(ints[a.GIVEN + part])
+        numbers[start : start + m] = values
+        if q:
+            numbers[start + m : start + m + q] = numbers[drive + k * q : drive + (k + 1) * q]
+        if len(held):
+            numbers[start + m + q : start + m + q + len(held)] = placed
     numbers[a.GIVEN_SPRINGS] = _springs(arrays, sprung) if sprung else 0.0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.entering import Measure, enter_start, set_start, set_state
+from multiphi_exudyn.events.entering import Measure, set_start, set_state
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -40,7 +40,7 @@ RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a lapto
 NOTHING = Loss()
 NO_RING = np.zeros(0)
 
-carry, measured, entered = entry(advance), entry(measure), entry(enter_start)
+carry, measured = entry(advance), entry(measure)
 quiet = np.errstate(all="ignore")  # as compiled: what is not finite is found, and told
 
 
@@ -74,7 +74,6 @@ class Motion:
         self.arrays, self.start = arrays, start
         self._loop: Callable[..., Any] = loop or (quiet(advance) if compiled is False else carry)
         self._measured: Measure = measure if compiled is False else measured
-        self._entered: Callable[..., None] = enter_start if compiled is False else entered
         self.levels = arrays.levels
         self.model = self.levels.model
         self.time, self.message, self.start_loss = start.time, "", NOTHING
@@ -240,8 +239,7 @@ class Motion:
         arrays.channels.set(arrays.buffers, piece, float(kept[a.AGE]), self.time)
         if state is None:
             start = self.start
-            given = start.displacement, start.velocity, start.states, start.held, start.penetrating
-            set_start(arrays, *given, self._entered)
+            set_start(arrays, start.displacement, start.velocity, start.states, start.held, start.penetrating)
         else:
             phases = [NUMBERS[phase] for phase in state.phases]
             set_state(arrays, level, state.displacement, state.velocity, phases, self._measured)

@@ -17,13 +17,17 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import (
     CHANNELS,
     COORDINATE_COUNT,
+    COORDINATES,
     CURRENT,
     DECISIONS,
+    DRIVE,
     DRIVE_NEXT,
+    ELEMENTS,
     END_REACHED,
     EVENT_COUNT,
     FOUND,
     FRESH,
+    GIVEN,
     GIVEN_UP,
     HORIZON,
     LEVEL,
@@ -37,13 +41,14 @@ from multiphi_exudyn.events.arrays import (
     PRESCRIBED,
     SEGMENT_COUNT,
     SEGMENT_ROOM,
+    SPEED,
     STARTING,
+    STATES,
     STOP_AT_EVENT,
     TIME,
     TRANSITIONS,
 )
 from multiphi_exudyn.events.drive import keep_drive, load_piece, set_drive
-from multiphi_exudyn.events.entering import enter_start
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled, entry
 from multiphi_exudyn.time.defects import SAMPLES
@@ -76,7 +81,7 @@ def carry_starts(
     ends: Ints,
     told: Numbers,
 ) -> int:
-    """Carries starts (entering.enter_start) to ``end`` one after the other; how many of them have come there.
+    """Carries starts (``enter_start``) to ``end`` one after the other; how many of them have come there.
 
     until: how long the first piece of the channels lasts. fresh: the numbers of a run at its start. ends: counts
     (count + 1, ENDS) of the record, the first ones zero. told: numbers (count, TOLD_WIDTH) of each run, and its
@@ -108,6 +113,25 @@ def carry_starts(
         ends[after], ends[after + 1] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT]
         ends[after + 2], ends[after + 3] = ints[PHASE_COUNT], ints[EVENT_COUNT]
     return count
+
+
+@compiled
+def enter_start(ints: Ints, numbers: Numbers, states: Ints, given: Numbers, k: int) -> None:
+    """GIVEN becomes the k-th start: states (c,) of elements; y, y' (m,) and the places (h,) that links hold."""
+    m, q, here = ints[COORDINATES], ints[PRESCRIBED], ints[ints[GIVEN + LEVEL] + STATES]
+    held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
+    start = k * (2 * m + held)
+    for i in range(ints[ELEMENTS]):
+        ints[here + i] = states[k * ints[ELEMENTS] + i]
+    for i in range(m):
+        numbers[place + i] = given[start + i]
+        numbers[speed + i] = given[start + m + i]
+    for i in range(q):
+        numbers[place + m + i] = numbers[ints[DRIVE] + i]
+        numbers[speed + m + i] = numbers[ints[DRIVE] + q + i]
+    for i in range(held):
+        numbers[place + m + q + i] = given[start + 2 * m + i]
+        numbers[speed + m + q + i] = 0.0
 
 
 @compiled
