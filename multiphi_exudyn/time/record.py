@@ -37,7 +37,7 @@ STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
 
 def _joined(name: str) -> property:
     """An array of a record."""
-    return property(lambda record: record.parts[name].whole)
+    return property(lambda record: record.joined(name))
 
 
 class Record:
@@ -89,6 +89,12 @@ class Record:
         if self._parts:
             taken += [part.bytes for part in self._parts.values()]
         return sum(taken)
+
+    def joined(self, name: str) -> np.ndarray:
+        """One of the arrays; where all was taken at once, as it was taken."""
+        if self._last and not self._parts:
+            return self._last.get(name, EMPTY[name])
+        return self.parts[name].whole
 
     @property
     def parts(self) -> dict[str, Growing]:
