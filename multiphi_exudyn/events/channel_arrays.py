@@ -69,6 +69,11 @@ class ChannelArrays:
         while self._excitation.prescribed and buffers.ints[a.PIECE_COUNT] <= piece:
             self.reserve(buffers)
 
+    @property
+    def first_end(self) -> float:
+        """When [s] the first piece of the channels ends, as far as it is asked for."""
+        return min(self._until, float(self._pieces.ends[0])) if self._excitation.prescribed else self._until
+
     def drive(self, piece: int) -> Drive:
         """The channels from the beginning of a piece on."""
         return self._excitation.drive(float(self._pieces.starts[piece]))

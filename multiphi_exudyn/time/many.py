@@ -1,51 +1,35 @@
-"""Many runs of one model that differ in their starts alone, on as many threads as are worth it.
+"""Many runs of one model that differ in their starts alone, on all cores.
 
-A thread carries one run at a time, on arrays of its own; levels are built once, for all. The compiled loop lets other
-threads go on, and everything else of a run is done by one thread at a time, so a run is what it is alone, to the bit,
-however many threads there are. What is not asked for is not kept.
+A thread has arrays of its own, on which several runs at a time are carried to their ends (several.py); levels are built
+once, for all. The compiled loop lets other threads go on, and everything else of a run is done by one thread at a time,
+so a run is what it is alone, to the bit, however many threads there are. What is not asked for is not kept.
 """
 
 from __future__ import annotations
 
-import functools
-import itertools
 import os
-import threading
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.levels.mode_choice import Tolerance, is_count
+from multiphi_exudyn.levels.mode_choice import is_count
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.compiled import available
 from multiphi_exudyn.mechanics.arguments import no_text, real_array
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.base_share import row_warnings
-from multiphi_exudyn.time.level_rows import point_row
-from multiphi_exudyn.time.motion import Motion, carry
-from multiphi_exudyn.time.segment import listed
-from multiphi_exudyn.time.simulate import Run, checked_end, holding, warned
-from multiphi_exudyn.time.start import Start
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.simulate import Run, checked_end, holding
 from multiphi_exudyn.time.warning_groups import grouped, issue
+from multiphi_exudyn.time.workers import StartVectors, Task
 
 __all__ = ["ManyRuns", "simulate_many"]
 
 BAR_DELAY = 2.0  # s before a progress bar appears
-KEPT = 8  # levels under loads as finely interpolated as runs have needed
-TRIED = 8  # first runs, by which the number of threads is chosen
-MOSTLY = 0.6  # of their time in the loop: below it threads wait for each other longer than they gain
-
-_Start: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"
 
 
 @dataclass(frozen=True)
@@ -121,8 +105,8 @@ def simulate_many(
     times : array (t,), default None
         At which they are [s], None for the end alone.
     threads : int, default None
-        How many; the answer does not hang on it. None for as many as there are cores where the loop takes most of the
-        first runs' time, and one elsewhere: all but the loop is done by one thread at a time.
+        How many; the answer does not hang on it. None for as many as there are cores, and one where the loop is plain
+        Python: all but the compiled loop is done by one thread at a time.
 
     Returns
     -------
@@ -158,123 +142,16 @@ def simulate_many(
     outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]
     Excitation.of(wider, loads, end)  # what is wrong with a load is so for all runs
     given = Run(wider, end, loads=loads)
-    task = _Task(given, starts, tuple(points), _times(times, end))
+    task = Task(given, starts, [row for _, row in rows], _times(times, end))
     with tqdm(total=len(starts), unit="run", disable=None, leave=False, delay=BAR_DELAY) as bar:
         task.carry_out(_checked(threads), bar)
-    result = task.result()
-    groups = grouped((str(number), sentences) for number, sentences in enumerate(result.warnings))
+    status, messages, warnings = zip(*task.told, strict=True)
+    groups = grouped((str(number), sentences) for number, sentences in enumerate(warnings))
     issue((*outside, *(group.told(len(starts)) for group in groups)))
-    return result
+    return ManyRuns(tuple(points), task.times, task.samples, task.events, task.ends, status, messages, warnings)
 
 
-class _Task:
-    """Runs to be done, and what is kept of them; given: what they have in common.
-
-    lock: whoever has it works on levels and on what is kept.
-    """
-
-    def __init__(self, given: Run, starts: list[_Start], points: tuple[At, ...], times: np.ndarray) -> None:
-        self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
-        self.levels = BoundedCache[object, LoadedLevels](KEPT)
-        self._rows: tuple[MultiPhiModel | None, list[np.ndarray]] = None, []
-        self._points, self._times, count = points, times, len(starts)
-        self._samples, self._ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
-        self._events, self._told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
-
-    def carry_out(self, threads: int | None, bar: Any) -> None:
-        """All runs; a Tolerance is decided by the first ones, one after the other."""
-        left, model = iter(range(len(self._starts))), self._given.model
-        while isinstance(model.modes, Tolerance) and model.decided is None and (number := next(left, None)) is not None:
-            self._run(number, None)
-            bar.update()
-        threads = self._chosen(left, bar) if threads is None else threads
-        with ThreadPoolExecutor(threads) as pool:
-            working = [pool.submit(self._work, left, bar) for _ in range(threads)]
-            try:
-                for each in working:
-                    each.result()
-            finally:
-                self._stopped = True
-
-    def _chosen(self, left: Iterator[int], bar: Any) -> int:
-        """How many threads are worth it, by the first runs."""
-        worker, begun = _Worker(self), time.perf_counter()
-        with self.lock:
-            for number in itertools.islice(left, TRIED):
-                self._run(number, worker)
-                bar.update()
-        return os.cpu_count() or 1 if worker.looped > MOSTLY * (time.perf_counter() - begun) else 1
-
-    def result(self) -> ManyRuns:
-        """What is kept."""
-        status, messages, warnings = zip(*self._told, strict=True)
-        kept = self._samples, self._events, self._ends
-        return ManyRuns(self._points, self._times, *kept, status, messages, warnings)
-
-    def _work(self, left: Iterator[int], bar: Any) -> None:
-        worker = _Worker(self)
-        with self.lock:
-            while not self._stopped and (number := next(left, None)) is not None:
-                self._run(number, worker)
-                bar.update()
-
-    def _run(self, number: int, worker: _Worker | None) -> None:
-        displacement, velocity = self._starts[number]
-        run = replace(self._given, displacement=displacement, velocity=velocity, shared=worker)
-        try:
-            trajectory = warned(run)
-            self._events[number], self._ends[number] = len(trajectory.events), trajectory.t_end
-            self._told[number] = trajectory.status, trajectory.message, trajectory.warnings
-            self._sample(number, trajectory)
-        except MultiPhiError as refused:
-            self._told[number] = "failed", str(refused), ()
-
-    def _sample(self, number: int, trajectory: Trajectory) -> None:
-        known = self._times <= trajectory.t_end
-        if not (trajectory.segments and known.any()):
-            return
-        segments, times = listed(trajectory.segments), self._times[known]
-        for place, row in enumerate(self._rows_of(trajectory.model)):
-            self._samples[number, place, known] = segments.values(times, "right", functools.partial(point_row, row))
-
-    def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
-        """The points' rows (m,) in the base coordinates of the model that runs end with, one for most of them."""
-        if self._rows[0] is not model:
-            rows = [model.base.modes.shapes.T @ model.structure.row(point) for point in self._points]
-            self._rows = model, rows
-        return self._rows[1]
-
-
-class _Worker:
-    """The arrays of a thread (simulate.Shared); looped: time [s] that it has been in the loop."""
-
-    def __init__(self, task: _Task) -> None:
-        self._task, self.looped = task, 0.0
-        self._arrays = BoundedCache[LoadedLevels, LevelArrays](KEPT)
-
-    def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
-        """The levels under the loads, those of all threads."""
-        return self._task.levels.get_or_build(key, made)
-
-    def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
-        """A run on the thread's arrays."""
-        arrays = self._arrays.get_or_build(levels, lambda: LevelArrays(levels))
-        motion = Motion(arrays, start, compiled, self._loop)
-        motion.sums_works = False  # an outcome has no ledger
-        return motion
-
-    def _loop(self, *given: Any) -> Any:
-        """The compiled loop, while others may go on."""
-        self._task.lock.release()
-        begun = time.perf_counter()
-        try:
-            return carry(*given)
-        finally:
-            self.looped += time.perf_counter() - begun
-            self._task.lock.acquire()
-
-
-def _starts(model: MultiPhiModel, displacements: Any, velocities: Any) -> list[_Start]:
+def _starts(model: MultiPhiModel, displacements: Any, velocities: Any) -> list[StartVectors]:
     """x and x' of every start."""
     n, needed = model.structure.n, "a (k, n) array of real numbers"
     given = {"displacements": displacements, "velocities": velocities}
@@ -299,9 +176,9 @@ def _times(given: Any, end: float) -> np.ndarray:
     return times
 
 
-def _checked(threads: int | None) -> int | None:
+def _checked(threads: int | None) -> int:
     if threads is not None and not is_count(threads):
         raise MultiPhiTypeError(f"threads: got {threads!r}, need an integer or None")
     if threads is not None and threads < 1:
         raise MultiPhiValueError(f"threads: got {threads}, need at least 1")
-    return threads
+    return threads or (os.cpu_count() if available() else None) or 1

@@ -15,6 +15,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.entering import Measure, set_start, set_state
+from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Loss, State
@@ -143,7 +144,7 @@ class Motion:
     def _carry(self, end: float, to_change: bool = False) -> None:
         """A failure ends the run, with its instant and its cause."""
         try:
-            self._take_over()
+            self.take_over()
             self.arrays.buffers.ints[a.STOP_AT_EVENT] = to_change
             answer = self._run(end)
             self._leave()
@@ -195,7 +196,7 @@ class Motion:
 
     # ------------------------------------------------------------------ the state in the arrays
 
-    def _take_over(self) -> None:
+    def take_over(self) -> None:
         """Get the arrays from the run that has them, and has left them."""
         if self.arrays.owner is None or self.arrays.owner() is not self:
             self._enter()
@@ -250,6 +251,33 @@ class Motion:
         self.time = float(self._ending.numbers[a.TIME])
         if not self.arrays.buffers.ints[a.STARTING]:
             self._starting = False
+
+    def land(self, part: dict[str, np.ndarray], told: np.ndarray) -> None:
+        """Be where several.py has brought it: its record, of which the last segment is its final state.
+
+        told: numbers of a run at its end, evaluations, transitions. It goes no further: its chatter check begins anew.
+        """
+        rows, spans = part["rows"], part["spans"]
+        number, piece, _, start, waits = rows[-1].tolist()
+        level = self.arrays.loaded[number]
+        n, exits = level.level.modes, len(exits_of(level))
+        phases = part["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
+        x = part["coordinates"][start : start + 2 * n]
+        self.record.keep(part | {"rows": rows[:-1], "spans": spans[:-1]})
+        ended = Ending(
+            told[: a.OF_A_RUN],
+            self.record,
+            level,
+            x[:n],
+            x[n:],
+            tuple(phases),
+            piece=piece,
+            levels_built=self.model.levels_built,
+            array_bytes=self.arrays.buffers.size,
+        )
+        evaluations, transitions = told[a.OF_A_RUN :].tolist()
+        self._ending = ended._replace(evaluations=evaluations, transitions=int(transitions))
+        self._starting, self.time = False, float(told[a.TIME])
 
     def failure(self) -> Exception:
         """What has stopped the loop."""

@@ -66,13 +66,14 @@ class Record:
 
     def take(self) -> None:
         """Take over what the loop has written."""
-        self._keep(taken(self.arrays, PARTS))
+        self.keep(taken(self.arrays, PARTS))
 
     def take_events(self) -> None:
         """Take over the events of what the loop has written, and forget the rest."""
-        self._keep(taken(self.arrays, EVENTS))
+        self.keep(taken(self.arrays, EVENTS))
 
-    def _keep(self, part: dict[str, np.ndarray]) -> None:
+    def keep(self, part: dict[str, np.ndarray]) -> None:
+        """Add a part, as it stood in the loop's arrays."""
         if not part:
             return
         if self._last:
@@ -177,9 +178,9 @@ class Record:
             function, n = row(self.levels[number]), self.levels[number].level.modes
             functions[number, :n], functions[number, width : width + n] = function[:n], function[n : 2 * n]
             functions[number, -1] = function[-1]
-        given = functions.ravel(), width, np.ascontiguousarray(times), len(times), int(side == "left"), result
+        asked = functions.ravel(), 0, width, np.ascontiguousarray(times), len(times), int(side == "left"), result, 0
         for offsets in self._packed(visited):
-            while self._supply(values_of(*self._given(offsets), len(self.rows), *given)):
+            while self._supply(values_of(*self._given(offsets), 0, len(self.rows), *asked)):
                 pass
         return result
 

@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.time_functions import Smooth, Sweep
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["to_tolerance"]
+__all__ = ["refined", "to_tolerance"]
 
 REFINEMENTS = 2  # of smooth courses; the second corrects for what the first has changed
 SAFETY = 1.5  # on the factor by which they are refined
@@ -29,8 +29,7 @@ def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> T
     trajectory, finer = run(1.0), 1.0
     if not loads:
         return trajectory
-    courses = [getattr(load, "course", None) for load in loads]
-    wanted = [course.tolerance for course in courses if isinstance(course, (Smooth, Sweep))]
+    wanted = [course.tolerance for course in refined(loads)]
     for _ in range(REFINEMENTS if wanted else 0):
         if trajectory.status != "ok" or (error := _interpolation_error(trajectory)) <= min(wanted):
             return trajectory
@@ -40,6 +39,12 @@ def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> T
         told = f"smooth loads: the response is accurate to {error:.2g} of its largest value, not to {min(wanted):g}"
         return replace(trajectory, message=told)
     return trajectory
+
+
+def refined(loads: Sequence[Load]) -> list[Smooth | Sweep]:
+    """The smooth courses of loads."""
+    courses = [getattr(load, "course", None) for load in loads]
+    return [course for course in courses if isinstance(course, (Smooth, Sweep))]
 
 
 def _interpolation_error(trajectory: Trajectory) -> float:

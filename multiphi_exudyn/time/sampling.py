@@ -94,21 +94,25 @@ def sample_rows(
     spans: Numbers,
     coordinates: Numbers,
     offsets: Ints,
+    first: int,
     segments: int,
     functions: Numbers,
+    function: int,
     width: int,
     times: Numbers,
     count: int,
     left: int,
     values: Numbers,
+    result: int,
 ) -> int:
     """Values (count,) at times [s] of what is row.(xi, xi', 1) in every level, at an event from the left or the right.
 
-    functions: the rows (levels, 2 width + 1), in the order of offsets. OK or NEED.
+    Of the segments from ``first`` before ``segments``. function: where the rows (levels, 2 width + 1) stand, in the
+    order of offsets. result: where values begin. OK or NEED.
     """
     i, k, step = -1, 0, even_step(times, count)
     while k < count:
-        i = owner_of(spans, segments, times[k], left, i)
+        i = owner_of(spans, first, segments, times[k], left, i)
         level, last = offsets[rows[i * SEGMENT_WIDTH]], k + 1
         until = spans[(i + 1) * SEGMENT_WIDTH_NUMBERS] if i + 1 < segments else math.inf
         while last < count and times[k] < times[last] < until:
@@ -116,12 +120,12 @@ def sample_rows(
         if level > 0:
             if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
-            began, row = spans[i * SEGMENT_WIDTH_NUMBERS], rows[i * SEGMENT_WIDTH] * (2 * width + 1)
+            began, row = spans[i * SEGMENT_WIDTH_NUMBERS], function + rows[i * SEGMENT_WIDTH] * (2 * width + 1)
             weigh(ints, numbers, waves, level, functions, row, width)
             constant, n = functions[row + 2 * width], ints[level + MODES] + ints[CHANNELS]
             for held in range(n - ints[CHANNELS] + ints[PRESCRIBED], n):
                 constant += functions[row + held] * numbers[ints[AFTER + PLACE] + held]
-            sample_flow(ints, numbers, waves, began, constant, times, k, last, step, values)
+            sample_flow(ints, numbers, waves, began, constant, times, k, last, step, values, result)
         k = last
     return OK
 
@@ -147,7 +151,7 @@ def sample_sizes(
     numbers[MEAN_SQUARE] = numbers[LARGEST_ENERGY] = 0.0
     for k in range(count):
         t = first + (end - first) * k / (count - 1)
-        i = owner_of(spans, segments, t, 0, i)
+        i = owner_of(spans, 0, segments, t, 0, i)
         level, x = offsets[rows[i * SEGMENT_WIDTH]], ints[AFTER + PLACE]
         if level == 0:
             continue
@@ -203,6 +207,7 @@ def sample_flow(
     last: int,
     step: float,
     values: Numbers,
+    result: int,
 ) -> None:
     """Values from ``first`` before ``last`` of a constant and SIGNALS on the flow of a segment that ``began`` [s]."""
     basis, p, phi, c = ints[FLOW_BASIS], ints[FLOW_COUNT], ints[WORK_WAVES], ints[SIGNALS]
@@ -222,7 +227,7 @@ def sample_flow(
                     waves[phi + j] *= waves[factors + j]
         for j in range(p):
             value += waves[c + j].real * waves[phi + j].real - waves[c + j].imag * waves[phi + j].imag
-        values[k] = value
+        values[result + k] = value
 
 
 @compiled
@@ -236,9 +241,9 @@ def even_step(times: Numbers, count: int) -> float:
 
 
 @compiled
-def owner_of(spans: Numbers, segments: int, t: float, left: int, near: int) -> int:
+def owner_of(spans: Numbers, first: int, segments: int, t: float, left: int, near: int) -> int:
     """The last segment that begins at a time [s] or before, from the left the last before it; at least the first."""
-    low, high = 0, segments
+    low, high = first, segments
     if near >= 0 and spans[near * SEGMENT_WIDTH_NUMBERS] < t:
         low, high = near, min(near + 2, segments)
         if high < segments and spans[high * SEGMENT_WIDTH_NUMBERS] <= t:

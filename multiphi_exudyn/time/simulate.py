@@ -180,7 +180,7 @@ class Run:
     """What ``simulate`` is asked for, there is more about it there; t_end [s].
 
     rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
-    shared: what it has in common with other runs, None where it is alone.
+    shared: what it has in common with other runs, None where it is alone. ahead: its motion, if it has set out.
     """
 
     model: MultiPhiModel
@@ -193,6 +193,7 @@ class Run:
     stretches: Mapping[str, float] | None = None
     rewound: bool = False
     shared: Shared | None = None
+    ahead: Motion | None = None
 
     def trajectory(self) -> Trajectory:
         """The answer without warnings: for runs that are one of many of an answer."""
@@ -207,12 +208,20 @@ class Run:
         motion.advance(self.t_end)
         return motion.trajectory(self.t_end, self._again)
 
+    def set_out(self) -> Motion:
+        """Its motion before its start, with which ``trajectory`` goes on from where that has come to."""
+        run = self if self.model.decided is None else replace(self, model=self.model.decided)
+        self.ahead = run._motion()
+        return self.ahead
+
     def begun(self) -> Motion:
         """A motion at its start."""
         return self._motion().begin()
 
     def _motion(self, finer: float = 1.0) -> Motion:
         """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
+        if self.ahead is not None and finer == 1.0:
+            return self.ahead
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before, levels = self._before, self._levels(finer)
@@ -258,9 +267,9 @@ class Run:
     def _again(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
         """The run from y, y' (m,) in base coordinates."""
         if isinstance(self.start, Trajectory):
-            return replace(self, start=nudged(self.start, v)).trajectory()
+            return replace(self, start=nudged(self.start, v), ahead=None).trajectory()
         shapes = self.model.base.modes.shapes
-        return replace(self, displacement=shapes @ y, velocity=shapes @ v).trajectory()
+        return replace(self, displacement=shapes @ y, velocity=shapes @ v, ahead=None).trajectory()
 
 
 def started(run: Run) -> Run:

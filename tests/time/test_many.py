@@ -10,8 +10,12 @@ from numpy.testing import assert_array_equal
 from small_structures import bed, chain, stop
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.mathematics.compiled import available
-from multiphi_exudyn.time import many
+from multiphi_exudyn.time import workers
+from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.several import Several, carry_several
+from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.warning_groups import kept_back
 
 END = 6.0
@@ -23,8 +27,9 @@ def model(modes=4, **contact):
     return mp.MultiPhiModel(chain(6, damping=mp.RayleighDamping(0.02, 0.01), stiffness=30.0), stops, modes=modes)
 
 
-def starts(count, seed=0, n=6):
-    return np.random.default_rng(seed).uniform(-0.09, 0.35, (count, n))
+def starts(count, seed=0, n=6, most=0.35):
+    """Displacements, some of them inside the upper stop; up to 0.11 m all of them are clear of it."""
+    return np.random.default_rng(seed).uniform(-0.09, most, (count, n))
 
 
 def alone(given, starts, **options):
@@ -92,20 +97,114 @@ def test_a_tolerance_is_decided_by_the_first_run():
     assert second.decided.modes == first.decided.modes
 
 
-@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
-@pytest.mark.parametrize(("share", "most"), [(0.0, None), (math.inf, 1)], ids=["threads pay", "they do not"])
-def test_the_first_runs_choose_the_number_of_threads(share, most, monkeypatch):
-    monkeypatch.setattr("multiphi_exudyn.time.many.MOSTLY", share)
+@pytest.mark.parametrize("known", [True, False], ids=["compiled", "plain Python"])
+def test_there_are_as_many_threads_as_cores_where_the_loop_is_compiled(known, monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.time.many.available", lambda: known)
     monkeypatch.setattr("os.cpu_count", lambda: 3)
     pools = []
-    pool = many.ThreadPoolExecutor
-    monkeypatch.setattr(many, "ThreadPoolExecutor", lambda threads: pools.append(threads) or pool(threads))
-    check(
-        mp.simulate_many(model("all"), END, starts(12), points=["m5"], times=TIMES),
-        alone(model("all"), starts(12)),
-        ["m5"],
-    )
-    assert pools == [most or 3]
+    pool = workers.ThreadPoolExecutor
+    monkeypatch.setattr(workers, "ThreadPoolExecutor", lambda threads: pools.append(threads) or pool(threads))
+    mp.simulate_many(model("all"), END, starts(4))
+    assert pools == [3 if known else 1]
+
+
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+class TestSeveralRunsTogether:
+    """Carried by one call of the loop, they are what each of them is alone."""
+
+    @pytest.fixture
+    def calls(self, monkeypatch):
+        """(Of several runs, by one call: how many it was given, how many came to their ends; of one run)."""
+        together, single = [], []
+        several, carry = workers.carry_several, workers.carry
+        monkeypatch.setattr(
+            workers, "carry_several", lambda *given: together.append((given[8], several(*given))) or together[-1][1]
+        )
+        monkeypatch.setattr(workers, "carry", lambda *given: single.append(1) or carry(*given))
+        return together, single
+
+    @pytest.mark.parametrize("loads", ["none", "harmonic"])
+    @pytest.mark.parametrize(("modes", "stiffness"), [(4, 50.0), (3, math.inf), ("all", 50.0)])
+    def test_to_the_bit(self, modes, stiffness, loads, calls):
+        points = ("m5", {"m0": 1.0, "m2": -2.0})
+        given, x = LOADS[loads], starts(24, most=0.11)
+        runs = alone(model(modes, stiffness=stiffness), x, loads=given)
+        for threads in (1, 2):
+            found = mp.simulate_many(
+                model(modes, stiffness=stiffness), END, x, loads=given, points=points, times=TIMES, threads=threads
+            )
+            check(found, runs, points)
+        assert sum(done for _, done in calls[0]) > 20
+
+    @pytest.mark.parametrize("threads", [1, 3])
+    def test_few_calls_of_the_loop(self, threads, calls):
+        mp.simulate_many(model("all"), END, starts(200, most=0.11), threads=threads)
+        together, single = calls
+        assert sum(done for _, done in together) > 150
+        assert len(together) < 30 * threads
+        assert len(single) < 30 * threads
+
+    def test_one_that_stops_is_carried_by_itself(self, calls):
+        """Inside a stop, or not finite, at its start; others go on together."""
+        x = starts(30, most=0.11)
+        x[5, 5], x[11, 0], x[17, 2] = -0.2, math.nan, 0.3
+        x[23] = 0.0
+        runs = alone(model("all", stiffness=50.0), np.delete(x, 11, axis=0))
+        found = mp.simulate_many(model("all", stiffness=50.0), END, x, points=["m5"], times=TIMES, threads=1)
+        assert found.status == ("ok",) * 11 + ("failed",) + ("ok",) * 18
+        assert_array_equal(np.delete(found.events, 11), [len(run.events) for run in runs])
+        assert_array_equal(np.delete(found.samples[:, 0], 11, axis=0), [run.at("m5", TIMES) for run in runs])
+        assert sum(done for _, done in calls[0]) > 15
+
+    def test_a_full_record_ends_a_call(self):
+        own = model("all")
+        for x in starts(3, most=0.11):
+            mp.simulate(own, END, displacement=x)  # packs the levels
+        motions = [Run(own, END, displacement=x).set_out() for x in starts(3, most=0.11)]
+        whole = Several.carried(motions, END, carry_several)
+        arrays = LevelArrays(motions[0].levels)
+        arrays.room = int(whole.ends[2, 0]) - 1
+        for motion in motions:
+            Motion(arrays, motion.start).advance(END)
+        short = Several.carried([Motion(arrays, motion.start) for motion in motions], END, carry_several)
+        assert (whole.count, short.count) == (3, 1)
+        assert_array_equal(short.ends[:2], whole.ends[:2])
+        for name, values in short.parts.items():
+            assert_array_equal(values, whole.parts[name][: len(values)])
+
+    def test_with_friction(self, calls):
+        """States, held places and warnings of friction are of each run."""
+        x, given = np.random.default_rng(3).uniform(-0.3, 0.3, (30, 6)), []
+        for _ in range(2):
+            ring = mp.Friction("ring", "m3", limit=0.4)
+            structure = chain(6, damping=mp.RayleighDamping(0.02, 0.01), stiffness=30.0)
+            given.append(mp.MultiPhiModel(structure, [stop("m5", 0.1), ring], modes=4))
+        x[:, 5] = np.abs(x[:, 5])
+        runs = alone(given[0], x)
+        check(mp.simulate_many(given[1], END, x, points=["m5"], times=TIMES, threads=2), runs, ["m5"])
+        assert sum(len(run.events) for run in runs) > 100
+
+    def test_motions_are_whole(self):
+        """A landed motion is that of a run alone: its segments, events, final state, energies and statistics."""
+        own = model(4, stiffness=50.0)
+        with kept_back():
+            runs = [mp.simulate(own, END, displacement=x) for x in starts(3, most=0.11)]
+            motions = [Run(own, END, displacement=x).set_out() for x in starts(3, most=0.11)]
+            several = Several.carried(motions, END, carry_several)
+        assert several.count == 3
+        for k, run in enumerate(runs):
+            found = several.land(k).trajectory(END)
+            assert [(s.start, s.end, s.phases) for s in found.segments] == [
+                (s.start, s.end, s.phases) for s in run.segments
+            ]
+            assert list(found.events) == list(run.events)
+            assert found.ledger == run.ledger
+            assert found.start_loss == run.start_loss
+            assert_array_equal(found.final.displacement, run.final.displacement)
+            assert_array_equal(found.final.velocity, run.final.velocity)
+            assert found.final.phases == run.final.phases
+            work = (found.stats.transitions, found.stats.segments, found.stats.function_evaluations)
+            assert work == (run.stats.transitions, run.stats.segments, run.stats.function_evaluations)
 
 
 class TestARunThatFails:
@@ -136,7 +235,7 @@ class TestARunThatFails:
 @pytest.mark.skipif(not available(), reason="plain Python holds the interpreter's lock")
 def test_threads_are_in_the_loop_at_the_same_time(monkeypatch):
     """Each waits in the loop until all are there, which would never be if it kept the others out."""
-    here, carry = threading.Barrier(3, timeout=60), many.carry
+    here, carry = threading.Barrier(3, timeout=60), workers.carry
     waited = []
 
     def waiting(*given):
@@ -145,7 +244,7 @@ def test_threads_are_in_the_loop_at_the_same_time(monkeypatch):
             here.wait()
         return carry(*given)
 
-    monkeypatch.setattr(many, "carry", waiting)
+    monkeypatch.setattr(workers, "carry", waiting)
     found = mp.simulate_many(model("all"), END, starts(3), threads=3)
     assert found.status == ("ok",) * 3
     assert not here.broken
@@ -156,7 +255,7 @@ def test_an_error_that_is_nobodys_ends_all(monkeypatch):
         time.sleep(0.01)
         raise RuntimeError("a fault of the program")
 
-    monkeypatch.setattr(many, "carry", broken)
+    monkeypatch.setattr(workers, "carry", broken)
     with pytest.raises(RuntimeError, match="a fault of the program"):
         mp.simulate_many(model("all"), END, starts(50), threads=2)
 

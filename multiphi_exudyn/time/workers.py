@@ -1,0 +1,194 @@
+"""Workers: threads that share out runs of one model from many starts, each on arrays of its own (many.py)."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.levels.mode_choice import Tolerance
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.time.level_rows import point_row
+from multiphi_exudyn.time.motion import Motion, carry
+from multiphi_exudyn.time.refinement import refined
+from multiphi_exudyn.time.reliability import INDICATOR
+from multiphi_exudyn.time.segment import listed
+from multiphi_exudyn.time.several import Several, carry_several
+from multiphi_exudyn.time.simulate import Run, warned
+from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["StartVectors", "Task"]
+
+KEPT = 8  # levels under loads as finely interpolated as runs have needed
+SEVERAL = 32  # runs that are carried together: threads then hardly wait for each other
+ROOM = 8192  # segments, and events, of a record of several runs: they take half of it, as they differ
+
+StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
+
+
+class Task:
+    """Runs to be done, and what is kept of them; given: what they have in common; points: rows (n,).
+
+    lock: whoever has it works on levels and on what is kept. samples, events, ends: see ManyRuns. told: status, message
+    and warnings of each.
+    """
+
+    def __init__(
+        self, given: Run, starts: Sequence[StartVectors], points: Sequence[np.ndarray], times: np.ndarray
+    ) -> None:
+        self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
+        self.levels = BoundedCache[object, LoadedLevels](KEPT)
+        self._rows: tuple[MultiPhiModel | None, list[np.ndarray]] = None, []
+        self._points, self.times, count = points, times, len(starts)
+        self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
+        self.events, self.told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
+        self._begun, self._together = 0, not refined(given.loads)
+        self._of_levels = dict[tuple[tuple[int, ...], ...], tuple[str, ...]]()
+
+    def carry_out(self, threads: int, bar: Any) -> None:
+        """All runs; a Tolerance is decided by the first ones, one after the other."""
+        model = self._given.model
+        while isinstance(model.modes, Tolerance) and model.decided is None and (numbers := self._next(1)):
+            self._finish(numbers[0], self._run(numbers[0], None))
+            bar.update()
+        with ThreadPoolExecutor(threads) as pool:
+            working = [pool.submit(self._work, threads, bar) for _ in range(threads)]
+            try:
+                for each in working:
+                    each.result()
+            finally:
+                self._stopped = True
+
+    def _next(self, most: int) -> range:
+        """The numbers of runs that nobody has begun."""
+        first, self._begun = self._begun, min(self._begun + most, len(self._starts))
+        return range(first, self._begun)
+
+    def _work(self, threads: int, bar: Any) -> None:
+        """A first run by itself, which packs levels that others need, and says how many are carried together."""
+        worker, most = _Worker(self), 1
+        with self.lock:
+            while not self._stopped and (numbers := self._next(most)):
+                runs = [(number, self._run(number, worker)) for number in numbers]
+                if len(runs) > 1:
+                    runs = self._several(worker, runs)
+                for number, run in runs:
+                    self._finish(number, run)
+                bar.update(len(numbers))
+                fair = (len(self._starts) - self._begun) // (2 * threads)
+                most = max(1, min(worker.most, fair)) if self._together else 1
+
+    def _run(self, number: int, worker: _Worker | None) -> Run:
+        displacement, velocity = self._starts[number]
+        return replace(self._given, displacement=displacement, velocity=velocity, shared=worker)
+
+    def _several(self, worker: _Worker, runs: list[tuple[int, Run]]) -> list[tuple[int, Run]]:
+        """Runs carried together, as far as nothing stops them; those that are left."""
+        left, waiting = list[tuple[int, Run]](), list[tuple[int, Run]]()
+        for number, run in runs:
+            try:
+                (left if run.set_out().start.penetrating else waiting).append((number, run))
+            except MultiPhiError as refused:
+                self.told[number] = "failed", str(refused), ()
+        while waiting:
+            several = Several.carried([run.ahead for _, run in waiting if run.ahead], self._given.t_end, worker.several)
+            if several.count:
+                self._keep(several, waiting)
+            left += waiting[several.count : several.count + 1]
+            waiting = waiting[several.count + 1 :]
+        return left
+
+    def _keep(self, several: Several, runs: list[tuple[int, Run]]) -> None:
+        """What is kept of the runs that have come to their end together."""
+        numbers, model = [number for number, _ in runs[: several.count]], several.arrays.levels.model
+        self.samples[numbers] = several.values(self._rows_of(model), self.times)
+        self.events[numbers], self.ends[numbers] = several.events, self._given.t_end
+        modes = self._given.model.modes
+        silent = several.silent(min(INDICATOR, modes.error) if isinstance(modes, Tolerance) else INDICATOR)
+        for k, (number, run) in enumerate(runs[: several.count]):
+            levels, told = several.visited(k), None
+            if silent[k]:
+                told = self._of_levels.get(levels)
+            if told is None:
+                several.land(k)
+                told = warned(run).warnings
+            if silent[k]:
+                self._of_levels[levels] = told
+            self.told[number] = "ok", "", told
+
+    def _finish(self, number: int, run: Run) -> None:
+        """A run by itself, from where it has come to."""
+        try:
+            trajectory = warned(run)
+            self.events[number], self.ends[number] = len(trajectory.events), trajectory.t_end
+            self.told[number] = trajectory.status, trajectory.message, trajectory.warnings
+            self._sample(number, trajectory)
+            if isinstance(run.shared, _Worker):
+                run.shared.most = min(SEVERAL, max(1, ROOM // (2 * len(trajectory.segments) + 1)))
+        except MultiPhiError as refused:
+            self.told[number] = "failed", str(refused), ()
+
+    def _sample(self, number: int, trajectory: Trajectory) -> None:
+        known = self.times <= trajectory.t_end
+        if not (trajectory.segments and known.any()):
+            return
+        segments, times = listed(trajectory.segments), self.times[known]
+        for place, row in enumerate(self._rows_of(trajectory.model)):
+            self.samples[number, place, known] = segments.values(times, "right", functools.partial(point_row, row))
+
+    def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
+        """The points' rows (m,) in the base coordinates of the model that runs end with, one for most of them."""
+        if self._rows[0] is not model:
+            rows = [model.base.modes.shapes.T @ row for row in self._points]
+            self._rows = model, rows
+        return self._rows[1]
+
+
+class _Worker:
+    """The arrays of a thread (simulate.Shared); most: how many runs are carried together."""
+
+    def __init__(self, task: Task) -> None:
+        self._task, self.most = task, 1
+        self._arrays = BoundedCache[LoadedLevels, LevelArrays](KEPT)
+
+    def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
+        """The levels under the loads, those of all threads."""
+        return self._task.levels.get_or_build(key, made)
+
+    def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
+        """A run on the thread's arrays."""
+        motion = Motion(self._arrays.get_or_build(levels, lambda: _roomy(levels)), start, compiled, self.loop)
+        motion.sums_works = False  # nobody asks for a ledger
+        return motion
+
+    def loop(self, *given: Any) -> Any:
+        """The compiled loop, while others may go on."""
+        return self._meanwhile(carry, given)
+
+    def several(self, *given: Any) -> Any:
+        """The same of several starts."""
+        return self._meanwhile(carry_several, given)
+
+    def _meanwhile(self, loop: Callable[..., Any], given: tuple[Any, ...]) -> Any:
+        self._task.lock.release()
+        try:
+            return loop(*given)
+        finally:
+            self._task.lock.acquire()
+
+
+def _roomy(levels: LoadedLevels) -> LevelArrays:
+    """Arrays with room for the record of several runs."""
+    arrays = LevelArrays(levels)
+    arrays.room = ROOM
+    return arrays
