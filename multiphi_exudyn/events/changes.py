@@ -12,6 +12,7 @@ from multiphi_exudyn.events.arrays import (
     CHANGE_IMPULSES,
     CHANGE_WIDTH,
     CHANGES,
+    CHANNELS,
     COMPLIANT,
     ELEMENT,
     ELEMENTS,
@@ -25,9 +26,11 @@ from multiphi_exudyn.events.arrays import (
     LOSSES,
     LOST,
     LOST_NOW,
+    MODES,
     OK,
     OPEN,
     RIGID,
+    ROW,
     SEGMENTS,
     SLIP_FORWARD,
     SPRINGS,
@@ -39,6 +42,7 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
 )
 from multiphi_exudyn.events.energies import lose
+from multiphi_exudyn.events.impact_sizes import speed_size
 from multiphi_exudyn.events.maps import find_level, move
 from multiphi_exudyn.events.phases import update_phases
 from multiphi_exudyn.events.signals import gap, row_sign
@@ -77,7 +81,8 @@ def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
         if ints[exit_ + TURN] >= 0 and ints[asking + element] == ints[exit_ + ASKED]:
-            sign = row_sign(ints, numbers, WORKED, exit_ + TURN, 0.0)
+            along = ints[exit_ + TURN + ROW] + ints[level + MODES] + ints[CHANNELS]
+            sign = row_sign(ints, numbers, WORKED, exit_ + TURN, speed_size(ints, numbers, WORKED, along))
             if sign != 0:
                 ints[asking + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
     for i in range(ints[ELEMENTS]):

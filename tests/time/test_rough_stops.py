@@ -379,15 +379,20 @@ def test_a_sled_on_elastic_feet_begins_at_rest():
     assert_allclose(run.displacement(1.0)[0] + 0.3 * run.displacement(1.0)[2], 0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize(("height", "sunk"), [(0.0, 0.0), (0.0, 0.01), (0.3, 0.0), (0.7, 0.0)])
+@pytest.mark.parametrize("sunk", [0.0, 0.01])
+@pytest.mark.parametrize("height", [0.0, 0.3, 0.7])
 def test_a_sled_on_two_equal_elastic_feet_moves_straight_up_and_down(height, sunk):
-    """Their friction is idle: one sticks for both, the other one does not push, and no pressure makes it slip."""
+    """Their friction is idle: one sticks for both, the other one does not push, and no pressure makes it slip.
+
+    A speed along the floor that is round-off of the fall, and not of itself, makes neither slide where it lands. How
+    the sled tips is unstable: every bounce makes ten times as much of it, from round-off on.
+    """
     model, weight = sled((-1.0, 1.0), height, 1e3)
     run, t = mp.simulate(model, 1.0, [0.0, -sunk, 0.0], np.zeros(3), weight), np.linspace(0, 1, 41)
     smooth = mp.simulate(sled((-1.0, 1.0), height, 1e3, friction=0.0)[0], 1.0, [0.0, -sunk, 0.0], np.zeros(3), weight)
     assert run.status == "ok"
-    assert_allclose(run.displacement(t), smooth.displacement(t), rtol=0, atol=1e-13)
-    assert np.max(np.abs(run.friction_force("rear", t) + run.friction_force("front", t))) < 1e-10
+    assert_allclose(run.displacement(t), smooth.displacement(t), rtol=0, atol=1e-11)
+    assert np.max(np.abs(run.friction_force("rear", t) + run.friction_force("front", t))) < 1e-8
     assert run.ledger.friction == pytest.approx(0.0, abs=1e-15)
     assert len(run.events) < 100
 

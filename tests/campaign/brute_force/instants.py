@@ -275,9 +275,8 @@ class Instants:
             s = level.signals @ later + level.signal_inputs @ w
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
             for value, i, size in zip(s, level.turns, sizes, strict=True):
-                if (i in resting and share > 0) or (
-                    i >= first and (share > 0 or self._pressed(i - first, state, y, t))
-                ):
+                at_once = i >= first and state[i] == "stick" and self._pressed(i - first, level, y, t)
+                if at_once or (share > 0 and (i in resting or i >= first)):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
                         size = self.length * (self.levels.rate_of_all * share * tau) ** 2
