@@ -50,7 +50,7 @@ from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["RunSummary", "warnings_of", "warnings_of_body"]
+__all__ = ["INDICATOR", "RunSummary", "looked_into", "warnings_of", "warnings_of_body"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
@@ -164,8 +164,7 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     lost, defects = abs(at_start) + at_events, total_defect(trajectory, segments)
     given = abs(_given_energy(trajectory)) if lost > 0 else 0.0
     least = min(INDICATOR, tolerance.error) if tolerance else INDICATOR
-    much = lost > ENERGY_SHARE * given
-    far = defects > 0 and not is_small(defects, least, trajectory.start.displacement)
+    much, far = looked_into((lost, defects, given), trajectory.start.displacement, least)
     if not (much or far):
         return []
     samples, found = Samples(segments, trajectory.t_end), list[str]()
@@ -175,6 +174,16 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     if far:
         found += _truncation(trajectory, indicator(defects, samples), tolerance)
     return found
+
+
+def looked_into(taken: tuple[float, float, float], start: np.ndarray, least: float) -> tuple[bool, bool]:
+    """Whether truncation is looked into for its energy, and for the motion; what is not a number is.
+
+    taken: energy [J] that it took, its sum of |defect|^2, and the energy [J] given at the start y (m,). least: the
+    indicator from which it is told.
+    """
+    lost, defects, given = taken
+    return not lost <= ENERGY_SHARE * given, not (defects <= 0 or is_small(defects, least, start))
 
 
 def _given_energy(trajectory: Trajectory) -> float:

@@ -51,12 +51,11 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.drive import keep_drive, load_piece, set_drive
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled, entry
-from multiphi_exudyn.time.defects import SAMPLES
 from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.loop_record import keep_segment
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.reliability import ENERGY_SHARE
+from multiphi_exudyn.time.reliability import looked_into
 from multiphi_exudyn.time.sampling import sample_rows
 from multiphi_exudyn.time.taken import PARTS, taken
 
@@ -64,7 +63,6 @@ __all__ = ["Several", "carry_several"]
 
 ENDS = 4  # ints: segments, coordinates, phases and events up to the end of a run
 TOLD_WIDTH = OF_A_RUN + 2
-MARGIN = 0.99  # of a bound: nearer is looked at by itself
 
 
 @compiled
@@ -250,20 +248,16 @@ class Several:
         self.motions[k].land(part, self.told[k])
         return self.motions[k]
 
-    def silent(self, least: float) -> np.ndarray:
-        """Of which (count,) reliability.py surely says nothing that depends on more than the levels visited.
+    def silent(self, k: int, least: float) -> bool:
+        """Whether reliability.py says nothing of a run that depends on more than the levels visited.
 
-        Truncation has taken so little of the energy at the start, and left out so little of the displacement there,
-        that neither is looked into. least: the indicator from which it is told.
+        least: the indicator from which truncation is told.
         """
-        told, model = self.told[: self.count], self.arrays.levels.model
-        base = model.base
-        if model.general or model.validity is not None or not base.complete:
-            return np.zeros(self.count, bool)
-        y = np.array([motion.start.displacement for motion in self.motions[: self.count]])
-        v = np.array([motion.start.velocity for motion in self.motions[: self.count]])
-        energy = ((y * y) @ base.squares + (v * v).sum(axis=1)) / 2 + base.energy_offset - y @ base.preload
-        at_start = told[:, a.LOST_AT_START + a.KINETIC] + told[:, a.LOST_AT_START + a.STRAIN]
-        lost, size = np.abs(at_start) + told[:, a.TRUNCATED], np.sqrt(told[:, a.DEFECTS])
-        seen = np.sqrt((y * y).sum(axis=1)) - size > np.sqrt(2 * SAMPLES) * size / (MARGIN * least)
-        return (lost <= MARGIN * ENERGY_SHARE * np.abs(energy)) & ((size == 0) | seen)
+        model = self.arrays.levels.model
+        if model.general or model.validity is not None or not model.base.complete:
+            return False
+        told, y = self.told[k], self.motions[k].start.displacement
+        kinetic, strain = told[a.LOST_AT_START + a.KINETIC : a.LOST_AT_START + a.STRAIN + 1].tolist()
+        defects, truncated = told[a.DEFECTS : a.TRUNCATED + 1].tolist()
+        given = abs(float(told[a.GIVEN_ENERGY]) + float(self.arrays.levels.excitation.static.dot(y)))
+        return not any(looked_into((abs(kinetic + strain) + truncated, defects, given), y, least))

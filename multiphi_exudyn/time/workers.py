@@ -114,15 +114,15 @@ class Task:
         self.samples[numbers] = several.values(self._rows_of(model), self.times)
         self.events[numbers], self.ends[numbers] = several.events, self._given.t_end
         modes = self._given.model.modes
-        silent = several.silent(min(INDICATOR, modes.error) if isinstance(modes, Tolerance) else INDICATOR)
+        least = min(INDICATOR, modes.error) if isinstance(modes, Tolerance) else INDICATOR
         for k, (number, run) in enumerate(runs[: several.count]):
-            levels, told = several.visited(k), None
-            if silent[k]:
+            levels, told, silent = several.visited(k), None, several.silent(k, least)
+            if silent:
                 told = self._of_levels.get(levels)
             if told is None:
                 several.land(k)
                 told = warned(run).warnings
-            if silent[k]:
+            if silent:
                 self._of_levels[levels] = told
             self.told[number] = "ok", "", told
 
