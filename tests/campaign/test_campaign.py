@@ -115,8 +115,12 @@ def test_a_spring_falls_from_its_static_limit_and_sticks_again():
     assert judged("contact friction", 162068)[0] == [("ok", "")]
 
 
-def test_a_run_that_says_that_it_is_not_unique_may_differ():
-    assert [verdict for verdict, _ in judged("contact friction", 162054)[0]] == ["told"]
+@pytest.mark.parametrize(
+    ("kind", "number", "verdict"), [("contact friction", 162054, "told"), ("plain", 1, "failure: wrong")]
+)
+def test_a_run_may_differ_where_it_says_that_it_is_not_unique(monkeypatch, kind, number, verdict):
+    monkeypatch.setattr(campaign_judge, "_compared", lambda scene, motion: [("failure: wrong", "another motion")])
+    assert [found for found, _ in judged(kind, number)[0]] == [verdict]
 
 
 def test_a_load_whose_numbers_are_large_hides_no_impact():
