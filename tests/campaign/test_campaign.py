@@ -116,7 +116,7 @@ def test_a_spring_falls_from_its_static_limit_and_sticks_again():
 
 
 @pytest.mark.parametrize(
-    ("kind", "number", "verdict"), [("contact friction", 162054, "told"), ("plain", 1, "failure: wrong")]
+    ("kind", "number", "verdict"), [("contact friction", 162054, "told"), ("jenkins", 1, "failure: wrong")]
 )
 def test_a_run_may_differ_where_it_says_that_it_is_not_unique(monkeypatch, kind, number, verdict):
     monkeypatch.setattr(campaign_judge, "_compared", lambda scene, motion: [("failure: wrong", "another motion")])
