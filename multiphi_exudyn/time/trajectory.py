@@ -20,6 +20,7 @@ import numpy as np
 from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.exits import exits_of
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
@@ -172,24 +173,24 @@ class Trajectory(ModelHistories):
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         losses = self.start_loss + total_loss(self.events)
         damped, varying, rubbed = self._segments.works
-        last = self.final
-        assert last is not None, "a run with segments has a final state"
+        level, displacement = self.ending.level, self.ending.displacement
+        assert level is not None, "a run with segments has a final state"
         return Ledger(
             initial=self.initial_energy,
-            work_of_loads=self._static_work(last) + losses.stop_work + varying + self.final_work,
+            work_of_loads=self._static_work(level, displacement) + losses.stop_work + varying + self.final_work,
             impact=losses.impact,
             truncation_kinetic=losses.truncation_kinetic,
             truncation_strain=losses.truncation_strain,
             damping=losses.damping + damped,
             friction=losses.friction + rubbed,
-            final=float(last.level.kinetic(last.velocity) + last.level.strain(last.displacement)),
+            final=float(level.kinetic(self.ending.velocity) + level.strain(displacement)),
         )
 
-    def _static_work(self, last: State) -> float:
-        """Work [J] of the static load up to the last state."""
+    def _static_work(self, level: LoadedLevel, last: np.ndarray) -> float:
+        """Work [J] of the static load up to the last displacement xi (n,)."""
         if not self.load.any():
             return 0.0
-        return float(self.load @ (last.level.configuration(last.displacement) - self.start.displacement))
+        return float(self.load @ (level.configuration(last) - self.start.displacement))
 
     @property
     def initial_energy(self) -> float:
