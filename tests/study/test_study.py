@@ -155,6 +155,14 @@ class TestCases:
         assert said in str(error.value)
         assert "\n" not in str(error.value)
 
+    def test_faults_of_axes_hide_none_of_a_method(self, study_file):
+        data = changed(["methods", 1, "axes"], {"rtoll": [1e-5, 1e-6]}, STUDY)
+        data = changed(["methods", 0, "axes"], {"nodes": [1, 2]}, data) | {"axes": {"start.displacment": [0.01, 0.02]}}
+        with pytest.raises(MultiPhiValueError) as error:
+            load_study(study_file(data))
+        for field in ("displacment", "nodes", "rtoll"):
+            assert str(error.value).count(f"{field}: got") == 1
+
     def test_an_unknown_study_is_told_the_known_ones(self):
         with pytest.raises(MultiPhiValueError, match="pareto"):
             load_study("paretto")

@@ -13,9 +13,10 @@ from __future__ import annotations
 import copy
 import functools
 import hashlib
+import itertools
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -188,12 +189,8 @@ def _check(study: Study) -> None:
     if "outputs.t_end" in study.file.axes and study.file.window is None:
         _refuse(study, "window", "none", "a window no longer than the shortest t_end of the axis outputs.t_end")
     _check_size(study)
-    for case in _samples(study):
-        try:
-            mechanics_of(study.scene_for(case))
-        except MultiPhiValueError as error:
-            told = str(error).removeprefix(f"{study.scene_path}: ")
-            raise MultiPhiValueError(f"{study.path}: at {_place(case)}: {told}") from error
+    if faults := "; ".join(_faults(study)):
+        raise MultiPhiValueError(f"{study.path}: {faults}")
 
 
 def _check_size(study: Study) -> None:
@@ -210,10 +207,24 @@ def _name(model: Mapping[str, Any], scene: Mapping[str, Any]) -> str:
     return str(model.get("name")).replace("{modes}", str(modes))
 
 
-def _samples(study: Study) -> Iterator[Parameters]:
-    """Every point of the axes, and at the first of them every setting."""
-    yield from map(study.reference, study.points)
-    yield from study.runs(study.points[0])
+def _faults(study: Study) -> Iterator[str]:
+    """Of the first point of the axes at which the scene is wrong, and of the first wrong setting of every method.
+
+    Settings are looked at where the axes begin, in the scene itself where these are wrong.
+    """
+    wrong = list(itertools.islice(_told(study, map(study.reference, study.points)), 1))
+    yield from wrong
+    for _, cases in itertools.groupby(study.runs({} if wrong else study.points[0]), lambda case: case["method"]):
+        yield from itertools.islice(_told(study, cases), 1)
+
+
+def _told(study: Study, cases: Iterable[Parameters]) -> Iterator[str]:
+    """What is wrong with the scenes of cases."""
+    for case in cases:
+        try:
+            mechanics_of(study.scene_for(case))
+        except MultiPhiValueError as error:
+            yield f"at {_place(case)}: {str(error).removeprefix(f'{study.scene_path}: ')}"
 
 
 def _place(case: Mapping[str, Any]) -> str:
