@@ -156,12 +156,17 @@ class TestCases:
         assert "\n" not in str(error.value)
 
     def test_faults_of_axes_hide_none_of_a_method(self, study_file):
-        data = changed(["methods", 1, "axes"], {"rtoll": [1e-5, 1e-6]}, STUDY)
+        data = changed(["methods", 1], STUDY["methods"][1] | {"axes": {"rtoll": [1e-5, 1e-6]}, "nearby": {}}, STUDY)
         data = changed(["methods", 0, "axes"], {"nodes": [1, 2]}, data) | {"axes": {"start.displacment": [0.01, 0.02]}}
         with pytest.raises(MultiPhiValueError) as error:
             load_study(study_file(data))
         for field in ("displacment", "nodes", "rtoll"):
             assert str(error.value).count(f"{field}: got") == 1
+
+    def test_all_faults_of_methods_are_told_at_once(self, study_file):
+        data = changed(["methods", 1, "axes"], {"rtoll": [1e-5]}, STUDY) | {"maps": ["nobody"]}
+        with pytest.raises(MultiPhiValueError, match=r"maps: got 'nobody'.*; nearby of stepwise: got 'rtol'"):
+            load_study(study_file(data))
 
     def test_an_unknown_study_is_told_the_known_ones(self):
         with pytest.raises(MultiPhiValueError, match="pareto"):

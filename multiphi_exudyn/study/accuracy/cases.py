@@ -169,36 +169,39 @@ def _change(data: dict[str, Any], file: StudyFile, quick: bool) -> None:
 
 
 def _check(study: Study) -> None:
-    """Names, sizes, and every scene of the study."""
+    """Names, sizes, and every scene of the study; all faults at once."""
+    if faults := [*_faults_of_methods(study), *_faults_of_size(study)] or [*_faults_of_scenes(study)]:
+        raise MultiPhiValueError(f"{study.path}: {'; '.join(faults)}")
+
+
+def _faults_of_methods(study: Study) -> Iterator[str]:
     names = [method.name for method in study.file.methods]
-    for name in names:
+    for name in dict.fromkeys(names):
         if names.count(name) > 1 or name in (REFERENCE, COARSER, BUDGET):
-            _refuse(study, "methods", name, "another name for each method, none of them reference, coarser or budget")
+            needed = "another name for each method, none of them reference, coarser or budget"
+            yield _fault("methods", name, needed)
     for name in study.file.maps:
         if name not in names:
-            _refuse(study, "maps", name, f"one of the methods: {', '.join(names)}")
+            yield _fault("maps", name, f"one of the methods: {', '.join(names)}")
     if study.file.coarser is not None and study.file.reference is None:
-        _refuse(study, "reference", "none", "a reference, as the study gives a coarser copy of it")
+        yield _fault("reference", "none", "a reference, as the study gives a coarser copy of it")
     if not names and study.file.budget is None:
-        _refuse(study, "methods", "none", "a method or a budget")
+        yield _fault("methods", "none", "a method or a budget")
     for method in study.file.methods:
         fields = [("nearby", field) for field in method.nearby] + [("refine", method.refine)] * bool(method.refine)
         for kind, field in fields:
             if not all(is_number(value) for value in method.axes.get(field or "", [method.model.get(field or "")])):
-                _refuse(study, f"{kind} of {method.name}", field, "a field of its model or its axes with numbers")
+                yield _fault(f"{kind} of {method.name}", field, "a field of its model or its axes with numbers")
+
+
+def _faults_of_size(study: Study) -> Iterator[str]:
     if "outputs.t_end" in study.file.axes and study.file.window is None:
-        _refuse(study, "window", "none", "a window no longer than the shortest t_end of the axis outputs.t_end")
-    _check_size(study)
-    if faults := "; ".join(_faults(study)):
-        raise MultiPhiValueError(f"{study.path}: {faults}")
-
-
-def _check_size(study: Study) -> None:
+        yield _fault("window", "none", "a window no longer than the shortest t_end of the axis outputs.t_end")
     axes = [study.file.axes, *(method.axes for method in study.file.methods)]
     points, *settings = (math.prod(map(len, each.values())) for each in axes)
     runs = points * sum(settings)
     if runs > MOST_RUNS:
-        _refuse(study, "axes", f"{runs} runs", f"at most {MOST_RUNS}")
+        yield _fault("axes", f"{runs} runs", f"at most {MOST_RUNS}")
 
 
 def _name(model: Mapping[str, Any], scene: Mapping[str, Any]) -> str:
@@ -207,7 +210,7 @@ def _name(model: Mapping[str, Any], scene: Mapping[str, Any]) -> str:
     return str(model.get("name")).replace("{modes}", str(modes))
 
 
-def _faults(study: Study) -> Iterator[str]:
+def _faults_of_scenes(study: Study) -> Iterator[str]:
     """Of the first point of the axes at which the scene is wrong, and of the first wrong setting of every method.
 
     Settings are looked at where the axes begin, in the scene itself where these are wrong.
@@ -278,5 +281,5 @@ def _find(source: str) -> Path:
     raise MultiPhiValueError(f"STUDY: got {source!r}, need a TOML file or {one_of(source, shipped)}")
 
 
-def _refuse(study: Study, field: str, given: object, needed: str) -> None:
-    raise MultiPhiValueError(f"{study.path}: {field}: got {given!r}, need {needed}")
+def _fault(field: str, given: object, needed: str) -> str:
+    return f"{field}: got {given!r}, need {needed}"
