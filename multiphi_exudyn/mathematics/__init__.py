@@ -7,6 +7,6 @@ small complementarity problem of contact and friction; what round-off is; functi
 Order: round_off, bounded_cache, buffer_function, machine_code, translation, compilation, compiled_cache, compiled,
 orthonormal, inner_products, modes, lanczos, lowest_modes, secular_equation, exponentials, basis_arrays, free_response,
 light_damping, motion_parts, coupled_response, forced_response, forced_orders, response_arrays, signal_bounds, suspect,
-block_search, zero_crossing, least_distance, free_rows, row_sides, complementarity, corners, interpolation,
-piecewise_exponential, piecewise_linear_fit.
+block_search, zero_crossing, least_distance, free_rows, row_sides, complementarity, coulomb_impacts, corners,
+interpolation, piecewise_exponential, piecewise_linear_fit.
 """

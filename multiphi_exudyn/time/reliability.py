@@ -8,6 +8,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "backward slip: ..."      truncated friction that moves against its slip (rubbing.py)
     "redundant friction: ..." which of several bears the load, and when they slip, is not unique (rubbing.py)
     "friction in turn: ..."   rigid contacts that rub and turn at one instant, whose order may count (rubbing.py)
+    "several impacts: ..."    an impact with friction to which Coulomb's law has several answers (rough_impacts.py)
     "lost energy: ..."        what truncation took of the largest energy of the run
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
     "undamped modes: ..."     modes for which a list of modal ratios has none
@@ -46,6 +47,7 @@ from multiphi_exudyn.time.known_warnings import (
     missing_modes,
     static_warnings,
 )
+from multiphi_exudyn.time.rough_impacts import impact_warnings
 from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
@@ -83,6 +85,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         found += _slow_mode(segments, known.slowest, span)
     if model.general:
         found += rubbing_warnings(segments, model)
+        found += impact_warnings(trajectory)
     if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
         found.append(_load_pieces(excitation, trajectory.t_end))
     return tuple(found)

@@ -36,7 +36,11 @@ BODY_STEPS = 400  # of the Exudyn body, each of which ends exactly
 BODY_NUDGE = 1e-9  # of the start and of the stiffness: what Newton's iterations leave of a state
 BODY_SHARE = 16  # one scene in so many runs in the body too, and in two parts,
 RUBBING_SHARE = 2  # of those with friction one in so many
-NOT_UNIQUE = ("redundant friction", "friction in turn")  # how a run's warnings say that it has no one answer
+NOT_UNIQUE = (
+    "redundant friction",
+    "friction in turn",
+    "several impacts",
+)  # of warnings that say that a run has no one answer
 MIDDLE = 0.437  # of the run, where that ends and goes on
 
 

@@ -10,7 +10,7 @@ from brute_force.system import NoAnswer
 
 ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
-SOONER = (1e-5, 1e-7)  # the same where no set is admissible: a slip may be over before
+SOONER = (1e-5, 1e-7, 1e-9)  # the same where no set is admissible: a slip may be over before
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 

@@ -1,0 +1,60 @@
+"""Impacts with friction to which Coulomb's law has several answers: a run that meets one says so."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import multiphi_exudyn as mp
+
+
+def struck(coupling, friction, *, gap=0.1, speed=(0.0, -1.0, -1.0), weight=0.0, **given):
+    """A body of mass 1 along x, y, z, coupled by xy, xz, yz, that meets a floor (y, rough along x) and a wall (z)."""
+    mass = np.eye(3)
+    mass[(0, 0, 1), (1, 2, 2)] = mass[(1, 2, 2), (0, 0, 1)] = coupling
+    structure = mp.LinearStructure(mass, np.zeros((3, 3)), points={"x": 0, "y": 1, "z": 2})
+    wall = {"restitution": given["restitution"]} if "restitution" in given else {}
+    floor = mp.UnilateralContact("floor", "y", 0.0 if weight else gap, friction=friction, tangential="x", **given)
+    model = mp.MultiPhiModel(structure, [floor, mp.UnilateralContact("wall", "z", gap, **wall)], modes="all")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        return mp.simulate(model, 0.2, velocity=speed, loads=[mp.ConstantLoad("y", -weight)] if weight else ())
+
+
+def told(run):
+    return [text for text in run.warnings if text.startswith("several impacts: ")]
+
+
+TOGETHER = (0.8, 0.0, -0.4)  # three answers where both are struck with 1 m/s
+HELD = (0.8, 0.8, 0.6)  # and where the floor holds the body and the wall is struck
+
+
+class TestSeveralAnswers:
+    @pytest.mark.parametrize("gap", [0.1, 0.0])
+    def test_are_told_where_both_are_struck(self, gap):
+        (text,) = told(struck(TOGETHER, 1.5, gap=gap))
+        assert "'floor' (1.5), 'wall' (0)" in text
+        assert f"t = {gap:g} s" in text
+        assert "3 answers" in text
+
+    def test_are_told_where_one_of_them_holds_already(self):
+        run = struck(HELD, 1.5, speed=(0.0, 0.0, -1.0), weight=1.0)
+        assert run.contact_intervals("floor")[0][0] == 0.0
+        assert "3 answers" in told(run)[0]
+
+    def test_are_told_once(self):
+        assert len(told(struck(TOGETHER, 1.5, restitution=0.5))) == 1
+
+    @pytest.mark.parametrize(
+        ("coupling", "friction", "given"),
+        [
+            (TOGETHER, 0.5, {}),
+            (TOGETHER, 1.2, {}),
+            ((0.4, 0.0, -0.4), 1.5, {}),
+            (TOGETHER, 1.5, {"speed": (0.0, -1.0, -0.9)}),  # one after the other
+            (TOGETHER, 1.5, {"stiffness": 1e4}),
+            (HELD, 0.5, {"speed": (0.0, 0.0, -1.0), "weight": 1.0}),
+        ],
+    )
+    def test_are_not_where_there_is_one(self, coupling, friction, given):
+        assert not told(struck(coupling, friction, **given))
