@@ -150,8 +150,9 @@ FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, where channels are fu
 STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per impulse squared, -1 for none
 SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|, then the row (n + 1,) with
 #             which static loads work on y; zero while nobody asked
+DISSIPATED_MODES = 30  # (r, 2) of each mode in that form, first and one past the last that it goes with
 DRIVEN = 29  # forms of the works of what channels force, -1 where there are none (work_forms.py)
-LEVEL_INTS = 30
+LEVEL_INTS = 31
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

@@ -75,14 +75,13 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapp
     """Give the record of a level the power of damping, of what varies and of friction, and their primitives."""
     damping, varying, rubbing, pairs = powers(level)
     damping = (damping + damping.T) / 2
-    dissipated = primitive(level.modal, damping)
     friction = np.append(rubbing, pairs)
     given = {
         a.DISSIPATION: buffers.put("numbers", damping),
         a.POWER: buffers.put("numbers", varying),
         a.RUBBING: buffers.put("numbers", friction) if np.any(friction) else -1,
         a.RUBBINGS: len(pairs),
-        a.DISSIPATED: -1 if dissipated is None or len(pairs) else buffers.put("numbers", dissipated),
+        **_put_dissipated(buffers, None if len(pairs) else primitive(level.modal, damping)),
         a.SWINGS: buffers.put("waves", swings(level, varying)),
         a.DRIVEN: -1,
     }
@@ -90,6 +89,15 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapp
         given[a.DRIVEN] = _put_driven(buffers, forms)
     for slot, value in given.items():
         buffers.ints[record + slot] = value
+
+
+def _put_dissipated(buffers: Buffers, form: np.ndarray | None) -> dict[int, int]:
+    """Where the form (2 r, 2 r) of what damping takes stands, and which modes go with each other in it."""
+    if form is None:
+        return {a.DISSIPATED: -1}
+    r = len(form) // 2
+    reached = response_arrays.reached_modes([form[:r, :r], form[:r, r:], form[r:, :r], form[r:, r:]])
+    return {a.DISSIPATED: buffers.put("numbers", form), a.DISSIPATED_MODES: buffers.put("ints", reached)}
 
 
 def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:

@@ -19,6 +19,7 @@ from multiphi_exudyn.events.arrays import (
     CHANNELS,
     CURRENT,
     DISSIPATED,
+    DISSIPATED_MODES,
     DRIVE_NEXT,
     DRIVE_WAVES,
     DRIVEN,
@@ -74,7 +75,7 @@ def work_of_segment(ints: Ints, numbers: Numbers, waves: Waves, duration: float)
     for i in range(size):
         numbers[sums + i] = numbers[first + size + i] + numbers[first + i]
         numbers[changes + i] = numbers[first + size + i] - numbers[first + i]
-    damping = dissipated(numbers, ints[level + DISSIPATED], r, sums + count, changes + count)
+    damping = dissipated(ints, numbers, level, sums + count, changes + count)
     varying, friction = 0.0, 0.0
     if q > 0:
         damping += changed(numbers, ints[forms + CHANGING_DAMPING], count, size, sums, changes)
@@ -154,13 +155,13 @@ def is_inflated(ints: Ints, numbers: Numbers, free: int) -> int:
 
 
 @compiled
-def dissipated(numbers: Numbers, form: int, r: int, sums: int, changes: int) -> float:
+def dissipated(ints: Ints, numbers: Numbers, level: int, sums: int, changes: int) -> float:
     """(y_1 + y_0).F (y_1 - y_0) of (2 r,), from the sum and the difference."""
-    total = 0.0
+    r, form, reached, total = ints[level + MODES], ints[level + DISSIPATED], ints[level + DISSIPATED_MODES], 0.0
     for i in range(r):  # four sums that do not wait for each other
         first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
         row, other = form + 2 * r * i, form + 2 * r * (r + i)
-        for k in range(r):
+        for k in range(ints[reached + 2 * i], ints[reached + 2 * i + 1]):
             place, speed = numbers[changes + k], numbers[changes + r + k]
             first += numbers[row + k] * place
             second += numbers[row + r + k] * speed

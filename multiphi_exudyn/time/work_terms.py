@@ -11,7 +11,6 @@ import math
 from multiphi_exudyn.events.arrays import (
     AFTER,
     CHANNELS,
-    DISSIPATED,
     DISSIPATION,
     FLOW_BASIS,
     FLOW_COUNT,
@@ -119,7 +118,7 @@ def dissipated_freely(ints: Ints, numbers: Numbers, waves: Waves, duration: floa
             numbers[sums + r + i] += (speed * whole).real
             numbers[changes + i] += (place * change).real
             numbers[changes + r + i] += (speed * change).real
-    return dissipated(numbers, ints[level + DISSIPATED], r, sums, changes)
+    return dissipated(ints, numbers, level, sums, changes)
 
 
 @compiled
