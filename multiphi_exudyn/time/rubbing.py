@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +73,14 @@ class _Rub(NamedTuple):
     pressed: bool  # by a rigid contact
     gives_way: bool  # what presses it
 
+    def turns(self, left: Sequence[int], entered: Sequence[int]) -> bool:
+        """Whether it slips in a level that is left, and the other way, or not at all, in the one that is entered."""
+        return left[self.element] > self.sticks <= entered[self.element] != left[self.element]
+
+    def lets_go(self, left: Sequence[int], entered: Sequence[int]) -> bool:
+        """Whether it falls from its static limit where a level is left."""
+        return self.drop > 0 and left[self.element] == self.sticks < entered[self.element]
+
 
 def _rigid_friction(segments: Segments) -> list[_Rub]:
     base, found = segments.levels[0].level.base, []
@@ -108,20 +116,22 @@ def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[floa
 
 
 def _in_turn(segments: Segments) -> Iterator[str]:
-    """Of friction at rigid contacts that turns with other friction at one instant, where not all of it sticks."""
+    """Of friction at rigid contacts that turns as other friction turns or lets go, where not all of it sticks."""
     rubs = _rigid_friction(segments)
     if len(rubs) < 2 or not any(rub.pressed for rub in rubs):
         return
     for before, after in np.unique(np.column_stack([segments.numbers[:-1], segments.numbers[1:]]), axis=0):
         left, entered = (segments.levels[k].states for k in (before, after))
-        turned = [r for r in rubs if left[r.element] > r.sticks <= entered[r.element] != left[r.element]]
+        turned = [rub for rub in rubs if rub.turns(left, entered)]
+        turned += [rub for rub in rubs if turned and rub.lets_go(left, entered)]
         several = any(_coupled(segments.levels[0].level.base, *pair) for pair in itertools.combinations(turned, 2))
         loose = any(entered[rub.element] > rub.sticks for rub in turned)
         if several and loose and any(rub.pressed for rub in turned) and any(rub.drop > 0 for rub in turned):
+            names = ", ".join(repr(rub.name) for rub in turned)
             yield (
-                f"friction in turn: {', '.join(repr(rub.name) for rub in turned)} come to rest at one instant and are "
-                f"decided one after the other, as a rigid contact rubs: with static limits above the kinetic ones "
-                f"another order may have another answer; {REMEDY}"
+                f"friction in turn: {names} come to rest, or let go, at one instant and are decided one after the "
+                "other, as a rigid contact rubs: with static limits above the kinetic ones another order may have "
+                f"another answer; {REMEDY}"
             )
             return
 
