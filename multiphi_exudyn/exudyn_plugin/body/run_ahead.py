@@ -141,9 +141,9 @@ class RunAhead:
         here, way = self._body.coordinates, self._way
         if here.slips:  # what stays where it is held moves its modes by nothing
             way += float(np.linalg.norm(here.stepped.loaded.channels.shapes @ here.held))
-        far = float(np.max(np.abs(expected), initial=0.0))  # more than they swing where they are free
-        apart, limit = q - expected, CHANGED * max(largest, far, UNSEEN * way)
-        if not apart.dot(apart) <= limit * limit:
+        apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
+        off = apart.dot(apart)  # free modes do not swing: of those counts how far they are
+        if not (off <= limit * limit or off <= CHANGED**2 * expected.dot(expected)):
             raise MultiPhiValueError(
                 f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set, need "
                 "the PreStep or PostStep function that sets them to be there before the run begins"
