@@ -124,9 +124,11 @@ class Motion:
 
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
+        numbers = self._ending.numbers
+        defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
         return Trajectory(
             model=self.model,
-            segments=Recorded(self.record, self._ending.numbers),
+            segments=Recorded(self.record, defects, truncated, tuple(works)),
             events=self.events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",

@@ -8,7 +8,6 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss
 from multiphi_exudyn.time.record import Record
@@ -52,22 +51,16 @@ class Made(Sequence[T], Generic[T]):
 
 
 class Recorded(Made[Segment], Segments):
-    """The segments of a record so far, which is looked into when somebody asks; numbers: those of its run."""
+    """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments.
 
-    def __init__(self, record: Record, numbers: np.ndarray) -> None:
+    summed: works [J] of all that the record does not list as left out.
+    """
+
+    def __init__(self, record: Record, defects: float, truncated: float, summed: tuple[float, ...]) -> None:
         self._make, self._count, self._known = record.segment, record.count, {}
-        self._record, self._numbers, self._left_out = record, numbers, record.left_out_count
-        self.arrays = record.arrays
-
-    @property
-    def defects(self) -> float:
-        """See ``Segments``."""
-        return float(self._numbers[a.DEFECTS])
-
-    @property
-    def truncated(self) -> float:
-        """See ``Segments``."""
-        return float(self._numbers[a.TRUNCATED])
+        self._record, self.arrays = record, record.arrays
+        self.defects, self.truncated = defects, truncated
+        self._summed, self._left_out = summed, record.left_out_count
 
     @functools.cached_property
     def starts(self) -> np.ndarray:
@@ -119,7 +112,7 @@ class Recorded(Made[Segment], Segments):
     @functools.cached_property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        damping, varying, friction = self._numbers[a.WORKS : a.WORKS + 3].tolist()
+        damping, varying, friction = self._summed
         if self._left_out:
             further = self._record.works(self._record.left_out[: self._left_out])
             damping, varying, friction = damping + further[0], varying + further[1], friction + further[2]

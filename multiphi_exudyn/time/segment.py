@@ -110,17 +110,14 @@ class Segment(Shown):
 
 
 class Segments(Sequence[Segment], ABC):
-    """The segments of a run, in order, and in arrays what many of them are asked for together."""
+    """The segments of a run, in order, and in arrays what many of them are asked for together.
 
-    @property
-    def defects(self) -> float:
-        """Sum of |defect|^2 (defects.py) [m2 kg]; nan where the loop has not summed it."""
-        return math.nan
+    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their
+    signs [J]; nan where the loop has not summed them.
+    """
 
-    @property
-    def truncated(self) -> float:
-        """Sum of the energies [J] lost to truncation at events, without their signs; nan as ``defects``."""
-        return math.nan
+    defects = math.nan
+    truncated = math.nan
 
     @property
     @abstractmethod
