@@ -245,6 +245,13 @@ def test_a_setting_lasts_where_every_finer_one_holds_too():
     assert all(s.lasting_error == s.error for s in settings(result_of(rows, methods=[method])))
 
 
+def test_few_modes_that_are_right_by_chance_do_not_last():
+    """Error 0.9 % with 4 modes, 6 % with 6 and 0.4 % with 8."""
+    rows = [row("few", error, setting={"modes": r}) for r, error in ((4, 0.009), (6, 0.06), (8, 0.004))]
+    method = {"name": "few", "model": {"kind": "reduced"}, "refine": "modes"}
+    assert [s.lasting_error for s in settings(result_of(rows, methods=[method]))] == [0.06, 0.06, 0.004]
+
+
 def test_the_cheapest_lasting_setting_is_another_one():
     lucky = Setting("m", {}, {"step": 2}, 0.01, 0.01, "", {}, {"online_s": 1.0}, lasting_error=0.05)
     sound = Setting("m", {}, {"step": 1}, 0.01, 0.01, "", {}, {"online_s": 2.0}, lasting_error=0.01)

@@ -4,7 +4,8 @@ A *field* is a place in a scene file, written with dots ("start.displacement", "
 :mod:`multiphi_exudyn.study.scene.places`); its values may be whole tables. A *setting* is one choice of a method's
 own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
 be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
-Errors of mesh and step can cancel for a whole range of steps: a setting *lasts* where every finer one holds as well.
+Errors of mesh and step can cancel for a whole range of steps, and few modes be right by chance: a setting *lasts* where
+every finer one holds as well, with a smaller step or tolerance, or with more modes or elements.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class MethodSpec(Table):
     model: dict[str, Any]  # as an entry of models in a scene
     axes: dict[str, Values] = Field(default_factory=dict)  # field of the model -> values, in every combination
     nearby: dict[str, Factors] = Field(default_factory=dict)  # field -> factors on its value
-    refine: str | None = None  # field whose smaller values are finer: a setting lasts if all finer ones hold too
+    refine: str | None = None  # its field in which all finer settings have to hold too: a smaller step, more modes
     quick: dict[str, Values] = Field(default_factory=dict)  # axes of the short form, in place of those of the same name
 
 

@@ -21,6 +21,8 @@ from multiphi_exudyn.study.sweep.store import Row, key_of
 
 __all__ = ["MapPair", "Setting", "StudyResult", "error_of"]
 
+COUNTS = ("modes", "elements")  # fields of which more are finer; of others less are
+
 Intervals = Sequence[Sequence[float]]
 
 
@@ -171,10 +173,14 @@ def _lasting(settings: Sequence[Setting], refine: Mapping[str, str | None]) -> l
 
 
 def _refined(setting: Setting, field: str) -> tuple[str, float, float]:
-    """What settings share that differ in one field at most, its value, and the error, infinite where there is none."""
+    """What settings share that differ in one field at most, its value, finer ones first, and the error.
+
+    The error is infinite where there is none.
+    """
+    value = setting.setting.get(field, 0.0)
     rest = {name: value for name, value in setting.setting.items() if name != field}
     alike = key_of({"method": setting.method, "at": setting.at, "setting": rest})
-    return alike, setting.setting.get(field, 0.0), math.inf if setting.error is None else setting.error
+    return alike, -value if field in COUNTS else value, math.inf if setting.error is None else setting.error
 
 
 def _setting_key(row: Row) -> str:
