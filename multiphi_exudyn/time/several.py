@@ -17,17 +17,13 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import (
     CHANNELS,
     COORDINATE_COUNT,
-    COORDINATES,
     CURRENT,
     DECISIONS,
-    DRIVE,
     DRIVE_NEXT,
-    ELEMENTS,
     END_REACHED,
     EVENT_COUNT,
     FOUND,
     FRESH,
-    GIVEN,
     GIVEN_UP,
     HORIZON,
     LEVEL,
@@ -41,14 +37,14 @@ from multiphi_exudyn.events.arrays import (
     PRESCRIBED,
     SEGMENT_COUNT,
     SEGMENT_ROOM,
-    SPEED,
+    START,
     STARTING,
-    STATES,
     STOP_AT_EVENT,
     TIME,
     TRANSITIONS,
 )
 from multiphi_exudyn.events.drive import keep_drive, load_piece, set_drive
+from multiphi_exudyn.events.entering import set_starts
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled, entry
 from multiphi_exudyn.time.level_rows import point_row
@@ -72,14 +68,12 @@ def carry_starts(
     waves: Waves,
     end: float,
     until: float,
-    states: Ints,
-    given: Numbers,
     fresh: Numbers,
     count: int,
     ends: Ints,
     told: Numbers,
 ) -> int:
-    """Carries starts (``enter_start``) to ``end`` one after the other; how many of them have come there.
+    """Carries the starts that stand in the arrays to ``end`` one after the other; how many of them have come there.
 
     until: how long the first piece of the channels lasts. fresh: the numbers of a run at its start. ends: counts
     (count + 1, ENDS) of the record, the first ones zero. told: numbers (count, TOLD_WIDTH) of each run, and its
@@ -88,14 +82,13 @@ def carry_starts(
     for k in range(count):
         for i in range(OF_A_RUN):
             numbers[i] = fresh[i]
-        ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = FRESH, 0, 0
+        ints[START], ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = k, FRESH, 0, 0
         ints[DECISIONS], ints[TRANSITIONS], ints[PIECE] = 0, 0, 0
         numbers[ints[FOUND] + 1] = 0.0
         if ints[PRESCRIBED] > 0:
             load_piece(ints, waves)
             set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], until)
             keep_drive(ints, waves)
-        enter_start(ints, numbers, states, given, k)
         status = advance(ints, numbers, waves, end)
         if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM] or is_finite(ints, numbers) == 0:
             before = ENDS * k
@@ -111,25 +104,6 @@ def carry_starts(
         ends[after], ends[after + 1] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT]
         ends[after + 2], ends[after + 3] = ints[PHASE_COUNT], ints[EVENT_COUNT]
     return count
-
-
-@compiled
-def enter_start(ints: Ints, numbers: Numbers, states: Ints, given: Numbers, k: int) -> None:
-    """GIVEN becomes the k-th start: states (c,) of elements; y, y' (m,) and the places (h,) that links hold."""
-    m, q, here = ints[COORDINATES], ints[PRESCRIBED], ints[ints[GIVEN + LEVEL] + STATES]
-    held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
-    start = k * (2 * m + held)
-    for i in range(ints[ELEMENTS]):
-        ints[here + i] = states[k * ints[ELEMENTS] + i]
-    for i in range(m):
-        numbers[place + i] = given[start + i]
-        numbers[speed + i] = given[start + m + i]
-    for i in range(q):
-        numbers[place + m + i] = numbers[ints[DRIVE] + i]
-        numbers[speed + m + i] = numbers[ints[DRIVE] + q + i]
-    for i in range(held):
-        numbers[place + m + q + i] = given[start + 2 * m + i]
-        numbers[speed + m + q + i] = 0.0
 
 
 @compiled
@@ -199,12 +173,11 @@ class Several:
         """Motions on the same arrays to ``end`` [s]; loop: ``carry_several``, or what calls it."""
         arrays, count = motions[0].arrays, len(motions)
         motions[0].take_over()
-        fresh, starts = arrays.numbers[:OF_A_RUN].copy(), [motion.start for motion in motions]
-        states = np.array([start.states for start in starts], np.int64).ravel()
-        given = np.concatenate([part for one in starts for part in (one.displacement, one.velocity, one.held)])
+        set_starts(arrays, [motion.start for motion in motions])
+        fresh = arrays.numbers[:OF_A_RUN].copy()
         ends, told = np.zeros((count + 1, ENDS), np.int64), np.empty((count, TOLD_WIDTH))
         outer = arrays.buffers.all
-        done = loop(*outer, end, arrays.channels.first_end, states, given, fresh, count, ends.ravel(), told.ravel())
+        done = loop(*outer, end, arrays.channels.first_end, fresh, count, ends.ravel(), told.ravel())
         arrays.owner = None
         return cls(arrays, motions, int(done), taken(arrays, PARTS), ends, told)
 

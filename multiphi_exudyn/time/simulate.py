@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
@@ -27,7 +28,7 @@ from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion, motion_of
 from multiphi_exudyn.time.refinement import to_tolerance
 from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.start import Start, first_start
+from multiphi_exudyn.time.start import first_start
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue

@@ -8,51 +8,25 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.element import friction_spring
 
-__all__ = ["Start", "first_start"]
+__all__ = ["first_start"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
 NOWHERE = np.zeros(0)  # no held places
-
-
-@dataclass(frozen=True, repr=False)
-class Start(Shown):
-    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
-
-    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
-    held places, leave them.
-    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
-    time [s], state: when the run begins, and of one that goes on from another what that has come to.
-    """
-
-    displacement: np.ndarray
-    velocity: np.ndarray
-    penetrating: tuple[int, ...]
-    touching: tuple[int, ...]
-    gaps: np.ndarray
-    states: tuple[int, ...]
-    held: np.ndarray
-    time: float = 0.0
-    state: State | None = None
-
-    def _facts(self) -> Iterator[tuple[str, str]]:
-        yield "time", f"{self.time:g} s"
-        yield "states", str(self.states)
 
 
 @dataclass(frozen=True)

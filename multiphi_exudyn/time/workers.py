@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
@@ -24,7 +25,6 @@ from multiphi_exudyn.time.reliability import INDICATOR
 from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.several import Several, carry_several
 from multiphi_exudyn.time.simulate import Run, warned
-from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["StartVectors", "Task"]
