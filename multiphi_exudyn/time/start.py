@@ -83,13 +83,19 @@ class _Scales:
 
 
 def first_start(
-    levels: LoadedLevels, end: float, y: np.ndarray | None, v: np.ndarray | None, stretches: Mapping[str, float]
+    levels: LoadedLevels,
+    end: float,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    stretches: Mapping[str, float],
 ) -> Start:
-    """The start from y, y' (m,), None for zero, of a run to ``end`` [s] as the contacts see it.
+    """The start from x, x' (n,), None for zero, of a run to ``end`` [s] as the contacts see it.
 
     stretches: of the springs of friction, by the names of their links.
     """
-    base = levels.model.base
+    base, vector = levels.model.base, levels.model.structure.vector
+    y = None if displacement is None else base.coordinates(vector("displacement", displacement))
+    v = None if velocity is None else base.coordinates(vector("velocity", velocity))
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
     y = scales.nowhere if y is None else y
     length = math.sqrt(y.dot(y))
