@@ -48,12 +48,16 @@ def left_out_warnings(
     model: MultiPhiModel,
     excitation: Excitation,
     taken: LeftOut,
+    looked: tuple[bool, bool],
     tolerance: Tolerance | None,
     samples: Samples,
     struck: Callable[[], bool],
 ) -> list[str]:
-    """Of the energy that truncation took, and of the motion that it did; struck: whether a rigid contact was."""
-    (much, far), found = taken.looked_into(tolerance), list[str]()
+    """Of the energy that truncation took, and of the motion that it did, where these are ``looked_into``.
+
+    struck: whether a rigid contact was.
+    """
+    (much, far), found = looked, list[str]()
     if much:
         alone = excitation.nothing and not (model.general or model.overrides)  # no more energy than at its start
         found += energy_warning(taken.energy, taken.given if alone else max(samples.largest_energy, taken.given))

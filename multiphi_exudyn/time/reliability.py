@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -164,10 +165,12 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
     lost += abs(trajectory.ending.truncated_at_start)
     given = abs(trajectory.ending.given_energy + float(trajectory.load.dot(y))) if lost > 0 else 0.0
     taken = LeftOut(lost, total_defect(trajectory, segments), given, y)
-    if not any(taken.looked_into(tolerance)):
+    looked = taken.looked_into(tolerance)
+    if not any(looked):
         return []
-    samples, excitation = Samples.of(segments, trajectory.t_end), segments.levels[0].excitation
-    return left_out_warnings(trajectory.model, excitation, taken, tolerance, samples, lambda: _struck(trajectory))
+    model, excitation = trajectory.model, segments.levels[0].excitation
+    samples, struck = Samples.of(segments, trajectory.t_end), partial(_struck, trajectory)
+    return left_out_warnings(model, excitation, taken, looked, tolerance, samples, struck)
 
 
 def _struck(trajectory: Trajectory) -> bool:

@@ -18,11 +18,11 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import NEED, OF_A_RUN
 from multiphi_exudyn.events.entering import Start, set_starts
 from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.time.carrying import ENDS, TOLD_WIDTH, carry_starts, measure_starts, sample_starts
 from multiphi_exudyn.time.defects import SAMPLES
 from multiphi_exudyn.time.left_out import LeftOut
-from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.taken import EMPTY, PARTS, taken
 
@@ -72,6 +72,11 @@ class Several:
         numbers: list[int] = self.parts["rows"][:, 0].tolist()
         return numbers
 
+    @functools.cached_property
+    def _visited(self) -> list[int]:
+        """The numbers of all levels visited."""
+        return sorted(set(self._numbers))
+
     def visited(self, k: int) -> tuple[tuple[int, ...], ...]:
         """The levels of a run, each once, by their states."""
         first, last = self._firsts[k], self._firsts[k + 1] - 1
@@ -86,8 +91,8 @@ class Several:
     @functools.cached_property
     def _record(self) -> tuple[np.ndarray, ...]:
         """What compiled functions are given of the record, and where its levels stand, (levels,)."""
-        offsets = np.zeros(max(self._numbers) + 1, np.int64)
-        for number in dict.fromkeys(self._numbers):
+        offsets = np.zeros(self._visited[-1] + 1, np.int64)
+        for number in self._visited:
             offsets[number] = self.arrays.level(self.arrays.loaded[number].states)
         rows, spans = self.parts["rows"].ravel(), self.parts["spans"].ravel()
         return rows, spans, self.parts["coordinates"], offsets, self.ends.ravel()
@@ -97,18 +102,18 @@ class Several:
         while self.call(function, *self.arrays.buffers.all, *self._record, *given) == NEED:
             self.arrays.supply()
 
-    def values(self, rows: Sequence[np.ndarray], times: np.ndarray) -> np.ndarray:
-        """Displacements (count, p, t) [m] of points at times (t,) [s]; rows: p of (m,) in base coordinates."""
-        found = np.empty((self.count, len(rows), len(times)))
+    def values(self, rows: Callable[[LoadedLevel], Sequence[np.ndarray]], points: int, times: np.ndarray) -> np.ndarray:
+        """Displacements (count, points, t) [m] at times (t,) [s]; rows: of all points in a level (level_rows.py)."""
+        found = np.empty((self.count, points, len(times)))
         if found.size:
-            loaded = {n: self.arrays.loaded[n] for n in dict.fromkeys(self._numbers)}
-            levels, width = max(loaded) + 1, max(level.level.modes for level in loaded.values())
-            functions = np.zeros((len(rows), levels, 2 * width + 1))
-            for number, level in loaded.items():
-                for p, row in enumerate(rows):
-                    function, n = point_row(row, level), level.level.modes
-                    functions[p, number, :n], functions[p, number, -1] = function[:n], function[-1]
-            asked = functions.ravel(), levels, len(rows), width, times, len(times)
+            loaded = [(number, self.arrays.loaded[number]) for number in self._visited]
+            levels, width = self._visited[-1] + 1, max(level.level.modes for _, level in loaded)
+            functions = np.zeros((points, levels, 2 * width + 1))
+            for number, level in loaded:
+                n = level.level.modes
+                for p, row in enumerate(rows(level)):
+                    functions[p, number, :n], functions[p, number, -1] = row[:n], row[-1]
+            asked = functions.ravel(), levels, points, width, times, len(times)
             self._asked(sampled_several, self.count, *asked, found.ravel())
         return found
 
@@ -116,8 +121,8 @@ class Several:
         """Mean of |y|^2 [m2 kg] and largest energy [J] of some runs, see ``Segments``."""
         found = np.empty((len(asked), 2))
         if len(asked):
-            for offset in np.unique(self._record[3][self.parts["rows"][:, 0]]).tolist():
-                self.arrays.add_sizes(offset)
+            for number in self._visited:
+                self.arrays.add_sizes(int(self._record[3][number]))
             numbers = np.array(asked, np.int64)
             self._asked(measured_several, numbers, len(asked), self.end, SAMPLES, found.ravel())
         return [(square, energy) for square, energy in found.tolist()]

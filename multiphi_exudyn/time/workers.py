@@ -15,6 +15,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
@@ -33,8 +34,9 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["StartVectors", "Task"]
 
+KEPT_ROWS = 256  # levels whose points' rows are kept
 KEPT = 8  # levels under loads as finely interpolated as runs have needed
-SEVERAL = 32  # runs that are carried together: threads then hardly wait for each other
+SEVERAL = 64  # runs that are carried together: threads then hardly wait for each other
 ROOM = 8192  # segments, and events, of a record of several runs: they take half of it, as they differ
 
 StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
@@ -53,6 +55,7 @@ class Task:
         self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
         self.levels = BoundedCache[object, LoadedLevels](KEPT)
         self._rows: tuple[MultiPhiModel | None, list[np.ndarray]] = None, []
+        self._in_levels = BoundedCache[tuple[int, ...], list[np.ndarray]](KEPT_ROWS)
         self._points, self.times, count = points, times, len(starts)
         self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self.events, self.told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
@@ -115,7 +118,8 @@ class Task:
 
     def _keep(self, worker: _Worker, several: Several, numbers: list[int]) -> None:
         """What is kept of the runs that have come to their end together."""
-        self.samples[numbers] = several.values(self._rows_of(several.arrays.levels.model), self.times)
+        rows = partial(self._rows_in, several.arrays.levels.model)
+        self.samples[numbers] = several.values(rows, len(self._points), self.times)
         self.events[numbers], self.ends[numbers] = several.events, self._given.t_end
         found = self._warnings(worker, several, numbers)
         for k, number in enumerate(numbers):
@@ -138,8 +142,9 @@ class Task:
         """Warnings of runs by what truncation took of each; all others are those of the levels that it was in."""
         levels, modes, found = several.arrays.levels, self._given.model.modes, dict[int, tuple[str, ...]]()
         model, tolerance = levels.model, modes if isinstance(modes, Tolerance) else None
-        looked = [k for k, taken in left_out.items() if not model.whole and any(taken.looked_into(tolerance))]
-        sizes = dict(zip(looked, several.sizes(looked), strict=True))
+        looked = {} if model.whole else {k: taken.looked_into(tolerance) for k, taken in left_out.items()}
+        asked = [k for k, which in looked.items() if any(which)]
+        sizes = dict(zip(asked, several.sizes(asked), strict=True))
         for k, taken in left_out.items():
             visited = several.visited(k)
             if visited not in self._around:
@@ -149,7 +154,7 @@ class Task:
             before, after = self._around[visited]
             if k in sizes:
                 samples, struck = Samples(partial(sizes.__getitem__, k)), partial(several.struck, k)
-                told = left_out_warnings(model, levels.excitation, taken, tolerance, samples, struck)
+                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, samples, struck)
                 found[k] = (*before, *told, *after)
             else:
                 found[k] = (*before, *after)
@@ -174,6 +179,12 @@ class Task:
         segments, times = listed(trajectory.segments), self.times[known]
         for place, row in enumerate(self._rows_of(trajectory.model)):
             self.samples[number, place, known] = segments.values(times, "right", partial(point_row, row))
+
+    def _rows_in(self, model: MultiPhiModel, level: LoadedLevel) -> list[np.ndarray]:
+        """The points' rows (2 n + 1,) in a level of the model that runs end with, kept for the runs that follow."""
+        return self._in_levels.get_or_build(
+            level.states, lambda: [point_row(row, level) for row in self._rows_of(model)]
+        )
 
     def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
         """The points' rows (m,) in the base coordinates of the model that runs end with, one for most of them."""

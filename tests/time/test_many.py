@@ -297,3 +297,22 @@ def test_an_error_that_is_nobodys_ends_all(monkeypatch):
 def test_bad_input_is_refused(refused, kind, changes, begins):
     given = {"model": model("all"), "t_end": END, "displacements": np.zeros((3, 6))}
     refused(kind, begins, mp.simulate_many, **(given | changes))
+
+
+@pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+@pytest.mark.parametrize("modes", [2, "all"], ids=["truncated", "whole"])
+def test_a_further_run_takes_few_calls(modes):
+    """Of Python, which one thread at a time does; with and without warnings of its own."""
+    own, calls = model(modes, stiffness=50.0), []
+
+    def counted(count):
+        calls.clear()
+        threading.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
+        try:
+            mp.simulate_many(own, END, starts(count, most=0.11), points=["m5"], threads=1)
+        finally:
+            threading.setprofile(None)
+        return len(calls)
+
+    first = counted(300)
+    assert counted(900) - first < 600 * 40
