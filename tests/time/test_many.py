@@ -173,6 +173,14 @@ class TestSeveralRunsTogether:
         assert_array_equal(np.delete(found.samples[:, 0], 11, axis=0), [run.at("m5", TIMES) for run in runs])
         assert sum(calls[0]) > 15
 
+    def test_one_pressed_against_a_rigid_contact_at_its_start(self, calls):
+        """Its numbers do not tell what its first level leaves out of it; the run as a whole does."""
+        x, loads = starts(24, most=0.11), [mp.ConstantLoad("m5", -9.0)]
+        x[::2], x[::2, 5] = np.linspace(0, -0.1, 6), -0.1
+        runs = alone(model(3), x, loads=loads)
+        check(mp.simulate_many(model(3), END, x, loads=loads, points=["m5"], times=TIMES, threads=2), runs, ["m5"])
+        assert sum(calls[0]) > 15
+
     def test_a_full_record_ends_a_call(self):
         own = model("all")
         for x in starts(3, most=0.11):
