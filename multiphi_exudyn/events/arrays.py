@@ -28,6 +28,8 @@ state     ints[state ...]         level, where xi, xi' and their scales stand, t
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
           SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
+start     STARTS                  y, y' (m,), the places that links hold, the energy of springs among them
+          START_STATES            a state for every element
 event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event), left
           EVENT_NUMBERS           time, six losses, impulse
 
@@ -110,7 +112,8 @@ PUSHING, ENTERS = 214, 215  # along which rows those of a small problem push; th
 COMPRESSED = 216  # a state, in all modes too: where an impact with friction and restitution has spent its first half
 UNMOVED = 224  # flags of elements that nothing lets move: nobody looks at their exits
 WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the segment under way are
-RUN_INTS = 228
+STARTS, START_STATES, START = 228, 229, 230  # where starts stand, their states in the ints; which of them a run has
+RUN_INTS = 231
 
 # ---------------------------------------------------------------------- run record, numbers
 

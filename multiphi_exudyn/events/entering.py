@@ -1,52 +1,72 @@
-"""Entering: the start of a run, or the state that it goes on from, into the arrays of its levels."""
+"""Entering: starts of runs, or the state that one goes on from, into the arrays of its levels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.state import State
 from multiphi_exudyn.events.state_arrays import measure
 
-__all__ = ["Measure", "set_start", "set_state"]
+__all__ = ["Measure", "Start", "set_starts", "set_state"]
 
 Measure = Callable[[np.ndarray, np.ndarray, int], None]
 
 
-def set_start(
-    arrays: LevelArrays,
-    displacement: np.ndarray,
-    velocity: np.ndarray,
-    key: Sequence[int],
-    held: np.ndarray,
-    sprung: Sequence[int],
-) -> None:
-    """The start of a run: y, y' (m,), the states of elements, those contacts closed that touch or penetrate.
+@dataclass(frozen=True, repr=False)
+class Start(Shown):
+    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 
-    held: places (h,) that links hold. sprung: links that hold by their springs.
+    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
+    held places, leave them.
+    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
+    time [s], state: when the run begins, and of one that goes on from another what that has come to.
     """
-    base = arrays.base
+
+    displacement: np.ndarray
+    velocity: np.ndarray
+    penetrating: tuple[int, ...]
+    touching: tuple[int, ...]
+    gaps: np.ndarray
+    states: tuple[int, ...]
+    held: np.ndarray
+    time: float = 0.0
+    state: State | None = None
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "time", f"{self.time:g} s"
+        yield "states", str(self.states)
+
+
+def set_starts(arrays: LevelArrays, starts: Sequence[Start]) -> None:
+    """The starts of runs, the first of which begins with the next call of the loop (start.py)."""
+    arrays.reserve_starts(len(starts))
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-    m, q, states = len(displacement), int(ints[a.PRESCRIBED]), int(ints[base + a.STATES])
-    ints[states : states + len(key)] = key
-    ints[a.GIVEN + a.LEVEL], ints[a.STARTING] = base, a.FRESH
-    place, speed = ints[a.GIVEN + a.PLACE : a.GIVEN + a.SPEED + 1].tolist()
-    numbers[place : place + m], numbers[speed : speed + m] = displacement, velocity
-    for start, number, values in ((place, 0, held), (speed, 1, 0.0 * held)) if q or len(held) else ():
-        drive = int(ints[a.DRIVE]) + number * q
-        numbers[start + m : start + m + q] = numbers[drive : drive + q]
-        numbers[start + m + q : start + m + q + len(held)] = values
-    numbers[a.GIVEN_SPRINGS] = _springs(arrays, sprung) if sprung else 0.0
+    place, here = ints[a.STARTS : a.START_STATES + 1].tolist()
+    for start in starts:
+        m, held, states = len(start.displacement), start.held, start.states
+        ints[here : here + len(states)] = states
+        numbers[place : place + m], numbers[place + m : place + 2 * m] = start.displacement, start.velocity
+        here, place = here + len(states), place + 2 * m + len(held) + 1
+        if len(held):
+            numbers[place - len(held) - 1 : place - 1] = held
+        numbers[place - 1] = _springs(arrays, start) if start.penetrating else 0.0
+    ints[a.START], ints[a.STARTING] = 0, a.FRESH
 
 
-def _springs(arrays: LevelArrays, sprung: Sequence[int]) -> float:
-    """Strain energy [J] that these links have in the place of GIVEN."""
+def _springs(arrays: LevelArrays, start: Start) -> float:
+    """Strain energy [J] of the links that hold by their springs."""
     base, ints, numbers = arrays.levels.model.base, arrays.ints, arrays.numbers
-    n, links = int(ints[a.COORDINATES] + ints[a.CHANNELS]), [k for k in sprung if np.isfinite(base.stiffnesses[k])]
+    links = [k for k in start.penetrating if np.isfinite(base.stiffnesses[k])]
+    place = np.concatenate([start.displacement, numbers[ints[a.DRIVE] :][: ints[a.PRESCRIBED]], start.held])
+    n = len(place)
     rows = numbers[ints[arrays.base + a.GAPS] :][: len(base.links) * (n + 1)].reshape(-1, n + 1)[links]
-    gaps = rows[:, :-1] @ numbers[ints[a.GIVEN + a.PLACE] :][:n] + rows[:, -1]
+    gaps = rows[:, :-1] @ place + rows[:, -1]
     return 0.5 * float(base.stiffnesses[links] @ (gaps * gaps))
 
 

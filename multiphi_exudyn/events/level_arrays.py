@@ -107,7 +107,8 @@ class LevelArrays:
         self._maps: dict[tuple[int, int], int] = {}  # records by their levels
         self._ring = 0  # where that of a chatter check begins
         self._recorded = 0, 0  # coordinates and exits for which the record has room
-        self._base = 0  # where the base stands among the levels, in the ints
+        self.base = 0  # where it stands as a level in the ints, once there are starts
+        self._starts = 0  # for how many there is room
         describe_elements(self.buffers, self.levels.model)
         self._tables = LevelTables(self.buffers)  # what the loop finds, and does not ask for
         self.channels.describe(self.buffers)
@@ -203,15 +204,23 @@ class LevelArrays:
         """Room for the powers that a response to a term has taken."""
         self.scratch.reserve_powers(max(len(level.modal.response.basis.rates) for level in self.loaded.values()))
 
-    @property
-    def base(self) -> int:
-        """Where the base stands as a level in the ints, with memory for what happens there, put there if it was not."""
-        if not self._base:
-            base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
-            for state in (a.GIVEN, a.SLOWED):
-                self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
-            self._base = put_base(self.buffers, base, self.levels.excitation)
-        return self._base
+    def reserve_starts(self, count: int) -> None:
+        """Room for so many starts, and the base in which they are; where there was less, none stands there any more."""
+        if not self.base:
+            self._add_base()
+        if count > self._starts:
+            self._starts = count
+            held = int(self.ints[a.CHANNELS] - self.ints[a.PRESCRIBED])
+            self.ints[a.STARTS] = self.buffers.take("numbers", count * (2 * int(self.ints[a.COORDINATES]) + held + 1))
+            self.ints[a.START_STATES] = self.buffers.take("ints", count * int(self.ints[a.ELEMENTS]))
+
+    def _add_base(self) -> None:
+        """Pack the base as a level, with memory for what happens there."""
+        base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
+        for state in (a.GIVEN, a.SLOWED):
+            self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
+        self.base = put_base(self.buffers, base, self.levels.excitation)
+        self.ints[a.GIVEN + a.LEVEL] = self.base
 
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
@@ -256,7 +265,7 @@ class LevelArrays:
         """The record of the map between two levels."""
         put, level = self.buffers.put, self.loaded[int(self.ints[target + a.NUMBER])]
         sizes, terms = list[float](), None
-        if source == self._base:
+        if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
             move = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
@@ -269,7 +278,7 @@ class LevelArrays:
 
     def _defect(self, source: int, level: LoadedLevel) -> np.ndarray:
         """What a defect is read from on the way from a level, or from the base, into a level (defect_sums.py)."""
-        if source == self._base:
+        if source == self.base:
             return np.column_stack([level.level.vectors, level.asymptotic.configuration]).ravel()
         form = defect_form(self.loaded[int(self.ints[source + a.NUMBER])], level, ())
         return np.concatenate([form.displaced.ravel(), form.moving.ravel()])

@@ -20,6 +20,7 @@ from multiphi_exudyn.events.arrays import (
     CHANNELS,
     COMPLIANT_KEY,
     COORDINATES,
+    DRIVE,
     ELEMENTS,
     EXIT_COUNT,
     FAILED,
@@ -38,10 +39,15 @@ from multiphi_exudyn.events.arrays import (
     OPEN,
     PHASES,
     PLACE,
+    PRESCRIBED,
     REACHED,
     RIGID,
     SETTLED,
     SLOWED,
+    SPEED,
+    START,
+    START_STATES,
+    STARTS,
     STATES,
     STICKS,
     STRAIN,
@@ -65,11 +71,12 @@ __all__ = ["begin"]
 
 @compiled
 def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """WORKED becomes the state right after the start from GIVEN; OK, NEED or FAILED.
+    """WORKED becomes the state right after the start; OK, NEED or FAILED.
 
     REACHED: the state before anybody was heard. Energies lost are added up in LOST, changes listed.
     """
     states, count, strikes = ints[ints[GIVEN + LEVEL] + STATES], 0, 0
+    enter_start(ints, numbers)
     measure(ints, numbers, GIVEN)
     touching = 0
     for i in range(ints[ELEMENTS]):
@@ -108,6 +115,26 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     for k in range(LOSSES):
         numbers[LOST + k] += numbers[LOST_AT_START + k]
     return OK
+
+
+@compiled
+def enter_start(ints: Ints, numbers: Numbers) -> None:
+    """GIVEN becomes the START-th of the starts that stand in the arrays (entering.py), w and w' what they are now."""
+    m, q, elements, here = ints[COORDINATES], ints[PRESCRIBED], ints[ELEMENTS], ints[ints[GIVEN + LEVEL] + STATES]
+    held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
+    start = ints[STARTS] + ints[START] * (2 * m + held + 1)
+    for i in range(elements):
+        ints[here + i] = ints[ints[START_STATES] + ints[START] * elements + i]
+    for i in range(m):
+        numbers[place + i] = numbers[start + i]
+        numbers[speed + i] = numbers[start + m + i]
+    for k in range(q):
+        numbers[place + m + k] = numbers[ints[DRIVE] + k]
+        numbers[speed + m + k] = numbers[ints[DRIVE] + q + k]
+    for k in range(held):
+        numbers[place + m + q + k] = numbers[start + 2 * m + k]
+        numbers[speed + m + q + k] = 0.0
+    numbers[GIVEN_SPRINGS] = numbers[start + 2 * m + held]
 
 
 @compiled

@@ -8,5 +8,5 @@ off it.
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, resuming,
 sampling, work_sums, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, start, model_histories,
 ending, trajectory, defects, truncation, chatter, loop_record, loop, going_on, failures, motion, refinement, rubbing,
-rough_impacts, known_warnings, reliability, several, simulate, workers, many.
+rough_impacts, known_warnings, left_out, reliability, carrying, several, simulate, workers, many.
 """

@@ -18,6 +18,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
+__all__ = ["SAMPLES", "Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
 
 SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
 
@@ -85,14 +86,22 @@ class DefectHistory:
     def indicator(self, end: float) -> float:
         """The truncation indicator of [0, end] (truncation.py)."""
         lost = float(np.sum(self.squares[self.segments.starts[self.places] <= end]))
-        return indicator(lost, Samples(self.segments, end))
+        return indicator(lost, Samples.of(self.segments, end))
 
 
 class Samples:
-    """The motion at times evenly spaced up to ``end`` [s]; looked at when somebody asks."""
+    """The motion at SAMPLES times evenly spaced; looked at when somebody asks.
 
-    def __init__(self, segments: Segments, end: float) -> None:
-        self._segments, self._end = segments, end
+    sizes: gives the mean of |y|^2 and the largest energy, see ``Segments``.
+    """
+
+    def __init__(self, sizes: Callable[[], tuple[float, float]]) -> None:
+        self._asked = sizes
+
+    @classmethod
+    def of(cls, segments: Segments, end: float) -> Samples:
+        """Of a run up to ``end`` [s]."""
+        return cls(lambda: segments.sizes(end, SAMPLES))
 
     @property
     def amplitude(self) -> float:
@@ -106,7 +115,7 @@ class Samples:
 
     @functools.cached_property
     def _sizes(self) -> tuple[float, float]:
-        return self._segments.sizes(self._end, SAMPLES)
+        return self._asked()
 
 
 def is_small(lost: float, limit: float, start: np.ndarray) -> bool:

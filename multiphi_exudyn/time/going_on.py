@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import State
-from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["going_on", "nudged", "stops_moved"]

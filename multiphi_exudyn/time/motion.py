@@ -14,7 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.entering import Measure, set_start, set_state
+from multiphi_exudyn.events.entering import Measure, Start, set_starts, set_state
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -28,7 +28,6 @@ from multiphi_exudyn.time.failures import NOT_FINITE, failure
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.recorded import Events, Recorded
-from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Again, Trajectory
 
 __all__ = ["Motion", "carry", "measured", "motion_of"]
@@ -234,8 +233,7 @@ class Motion:
         arrays.buffers.numbers[: a.OF_A_RUN] = ending.numbers
         arrays.channels.set(arrays.buffers, ending.piece, float(ending.numbers[a.AGE]), self.time)
         if ending.level is None:
-            start = self.start
-            set_start(arrays, start.displacement, start.velocity, start.states, start.held, start.penetrating)
+            set_starts(arrays, (self.start,))
         else:
             set_state(arrays, level, ending.displacement, ending.velocity, ending.phases, self._measured)
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0

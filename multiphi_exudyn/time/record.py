@@ -190,7 +190,7 @@ class Record:
         for offsets in self._packed(list(range(len(self.levels)))):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_sizes(level)
-            while self._supply(sizes_of(*self._given(offsets), len(self.rows), end, count)):
+            while self._supply(sizes_of(*self._given(offsets), 0, len(self.rows), end, count)):
                 pass
             square += float(self.arrays.numbers[a.MEAN_SQUARE])
             largest = max(largest, float(self.arrays.numbers[a.LARGEST_ENERGY]))

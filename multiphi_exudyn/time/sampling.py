@@ -139,19 +139,21 @@ def sample_sizes(
     spans: Numbers,
     coordinates: Numbers,
     offsets: Ints,
+    begin: int,
     segments: int,
     end: float,
     count: int,
 ) -> int:
     """MEAN_SQUARE of |y| from the first start to ``end`` [s], of a polygon through ``count`` even instants.
 
-    LARGEST_ENERGY: the largest kinetic and strain energy at these, without its sign. OK or NEED.
+    LARGEST_ENERGY: the largest kinetic and strain energy at these, without its sign. Of the segments from ``begin``
+    before ``segments``. OK or NEED.
     """
-    i, flowing, first = -1, -1, spans[0]
+    i, flowing, first = -1, -1, spans[begin * SEGMENT_WIDTH_NUMBERS]
     numbers[MEAN_SQUARE] = numbers[LARGEST_ENERGY] = 0.0
     for k in range(count):
         t = first + (end - first) * k / (count - 1)
-        i = owner_of(spans, 0, segments, t, 0, i)
+        i = owner_of(spans, begin, segments, t, 0, i)
         level, x = offsets[rows[i * SEGMENT_WIDTH]], ints[AFTER + PLACE]
         if level == 0:
             continue

@@ -7,6 +7,7 @@ the call: whoever has asked carries that one by itself. So a run is what it is a
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,250 +15,144 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.arrays import (
-    CHANNELS,
-    COORDINATE_COUNT,
-    COORDINATES,
-    CURRENT,
-    DECISIONS,
-    DRIVE,
-    DRIVE_NEXT,
-    ELEMENTS,
-    END_REACHED,
-    EVENT_COUNT,
-    FOUND,
-    FRESH,
-    GIVEN,
-    GIVEN_UP,
-    HORIZON,
-    LEVEL,
-    MODES,
-    NEED,
-    OF_A_RUN,
-    OK,
-    PHASE_COUNT,
-    PIECE,
-    PLACE,
-    PRESCRIBED,
-    SEGMENT_COUNT,
-    SEGMENT_ROOM,
-    SPEED,
-    STARTING,
-    STATES,
-    STOP_AT_EVENT,
-    TIME,
-    TRANSITIONS,
-)
-from multiphi_exudyn.events.drive import keep_drive, load_piece, set_drive
+from multiphi_exudyn.events.arrays import NEED, OF_A_RUN
+from multiphi_exudyn.events.entering import Start, set_starts
 from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled, entry
-from multiphi_exudyn.time.level_rows import point_row
-from multiphi_exudyn.time.loop import advance
-from multiphi_exudyn.time.loop_record import keep_segment
+from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.time.carrying import ENDS, TOLD_WIDTH, carry_starts, measure_starts, sample_starts
+from multiphi_exudyn.time.defects import SAMPLES
+from multiphi_exudyn.time.left_out import LeftOut
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.reliability import looked_into
-from multiphi_exudyn.time.sampling import sample_rows
-from multiphi_exudyn.time.taken import PARTS, taken
+from multiphi_exudyn.time.taken import EMPTY, PARTS, taken
 
-__all__ = ["Several", "carry_several"]
+__all__ = ["Several"]
 
-ENDS = 4  # ints: segments, coordinates, phases and events up to the end of a run
-TOLD_WIDTH = OF_A_RUN + 2
-
-
-@compiled
-def carry_starts(
-    ints: Ints,
-    numbers: Numbers,
-    waves: Waves,
-    end: float,
-    until: float,
-    states: Ints,
-    given: Numbers,
-    fresh: Numbers,
-    count: int,
-    ends: Ints,
-    told: Numbers,
-) -> int:
-    """Carries starts (``enter_start``) to ``end`` one after the other; how many of them have come there.
-
-    until: how long the first piece of the channels lasts. fresh: the numbers of a run at its start. ends: counts
-    (count + 1, ENDS) of the record, the first ones zero. told: numbers (count, TOLD_WIDTH) of each run, and its
-    function evaluations and transitions. A segment of no length after those of a run has its final state.
-    """
-    for k in range(count):
-        for i in range(OF_A_RUN):
-            numbers[i] = fresh[i]
-        ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = FRESH, 0, 0
-        ints[DECISIONS], ints[TRANSITIONS], ints[PIECE] = 0, 0, 0
-        numbers[ints[FOUND] + 1] = 0.0
-        if ints[PRESCRIBED] > 0:
-            load_piece(ints, waves)
-            set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], until)
-            keep_drive(ints, waves)
-        enter_start(ints, numbers, states, given, k)
-        status = advance(ints, numbers, waves, end)
-        if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM] or is_finite(ints, numbers) == 0:
-            before = ENDS * k
-            ints[SEGMENT_COUNT], ints[COORDINATE_COUNT] = ends[before], ends[before + 1]
-            ints[PHASE_COUNT], ints[EVENT_COUNT] = ends[before + 2], ends[before + 3]
-            return k
-        for i in range(OF_A_RUN):
-            told[k * TOLD_WIDTH + i] = numbers[i]
-        told[k * TOLD_WIDTH + OF_A_RUN] = numbers[ints[FOUND] + 1]
-        told[k * TOLD_WIDTH + OF_A_RUN + 1] = ints[TRANSITIONS]
-        keep_segment(ints, numbers, 0.0, numbers[HORIZON])
-        after = ENDS * (k + 1)
-        ends[after], ends[after + 1] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT]
-        ends[after + 2], ends[after + 3] = ints[PHASE_COUNT], ints[EVENT_COUNT]
-    return count
-
-
-@compiled
-def enter_start(ints: Ints, numbers: Numbers, states: Ints, given: Numbers, k: int) -> None:
-    """GIVEN becomes the k-th start: states (c,) of elements; y, y' (m,) and the places (h,) that links hold."""
-    m, q, here = ints[COORDINATES], ints[PRESCRIBED], ints[ints[GIVEN + LEVEL] + STATES]
-    held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
-    start = k * (2 * m + held)
-    for i in range(ints[ELEMENTS]):
-        ints[here + i] = states[k * ints[ELEMENTS] + i]
-    for i in range(m):
-        numbers[place + i] = given[start + i]
-        numbers[speed + i] = given[start + m + i]
-    for i in range(q):
-        numbers[place + m + i] = numbers[ints[DRIVE] + i]
-        numbers[speed + m + i] = numbers[ints[DRIVE] + q + i]
-    for i in range(held):
-        numbers[place + m + q + i] = given[start + 2 * m + i]
-        numbers[speed + m + q + i] = 0.0
-
-
-@compiled
-def is_finite(ints: Ints, numbers: Numbers) -> int:
-    """1 where all coordinates of the present state are finite."""
-    x = ints[CURRENT + PLACE]
-    for i in range(ints[ints[CURRENT + LEVEL] + MODES] + ints[CHANNELS]):
-        if numbers[x + i] - numbers[x + i] != 0.0:
-            return 0
-    return 1
-
-
-@compiled
-def sample_starts(
-    ints: Ints,
-    numbers: Numbers,
-    waves: Waves,
-    rows: Ints,
-    spans: Numbers,
-    coordinates: Numbers,
-    offsets: Ints,
-    ends: Ints,
-    runs: int,
-    functions: Numbers,
-    levels: int,
-    points: int,
-    width: int,
-    times: Numbers,
-    count: int,
-    values: Numbers,
-) -> int:
-    """Values (runs, points, count) at times [s] in a record of ``carry_starts`` (sampling.py); OK or NEED.
-
-    functions: the points' rows (points, levels, 2 width + 1).
-    """
-    for k in range(runs):
-        for p in range(points):
-            place, function = (k * points + p) * count, p * levels * (2 * width + 1)
-            status = sample_rows(
-                ints, numbers, waves, rows, spans, coordinates, offsets, ends[ENDS * k], ends[ENDS * (k + 1)] - 1,
-                functions, function, width, times, count, 0, values, place,
-            )  # fmt: skip
-            if status == NEED:
-                return NEED
-    return OK
-
-
-carry_several, sampled_several = entry(carry_starts), entry(sample_starts)
+carry_several, sampled_several, measured_several = entry(carry_starts), entry(sample_starts), entry(measure_starts)
 
 
 @dataclass(frozen=True)
 class Several:
-    """Motions that have set out on ``arrays``, of which the first ``count`` have come to the end.
+    """Runs from ``starts`` on ``arrays``, of which the first ``count`` have come to the ``end`` [s].
 
-    parts: their record. ends, told: see ``carry_starts``.
+    call: calls a compiled function with what it is given. parts: their record. ends, told: see ``carry_starts``.
     """
 
     arrays: LevelArrays
-    motions: Sequence[Motion]
+    starts: Sequence[Start]
+    end: float
+    call: Callable[..., Any]
     count: int
     parts: dict[str, np.ndarray]
     ends: np.ndarray
     told: np.ndarray
 
     @classmethod
-    def carried(cls, motions: Sequence[Motion], end: float, loop: Callable[..., Any]) -> Several:
-        """Motions on the same arrays to ``end`` [s]; loop: ``carry_several``, or what calls it."""
-        arrays, count = motions[0].arrays, len(motions)
-        motions[0].take_over()
-        fresh, starts = arrays.numbers[:OF_A_RUN].copy(), [motion.start for motion in motions]
-        states = np.array([start.states for start in starts], np.int64).ravel()
-        given = np.concatenate([part for one in starts for part in (one.displacement, one.velocity, one.held)])
+    def carried(cls, motion: Motion, starts: Sequence[Start], end: float, call: Callable[..., Any]) -> Several:
+        """Starts carried to ``end`` [s]; motion: from the first of them, on whose arrays they are."""
+        arrays, count = motion.arrays, len(starts)
+        motion.take_over()
+        set_starts(arrays, starts)
+        fresh = arrays.numbers[:OF_A_RUN].copy()
         ends, told = np.zeros((count + 1, ENDS), np.int64), np.empty((count, TOLD_WIDTH))
-        outer = arrays.buffers.all
-        done = loop(*outer, end, arrays.channels.first_end, states, given, fresh, count, ends.ravel(), told.ravel())
+        given = end, arrays.channels.first_end, fresh, count, ends.ravel(), told.ravel()
+        done = int(call(carry_several, *arrays.buffers.all, *given))
         arrays.owner = None
-        return cls(arrays, motions, int(done), taken(arrays, PARTS), ends, told)
+        return cls(arrays, starts, end, call, done, EMPTY | taken(arrays, PARTS), ends, told)
 
     @property
     def events(self) -> np.ndarray:
         """Their numbers (count,)."""
-        own = np.concatenate([[0], np.cumsum(self.parts["kinds"][:, 1] != a.SHARED)]) if "kinds" in self.parts else None
-        return np.zeros(self.count, int) if own is None else np.diff(own[self.ends[: self.count + 1, 3]])
+        own = np.concatenate([[0], np.cumsum(self.parts["kinds"][:, 1] != a.SHARED)])
+        return np.diff(own[self.ends[: self.count + 1, 3]])
+
+    @functools.cached_property
+    def _numbers(self) -> list[int]:
+        """Of the levels of all segments."""
+        numbers: list[int] = self.parts["rows"][:, 0].tolist()
+        return numbers
+
+    @functools.cached_property
+    def _visited(self) -> list[int]:
+        """The numbers of all levels visited."""
+        return sorted(set(self._numbers))
 
     def visited(self, k: int) -> tuple[tuple[int, ...], ...]:
         """The levels of a run, each once, by their states."""
-        first, last = self.ends[k, 0], self.ends[k + 1, 0] - 1
-        return tuple(self.arrays.loaded[n].states for n in dict.fromkeys(self.parts["rows"][first:last, 0].tolist()))
+        first, last = self._firsts[k], self._firsts[k + 1] - 1
+        return tuple([self.arrays.loaded[n].states for n in dict.fromkeys(self._numbers[first:last])])
 
-    def values(self, rows: Sequence[np.ndarray], times: np.ndarray) -> np.ndarray:
-        """Displacements (count, p, t) [m] of points at times (t,) [s]; rows: p of (m,) in base coordinates."""
-        arrays, found = self.arrays, np.empty((self.count, len(rows), len(times)))
-        if not found.size:
-            return found
-        loaded = {n: arrays.loaded[n] for n in dict.fromkeys(self.parts["rows"][:, 0].tolist())}
-        levels, width = max(loaded) + 1, max(level.level.modes for level in loaded.values())
-        functions, offsets = np.zeros((len(rows), levels, 2 * width + 1)), np.zeros(levels, np.int64)
-        for number, level in loaded.items():
-            offsets[number] = arrays.level(level.states)
-            for p, row in enumerate(rows):
-                function, n = point_row(row, level), level.level.modes
-                functions[p, number, :n], functions[p, number, -1] = function[:n], function[-1]
-        record = self.parts["rows"].ravel(), self.parts["spans"].ravel(), self.parts["coordinates"], offsets
-        asked = self.ends.ravel(), self.count, functions.ravel(), levels, len(rows), width, times, len(times)
-        while sampled_several(*arrays.buffers.all, *record, *asked, found.ravel()) == NEED:
-            arrays.supply()
+    @functools.cached_property
+    def _firsts(self) -> list[int]:
+        """The first segments of all runs."""
+        firsts: list[int] = self.ends[:, 0].tolist()
+        return firsts
+
+    @functools.cached_property
+    def _record(self) -> tuple[np.ndarray, ...]:
+        """What compiled functions are given of the record, and where its levels stand, (levels,)."""
+        offsets = np.zeros(self._visited[-1] + 1, np.int64)
+        for number in self._visited:
+            offsets[number] = self.arrays.level(self.arrays.loaded[number].states)
+        rows, spans = self.parts["rows"].ravel(), self.parts["spans"].ravel()
+        return rows, spans, self.parts["coordinates"], offsets, self.ends.ravel()
+
+    def _asked(self, function: Callable[..., Any], *given: Any) -> None:
+        """Call a compiled function about the record until it has all that it needs."""
+        while self.call(function, *self.arrays.buffers.all, *self._record, *given) == NEED:
+            self.arrays.supply()
+
+    def values(self, rows: Callable[[LoadedLevel], Sequence[np.ndarray]], points: int, times: np.ndarray) -> np.ndarray:
+        """Displacements (count, points, t) [m] at times (t,) [s]; rows: of all points in a level (level_rows.py)."""
+        found = np.empty((self.count, points, len(times)))
+        if found.size:
+            loaded = [(number, self.arrays.loaded[number]) for number in self._visited]
+            levels, width = self._visited[-1] + 1, max(level.level.modes for _, level in loaded)
+            functions = np.zeros((points, levels, 2 * width + 1))
+            for number, level in loaded:
+                n = level.level.modes
+                for p, row in enumerate(rows(level)):
+                    functions[p, number, :n], functions[p, number, -1] = row[:n], row[-1]
+            asked = functions.ravel(), levels, points, width, times, len(times)
+            self._asked(sampled_several, self.count, *asked, found.ravel())
         return found
 
+    def sizes(self, asked: Sequence[int]) -> list[tuple[float, float]]:
+        """Mean of |y|^2 [m2 kg] and largest energy [J] of some runs, see ``Segments``."""
+        found = np.empty((len(asked), 2))
+        if len(asked):
+            for number in self._visited:
+                self.arrays.add_sizes(int(self._record[3][number]))
+            numbers = np.array(asked, np.int64)
+            self._asked(measured_several, numbers, len(asked), self.end, SAMPLES, found.ravel())
+        return [(square, energy) for square, energy in found.tolist()]
+
+    def left_out(self) -> list[LeftOut]:
+        """What truncation took of each run."""
+        told, y = self.told[: self.count], [start.displacement for start in self.starts]
+        at_start = told[:, a.LOST_AT_START + a.KINETIC] + told[:, a.LOST_AT_START + a.STRAIN]
+        numbers = np.abs(at_start) + told[:, a.TRUNCATED], told[:, a.DEFECTS], told[:, a.GIVEN_ENERGY]
+        load, found = self.arrays.levels.excitation.static, list[LeftOut]()
+        for k, (lost, defects, energy) in enumerate(zip(*(column.tolist() for column in numbers), strict=True)):
+            given = abs(energy + float(load.dot(y[k]))) if lost > 0 else 0.0
+            found.append(LeftOut(lost, defects, given, y[k]))
+        return found
+
+    def struck(self, k: int) -> bool:
+        """Whether a rigid contact was struck in a run."""
+        (*_, first, _), (*_, last, _) = self.ends[k], self.ends[k + 1]
+        amounts, kinds = (self.parts[name][first:last] for name in ("amounts", "kinds"))
+        return bool(np.any(amounts[kinds[:, 1] != a.SHARED, -1] > 0))
+
     def land(self, k: int) -> Motion:
-        """A motion where it has come to."""
-        (s, _, _, e), (s_end, _, _, e_end) = self.ends[k].tolist(), self.ends[k + 1].tolist()
+        """The run as a motion that has come to the end."""
+        (s, _, _, e, left), (s_end, _, _, e_end, left_end) = self.ends[k].tolist(), self.ends[k + 1].tolist()
         part = {name: given for name, given in self.parts.items() if name in ("coordinates", "phases")}
-        part |= {name: self.parts[name][s:s_end] for name in ("rows", "spans")}
+        part |= {"rows": self.parts["rows"][s:s_end].copy(), "spans": self.parts["spans"][s:s_end]}
         part |= {name: self.parts[name][e:e_end] for name in ("kinds", "amounts") if e_end > e}
+        if left_end > left:
+            part["left_out"] = self.parts["left_out"][left:left_end] - s
         part["rows"][:, 2] -= e
-        self.motions[k].land(part, self.told[k])
-        return self.motions[k]
-
-    def silent(self, k: int, least: float) -> bool:
-        """Whether reliability.py says nothing of a run that depends on more than the levels visited.
-
-        least: the indicator from which truncation is told.
-        """
-        model = self.arrays.levels.model
-        if model.general or model.validity is not None or not model.base.complete:
-            return False
-        told, y = self.told[k], self.motions[k].start.displacement
-        kinetic, strain = told[a.LOST_AT_START + a.KINETIC : a.LOST_AT_START + a.STRAIN + 1].tolist()
-        defects, truncated = told[a.DEFECTS : a.TRUNCATED + 1].tolist()
-        given = abs(float(told[a.GIVEN_ENERGY]) + float(self.arrays.levels.excitation.static.dot(y)))
-        return not any(looked_into((abs(kinetic + strain) + truncated, defects, given), y, least))
+        motion = Motion(self.arrays, self.starts[k])
+        motion.land(part, self.told[k])
+        return motion

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
@@ -27,7 +28,7 @@ from multiphi_exudyn.time.going_on import going_on, nudged
 from multiphi_exudyn.time.motion import Motion, motion_of
 from multiphi_exudyn.time.refinement import to_tolerance
 from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.start import Start, first_start
+from multiphi_exudyn.time.start import first_start
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import adapted
 from multiphi_exudyn.time.warning_groups import issue
@@ -180,7 +181,7 @@ class Run:
     """What ``simulate`` is asked for, there is more about it there; t_end [s].
 
     rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
-    shared: what it has in common with other runs, None where it is alone. ahead: its motion, if it has set out.
+    shared: what it has in common with other runs, None where it is alone. ahead: its motion, if it has been carried.
     """
 
     model: MultiPhiModel
@@ -208,12 +209,6 @@ class Run:
         motion.advance(self.t_end)
         return motion.trajectory(self.t_end, self._again)
 
-    def set_out(self) -> Motion:
-        """Its motion before its start, with which ``trajectory`` goes on from where that has come to."""
-        run = self if self.model.decided is None else replace(self, model=self.model.decided)
-        self.ahead = run._motion()
-        return self.ahead
-
     def begun(self) -> Motion:
         """A motion at its start."""
         return self._motion().begin()
@@ -224,8 +219,11 @@ class Run:
             return self.ahead
         if self.compiled and not available():
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
-        before, levels = self._before, self._levels(finer)
-        start = self._first(levels) if before is None else going_on(before, levels, self.rewound)
+        before, levels = self._before, self.levels(finer)
+        if before is None:
+            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.stretches or {})
+        else:
+            start = going_on(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
 
     @property
@@ -233,18 +231,11 @@ class Run:
         """The trajectory from whose end this goes on."""
         return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
 
-    def _first(self, levels: LoadedLevels) -> Start:
-        """The start from the vectors that were given."""
-        y = self._coordinates("displacement", self.displacement)
-        v = self._coordinates("velocity", self.velocity)
-        return first_start(levels, self.t_end, y, v, self.stretches or {})
+    def levels(self, finer: float = 1.0) -> LoadedLevels:
+        """The levels under the loads, which the model keeps where nobody can change what the loads are.
 
-    def _coordinates(self, name: str, given: np.ndarray | None) -> np.ndarray | None:
-        """A vector (n,) in base coordinates (m,)."""
-        return None if given is None else self.model.base.coordinates(self.model.structure.vector(name, given))
-
-    def _levels(self, finer: float) -> LoadedLevels:
-        """The levels under the loads, which the model keeps where nobody can change what the loads are."""
+        finer: by which smooth courses of loads are taken to a smaller part of their tolerance.
+        """
         model, loads, before = self.model, unchanging(self.loads), self._before
         time = 0.0 if before is None or self.rewound else before.t_end
 

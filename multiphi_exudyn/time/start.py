@@ -8,51 +8,25 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.element import friction_spring
 
-__all__ = ["Start", "first_start"]
+__all__ = ["first_start"]
 
 TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
 UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
 NOWHERE = np.zeros(0)  # no held places
-
-
-@dataclass(frozen=True, repr=False)
-class Start(Shown):
-    """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
-
-    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
-    held places, leave them.
-    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
-    time [s], state: when the run begins, and of one that goes on from another what that has come to.
-    """
-
-    displacement: np.ndarray
-    velocity: np.ndarray
-    penetrating: tuple[int, ...]
-    touching: tuple[int, ...]
-    gaps: np.ndarray
-    states: tuple[int, ...]
-    held: np.ndarray
-    time: float = 0.0
-    state: State | None = None
-
-    def _facts(self) -> Iterator[tuple[str, str]]:
-        yield "time", f"{self.time:g} s"
-        yield "states", str(self.states)
 
 
 @dataclass(frozen=True)
@@ -109,13 +83,19 @@ class _Scales:
 
 
 def first_start(
-    levels: LoadedLevels, end: float, y: np.ndarray | None, v: np.ndarray | None, stretches: Mapping[str, float]
+    levels: LoadedLevels,
+    end: float,
+    displacement: np.ndarray | None,
+    velocity: np.ndarray | None,
+    stretches: Mapping[str, float],
 ) -> Start:
-    """The start from y, y' (m,), None for zero, of a run to ``end`` [s] as the contacts see it.
+    """The start from x, x' (n,), None for zero, of a run to ``end`` [s] as the contacts see it.
 
     stretches: of the springs of friction, by the names of their links.
     """
-    base = levels.model.base
+    base, vector = levels.model.base, levels.model.structure.vector
+    y = None if displacement is None else base.coordinates(vector("displacement", displacement))
+    v = None if velocity is None else base.coordinates(vector("velocity", velocity))
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
     y = scales.nowhere if y is None else y
     length = math.sqrt(y.dot(y))

@@ -19,6 +19,7 @@ import numpy as np
 
 from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
@@ -30,7 +31,6 @@ from multiphi_exudyn.time.histories import INSTANTS
 from multiphi_exudyn.time.model_histories import ModelHistories
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segment import Segment
-from multiphi_exudyn.time.start import Start
 
 __all__ = ["Again", "Trajectory"]
 

@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
-import functools
+import math
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError
+from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.time.defects import Samples
+from multiphi_exudyn.time.left_out import LeftOut, left_out_warnings
 from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
 from multiphi_exudyn.time.refinement import refined
-from multiphi_exudyn.time.reliability import INDICATOR
+from multiphi_exudyn.time.reliability import Known
 from multiphi_exudyn.time.segment import listed
-from multiphi_exudyn.time.several import Several, carry_several
+from multiphi_exudyn.time.several import Several
 from multiphi_exudyn.time.simulate import Run, warned
-from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.start import first_start
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["StartVectors", "Task"]
 
+KEPT_ROWS = 256  # levels whose points' rows are kept
 KEPT = 8  # levels under loads as finely interpolated as runs have needed
-SEVERAL = 32  # runs that are carried together: threads then hardly wait for each other
+SEVERAL = 64  # runs that are carried together: threads then hardly wait for each other
 ROOM = 8192  # segments, and events, of a record of several runs: they take half of it, as they differ
 
 StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
@@ -49,11 +55,12 @@ class Task:
         self.lock, self._stopped, self._given, self._starts = threading.Lock(), False, given, starts
         self.levels = BoundedCache[object, LoadedLevels](KEPT)
         self._rows: tuple[MultiPhiModel | None, list[np.ndarray]] = None, []
+        self._in_levels = BoundedCache[tuple[int, ...], list[np.ndarray]](KEPT_ROWS)
         self._points, self.times, count = points, times, len(starts)
         self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self.events, self.told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
         self._begun, self._together = 0, not refined(given.loads)
-        self._of_levels = dict[tuple[tuple[int, ...], ...], tuple[str, ...]]()
+        self._around = dict[tuple[tuple[int, ...], ...], tuple[list[str], list[str]]]()  # warnings by levels
 
     def carry_out(self, threads: int, bar: Any) -> None:
         """All runs; a Tolerance is decided by the first ones, one after the other."""
@@ -79,11 +86,8 @@ class Task:
         worker, most = _Worker(self), 1
         with self.lock:
             while not self._stopped and (numbers := self._next(most)):
-                runs = [(number, self._run(number, worker)) for number in numbers]
-                if len(runs) > 1:
-                    runs = self._several(worker, runs)
-                for number, run in runs:
-                    self._finish(number, run)
+                for number in self._several(worker, numbers) if len(numbers) > 1 else numbers:
+                    self._finish(number, self._run(number, worker))
                 bar.update(len(numbers))
                 fair = (len(self._starts) - self._begun) // (2 * threads)
                 most = max(1, min(worker.most, fair)) if self._together else 1
@@ -92,39 +96,69 @@ class Task:
         displacement, velocity = self._starts[number]
         return replace(self._given, displacement=displacement, velocity=velocity, shared=worker)
 
-    def _several(self, worker: _Worker, runs: list[tuple[int, Run]]) -> list[tuple[int, Run]]:
+    def _several(self, worker: _Worker, numbers: Sequence[int]) -> list[int]:
         """Runs carried together, as far as nothing stops them; those that are left."""
-        left, waiting = list[tuple[int, Run]](), list[tuple[int, Run]]()
-        for number, run in runs:
+        given, end = self._given, self._given.t_end
+        levels = replace(given, model=given.model.decided or given.model, shared=worker).levels()
+        waiting, starts, left = list[int](), list[Start](), list[int]()
+        for number in numbers:
             try:
-                (left if run.set_out().start.penetrating else waiting).append((number, run))
+                starts.append(first_start(levels, end, *self._starts[number], {}))
+                waiting.append(number)
             except MultiPhiError as refused:
                 self.told[number] = "failed", str(refused), ()
         while waiting:
-            several = Several.carried([run.ahead for _, run in waiting if run.ahead], self._given.t_end, worker.several)
-            if several.count:
-                self._keep(several, waiting)
-            left += waiting[several.count : several.count + 1]
-            waiting = waiting[several.count + 1 :]
+            several = Several.carried(worker.motion(levels, starts[0], None), starts, end, worker.meanwhile)
+            done = several.count
+            if done:
+                self._keep(worker, several, waiting[:done])
+            left += waiting[done : done + 1]
+            waiting, starts = waiting[done + 1 :], starts[done + 1 :]
         return left
 
-    def _keep(self, several: Several, runs: list[tuple[int, Run]]) -> None:
+    def _keep(self, worker: _Worker, several: Several, numbers: list[int]) -> None:
         """What is kept of the runs that have come to their end together."""
-        numbers, model = [number for number, _ in runs[: several.count]], several.arrays.levels.model
-        self.samples[numbers] = several.values(self._rows_of(model), self.times)
+        rows = partial(self._rows_in, several.arrays.levels.model)
+        self.samples[numbers] = several.values(rows, len(self._points), self.times)
         self.events[numbers], self.ends[numbers] = several.events, self._given.t_end
-        modes = self._given.model.modes
-        least = min(INDICATOR, modes.error) if isinstance(modes, Tolerance) else INDICATOR
-        for k, (number, run) in enumerate(runs[: several.count]):
-            levels, told, silent = several.visited(k), None, several.silent(k, least)
-            if silent:
-                told = self._of_levels.get(levels)
-            if told is None:
-                several.land(k)
-                told = warned(run).warnings
-            if silent:
-                self._of_levels[levels] = told
-            self.told[number] = "ok", "", told
+        found = self._warnings(worker, several, numbers)
+        for k, number in enumerate(numbers):
+            self.told[number] = "ok", "", found[k]
+
+    def _warnings(self, worker: _Worker, several: Several, numbers: list[int]) -> dict[int, tuple[str, ...]]:
+        """Of runs carried together; one that its numbers alone do not tell of is looked into as a whole."""
+        model, left_out = several.arrays.levels.model, several.left_out()
+        hidden = model.general or model.validity is not None or not model.base.complete
+        apart = [k for k, taken in enumerate(left_out) if hidden or math.isnan(taken.defects)]
+        landed = [(k, several.land(k)) for k in apart]  # at once: who looks into one may begin the arrays anew
+        found = self._from_numbers(several, {k: taken for k, taken in enumerate(left_out) if k not in apart})
+        for k, motion in landed:
+            run = self._run(numbers[k], worker)
+            run.ahead = motion
+            found[k] = warned(run).warnings
+        return found
+
+    def _from_numbers(self, several: Several, left_out: dict[int, LeftOut]) -> dict[int, tuple[str, ...]]:
+        """Warnings of runs by what truncation took of each; all others are those of the levels that it was in."""
+        levels, modes, found = several.arrays.levels, self._given.model.modes, dict[int, tuple[str, ...]]()
+        model, tolerance = levels.model, modes if isinstance(modes, Tolerance) else None
+        looked = {} if model.whole else {k: taken.looked_into(tolerance) for k, taken in left_out.items()}
+        asked = [k for k, which in looked.items() if any(which)]
+        sizes = dict(zip(asked, several.sizes(asked), strict=True))
+        for k, taken in left_out.items():
+            visited = several.visited(k)
+            if visited not in self._around:
+                trajectory = several.land(k).trajectory(several.end)
+                segments = listed(trajectory.segments)
+                self._around[visited] = Known.of(model, segments).around(trajectory, segments)
+            before, after = self._around[visited]
+            if k in sizes:
+                samples, struck = Samples(partial(sizes.__getitem__, k)), partial(several.struck, k)
+                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, samples, struck)
+                found[k] = (*before, *told, *after)
+            else:
+                found[k] = (*before, *after)
+        return found
 
     def _finish(self, number: int, run: Run) -> None:
         """A run by itself, from where it has come to."""
@@ -144,7 +178,13 @@ class Task:
             return
         segments, times = listed(trajectory.segments), self.times[known]
         for place, row in enumerate(self._rows_of(trajectory.model)):
-            self.samples[number, place, known] = segments.values(times, "right", functools.partial(point_row, row))
+            self.samples[number, place, known] = segments.values(times, "right", partial(point_row, row))
+
+    def _rows_in(self, model: MultiPhiModel, level: LoadedLevel) -> list[np.ndarray]:
+        """The points' rows (2 n + 1,) in a level of the model that runs end with, kept for the runs that follow."""
+        return self._in_levels.get_or_build(
+            level.states, lambda: [point_row(row, level) for row in self._rows_of(model)]
+        )
 
     def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
         """The points' rows (m,) in the base coordinates of the model that runs end with, one for most of them."""
@@ -173,16 +213,13 @@ class _Worker:
 
     def loop(self, *given: Any) -> Any:
         """The compiled loop, while others may go on."""
-        return self._meanwhile(carry, given)
+        return self.meanwhile(carry, *given)
 
-    def several(self, *given: Any) -> Any:
-        """The same of several starts."""
-        return self._meanwhile(carry_several, given)
-
-    def _meanwhile(self, loop: Callable[..., Any], given: tuple[Any, ...]) -> Any:
+    def meanwhile(self, function: Callable[..., Any], *given: Any) -> Any:
+        """What a compiled function returns, while others may go on."""
         self._task.lock.release()
         try:
-            return loop(*given)
+            return function(*given)
         finally:
             self._task.lock.acquire()
 
