@@ -64,7 +64,7 @@ def test_round_off_of_what_the_load_or_the_velocity_or_another_gap_makes_is_in_t
 
 @pytest.mark.parametrize("far", [0.5, 1e3])
 def test_a_compliant_contact_that_lies_inside_by_little_is_closed_whatever_gap_another_one_has(far):
-    """x = -d cos(w t), w^2 = k + 1e8, until it opens; d is less than a rigid contact may be inside by the other's gap."""
+    """x = -d cos(w t), w^2 = 4 + k, until it opens; a rigid one may be inside by more, for the gap of the other one."""
     structure, stiffness, depth = LinearStructure([[1.0]], [[4.0]], points={"m": 0}), 1e8, 1e-13
     stops = [UnilateralContact("near", "m", 0.0, stiffness), UnilateralContact("far", {"m": -1.0}, far, 1e6)]
     with pytest.warns(MultiPhiWarning, match="slow model"):
