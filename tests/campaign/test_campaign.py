@@ -49,6 +49,17 @@ def test_the_loop_as_plain_python_gives_the_same_answer(kind):
         assert apart(*runs) == ""
 
 
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [
+        ("friction", 210116),  # resonance: the speed at a turn is round-off of what it has grown to
+        ("friction contacts", 210145),  # a spring at its limit goes back for less than the moment looked ahead
+    ],
+)
+def test_brute_force_decides_what_turns_in_little_time(kind, number):
+    assert judged(kind, number)[0] == [("ok", "")]
+
+
 def test_what_friction_holds_does_not_move_but_for_round_off_of_the_forces_on_it():
     """1e-16 m, which a run in two parts has otherwise, are no motion where the loads could move it by 1e-2 m."""
     scene = scene_of("friction redundant", 210028)

@@ -12,6 +12,7 @@ ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
 SOONER = (1e-5, 1e-7, 1e-9)  # the same where no set is admissible: a slip may be over before
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
+BACKWARDS = 1e-9  # of the speed of the scene: a slip against its direction is no round-off
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
 
@@ -261,7 +262,7 @@ class Instants:
     def _violation(self, state, resting, y, t, moment):
         """By how much the motion of a state leaves what is admissible a moment later, of what it could.
 
-        Of what sticks at once, too: it may be within its limit again a moment later.
+        Of what sticks, or slips, at once, too: it may be within its limit, or slip its way, again a moment later.
         """
         first = self.levels.sliding.first
         if not resting and len(state) == first:
@@ -276,6 +277,8 @@ class Instants:
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
             for value, i, size in zip(s, level.turns, sizes, strict=True):
                 at_once = i >= first and state[i] == "stick" and self._pressed(i - first, level, y, t)
+                if share == 0 and state[i] in SIGNS and value < -BACKWARDS * self.speed:
+                    worst = max(worst, -value / self.speed)
                 if at_once or (share > 0 and (i in resting or i >= first)):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0
