@@ -22,7 +22,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
 3. A rigid contact that asks to open always opens: it never pulls. Friction that asks changes always, but stays in slip
    where it has come from stick at the same instant and truncation has left it a speed against its slip. With a spring
    that has fallen from its static limit it sticks again: its pressure may fall faster than its force.
-   -> switching.is_firm, switching.open_and_enter, sticking.let_go
+   -> switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
    -> switching.try_wishes, switching.switch, phases.is_denied
