@@ -9,7 +9,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     1       armed, and asking             phases.phase_of, waiting.watch, waiting.who_asks, decision.decide_jump
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
     2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, independence.join
-    3       a rigid contact opens         switching.is_firm, switching.open_and_enter, sticking.let_go
+    3       a rigid contact opens         switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
     4       a compliant contact changes   switching.try_wishes, switching.switch, phases.is_denied
     5       recovering                    phases.phase_of, waiting.watch
     6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again

@@ -163,7 +163,7 @@ EXIT_INTS = 12
 ROW, WAVE, RATED = 0, 1, 2
 
 MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS, MAP_DEFECT = 0, 1, 2, 3, 5, 6
-MAP_SIZES = 4  # of a map from the base: |y| that a level's rest has, and for w = 1 its channels, (q + 1,)
+MAP_SIZES = 4  # of a map from the base: of the terms that channels, w = 1, and a level's rest give modes, (r, q + 1)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 
 LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)

@@ -22,7 +22,7 @@ bases of two levels need not agree, so the law says what happens then; each sent
 3. A rigid contact that asks to open always opens: it never pulls. Friction that asks changes always, but stays in slip
    where it has come from stick at the same instant and truncation has left it a speed against its slip. With a spring
    that has fallen from its static limit it sticks again: its pressure may fall faster than its force.
-   -> switching.is_firm, switching.open_and_enter, sticking.let_go
+   -> switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
 4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
    several that ask together and may not, the first that may alone changes.
    -> switching.try_wishes, switching.switch, phases.is_denied
@@ -136,7 +136,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.bounces import keep_landing
 from multiphi_exudyn.events.changes import NOBODY, bears_nothing, clear, enter, flag_asking, is_held, turn_wishes
-from multiphi_exudyn.events.phases import hold_back, keep_entered, update_phases
+from multiphi_exudyn.events.phases import hold_back, is_pulled, keep_entered, update_phases
 from multiphi_exudyn.events.rebounds import forget_bounces, hear_touching
 from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.state_arrays import clear_turning_speeds, copy_state, same_level
@@ -157,7 +157,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """WORKED becomes the state right after an instant at which the elements in ASKING ask; OK, NEED or FAILED.
 
     AGAIN: those refused at it before. Energies lost are added up in LOST, changes listed. Where in the end all elements
-    are as before, none was struck and no spring of friction has let go, nothing has happened at it.
+    are as before, none was struck, no spring of friction has let go and none would pull, nothing has happened at it.
     """
     clear(numbers, LOST)
     first, struck = ints[FIRST_CHANGE], 0
@@ -174,8 +174,8 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         shared = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == SHARED
         if shared or numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
             struck = 1
-    moved = struck == 1 or numbers[LOST + FRICTION] != 0.0
-    if ints[CHANGE_COUNT] > first and not moved and same_level(ints, REACHED, WORKED) == 1:
+    moved = struck == 1 or numbers[LOST + FRICTION] != 0.0 or same_level(ints, REACHED, WORKED) == 0
+    if ints[CHANGE_COUNT] > first and not moved and is_pulled(ints, numbers, waves, REACHED) == 0:
         copy_state(ints, numbers, REACHED, WORKED)
         flag_asking(ints, ints[ASKING], ints[DENIED])
         update_phases(ints, numbers, waves, WORKED, ints[DENIED])

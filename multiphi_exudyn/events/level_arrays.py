@@ -264,7 +264,7 @@ class LevelArrays:
     def _map(self, source: int, target: int) -> int:
         """The record of the map between two levels."""
         put, level = self.buffers.put, self.loaded[int(self.ints[target + a.NUMBER])]
-        sizes, terms = list[float](), None
+        sizes, terms = np.zeros(0), None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:

@@ -48,14 +48,14 @@ def base_parts(base: ModalBase, excitation: Excitation) -> dict[int, np.ndarray]
     }
 
 
-def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[float]]:
-    """The map (T, c, T') from the base to a level; |y| of its channels, and of its rest behind them."""
+def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The map (T, c, T') from the base to a level; sizes (r, q + 1) of the terms that channels and rest give a mode."""
     vectors, channels, rest = level.modal.vectors.T, level.channels, level.asymptotic.configuration
     (r, m), q = vectors.shape, channels.carried.shape[1]
     place, speed = np.eye(r + q, m + q, m - r), np.eye(r + q, m + q, m - r)
     for matrix, moved in ((place, channels.shapes), (speed, channels.carried)):
         matrix[:r, :m], matrix[:r, m:] = vectors, -(vectors @ moved)
-    sizes = [*np.linalg.norm(channels.shapes, axis=0).tolist(), float(np.linalg.norm(rest))]
+    sizes = np.abs(vectors) @ np.abs(np.column_stack([channels.shapes, rest]))
     return place, np.concatenate([-(vectors @ rest), np.zeros(q)]), speed, sizes
 
 

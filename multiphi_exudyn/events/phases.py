@@ -57,6 +57,7 @@ __all__ = [
     "first_exit",
     "hold_back",
     "is_denied",
+    "is_pulled",
     "is_refused",
     "keep_entered",
     "opening",
@@ -132,6 +133,18 @@ def is_refused(ints: Ints, state: int, element: int) -> int:
     first = ints[ints[state + LEVEL] + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):
         if ints[ints[state + PHASES] + k] == REFUSED:
+            return 1
+    return 0
+
+
+@compiled
+def is_pulled(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> int:
+    """3. 1 where a rigid contact would be pulled if a state went on as it is."""
+    level = ints[state + LEVEL]
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        opens = ints[exit_ + ASKED] == OPEN and ints[ints[KINDS] + ints[exit_ + ELEMENT]] == RIGID
+        if opens and phase_of(ints, numbers, waves, state, exit_) == REFUSED:
             return 1
     return 0
 

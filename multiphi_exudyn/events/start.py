@@ -34,6 +34,7 @@ from multiphi_exudyn.events.arrays import (
     LOST,
     LOST_AT_START,
     MAP_SIZES,
+    MATRIX,
     MODES,
     OK,
     OPEN,
@@ -63,7 +64,6 @@ from multiphi_exudyn.events.rebounds import collide_and_rebound, rebound
 from multiphi_exudyn.events.state_arrays import copy_state, measure
 from multiphi_exudyn.events.striking import impact, list_changes
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.free_rows import norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["begin"]
@@ -166,12 +166,15 @@ def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: i
     status = move(ints, numbers, GIVEN, speeds, level, result)
     if status < 0:
         return status
-    x, y, q = ints[result + PLACE], ints[GIVEN + PLACE], ints[CHANNELS]
-    sizes = ints[find_map(ints, ints[GIVEN + LEVEL], level) + MAP_SIZES]
-    size = norm(numbers, y, ints[COORDINATES]) + numbers[sizes + q]
-    for k in range(q):
-        size += numbers[sizes + k] * abs(numbers[y + ints[COORDINATES] + k])
+    x, y, q, m = ints[result + PLACE], ints[GIVEN + PLACE], ints[CHANNELS], ints[COORDINATES]
+    way = find_map(ints, ints[GIVEN + LEVEL], level)
     for i in range(ints[level + MODES]):
+        row, sizes = ints[way + MATRIX] + i * (m + q), ints[way + MAP_SIZES] + i * (q + 1)
+        size = numbers[sizes + q]
+        for j in range(m):
+            size += abs(numbers[row + j] * numbers[y + j])
+        for k in range(q):
+            size += numbers[sizes + k] * abs(numbers[y + m + k])
         if abs(numbers[x + i]) <= ZERO * size:
             numbers[x + i] = 0.0
     for i in range(ints[level + EXIT_COUNT]):

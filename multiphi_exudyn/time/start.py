@@ -1,7 +1,8 @@
 """Start: displacement and velocity of a run in base coordinates, and the states that its elements begin in.
 
 A contact is in touch where its gap is round-off of what makes it, |h|.|y| and the gaps themselves, or of how far the
-motion may take the structure: |y|, where y' takes the modes, and what the loads make.
+motion may take the structure: |y|, where y' takes the modes, and what the loads make; of a rigid one the largest gap
+too, as it may not lie inside. A compliant one that lies inside by so little has a force.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ class _Scales:
         times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
         ways = base.magnitudes[1] + excitation.stop_ways
         gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
-        lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + float(np.max(gaps, initial=0.0))
+        others = np.where(np.isinf(base.stiffnesses), np.max(gaps, initial=0.0), 0.0)
+        lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + others
         moved, speeds = map(excitation.moved, levels.drive.values[:2])
         apart = None if model.general or model.force_laws else (OPEN,) * len(model.contacts)
         near = TOUCHING * ways + UNSEEN * lengths * sizes

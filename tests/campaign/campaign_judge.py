@@ -130,11 +130,11 @@ def _verdicts(scene, motion):
     if motion.status != "ok":
         return [("named failure", motion.message)]
     found = [(f"failure: {text.split(':')[0]}", text) for run in motion.runs for text in laws_of(scene, run)]
-    found += [
-        ("told" if kind == "failure: wrong" and told(motion) else kind, text) for kind, text in _compared(scene, motion)
-    ]
+    compared, scale = _compared(scene, motion)
+    found += [("told" if kind == "failure: wrong" and told(motion) else kind, text) for kind, text in compared]
     rubs = scene.system is not None and scene.system.sliders
     looked_at = scene.number % (RUBBING_SHARE if rubs else BODY_SHARE) == 0 and not scene.split
+    motion = replace(motion, scale=scale)
     if not found and looked_at:
         found += in_two_parts(scene, motion)
     if not found and looked_at and scene.units == (0, 0, 0):
@@ -159,14 +159,17 @@ def _constant(scene):
 
 
 def _compared(scene, motion):
-    """The motion against brute force; of a truncated model against itself with its freedoms in another order."""
+    """The motion against brute force, and the scale of that; of a truncated model against itself with its degrees of
+    freedom in another order, without a scale.
+    """
     if scene.system is None:
         other = native(_reordered(scene))
         places, speeds = np.argsort(_order(scene)), None
         other = replace(other, displacement=other.displacement[places], velocity=other.velocity[places])
         if other.status != motion.status:
-            return [("failure: order", f"{motion.status}, in another order {other.status} {other.message}")]
-        return _difference(scene, motion, other, "failure: order", speeds)
+            text = f"{motion.status}, in another order {other.status} {other.message}"
+            return [("failure: order", text)], motion.scale
+        return _difference(scene, motion, other, "failure: order", speeds), motion.scale
     start, times = scene.start or (scene.displacement, scene.velocity), np.append(instants(scene), scene.t_end)
     answer, reasons = None, []
     for setting in ({}, *OTHERWISE):
@@ -176,13 +179,13 @@ def _compared(scene, motion):
         except brute_force.NoAnswer as reason:
             reasons.append(str(reason))
     if answer is None:
-        return [("unjudged", reasons[0])]
+        return [("unjudged", reasons[0])], motion.scale
     expected = motion_of(scene, answer)
     near = [np.min(np.abs(t - np.array([e[0] for e in answer.events])), initial=np.inf) for t in instants(scene)]
     found = _difference(scene, motion, expected, "failure: wrong", np.array(near) > AT_EVENT * scene.t_end)
     if found and found[0][0] == "failure: wrong":
-        return _otherwise(scene, motion, start, times, expected, found)
-    return found
+        found = _otherwise(scene, motion, start, times, expected, found)
+    return found, expected.scale
 
 
 def _otherwise(scene, motion, start, times, expected, found):
@@ -342,20 +345,21 @@ def in_two_parts(scene, motion):
 
 def in_the_body(scene, motion):
     """The same scene as an Exudyn object, which is alone and therefore exact at the end of every step."""
-    error = _body_error(scene, motion.runs[0])
+    error = _body_error(scene, motion)
     if error <= NEAR:
         return []
     return [("sensitive" if _sensitive_to_steps(scene, motion) else "failure: body", f"error {error:.3g}")]
 
 
-def _body_error(scene, run):
-    points = list(scene.model.structure.points)
+def _body_error(scene, motion):
+    run, points = motion.runs[0], list(scene.model.structure.points)
     start = (scene.model, scene.displacement, scene.t_end, BODY_STEPS, points)
     histories, _ = solve_body_alone(*start, velocity=scene.velocity, loads=scene.loads, matched=True)
     times = np.minimum(histories.time, run.t_end)
     expected = np.array([run.at(point, times) for point in points])
     found = np.array([histories.points[point] for point in points])
-    return float(np.max(np.abs(found - expected)) / max(np.max(np.abs(expected)), 1e-300))
+    size = max(np.max(np.abs(expected)), NO_MOTION * motion.scale[0], 1e-300)
+    return float(np.max(np.abs(found - expected)) / size)
 
 
 def _sensitive_to_steps(scene, motion):

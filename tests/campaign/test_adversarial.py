@@ -63,6 +63,27 @@ FOUND = {
     "a contact strikes at 1e-7 of the speed beside others at rest": Recipe(
         21529, "free chain", 5, "none", 4, "rigid", "preload", "rows", "all", "rest", "gravity"
     ),
+    "two stops at one place, and truncation that brings back who opens": Recipe(
+        1058536, "unconnected", 6, "dashpot", 2, "rigid", "zero", "above", "half", "touching", "point"
+    ),
+    "an impact that leaves no motion at all": Recipe(
+        1058604, "free dense", 3, "none", 2, "mixed", "preload", "above", "few", "random", "none"
+    ),
+    "a start inside a compliant contact by 1e-12 of another one's gap": Recipe(
+        1062303, "repeated", 2, "given", 4, "compliant", "mixed", "facing", "few", "static", "none"
+    ),
+    "a start at rest beside a rest that is far away": Recipe(
+        1087402, "unconnected", 6, "none", 3, "compliant", "mixed", "between", "all", "static", "gravity"
+    ),
+    "a stiff spring at 1e-2 m beside a rigid contact that it nearly opens": Recipe(
+        1112755, "repeated", 3, "given", 3, "mixed", "zero", "rows", "all", "static", "none"
+    ),
+    "a start that leaves its stop at the round-off of a speed": Recipe(
+        1057756, "free chain", 1, "dashpot", 3, "rigid", "mixed", "mixed", "all", "touching", "point"
+    ),
+    "a contact that hardly holds a body": Recipe(
+        1085108, "free dense", 6, "modal", 4, "mixed", "mixed", "mixed", "all", "static", "point"
+    ),
     "a load that a stop carries without any motion": Recipe(
         16004, "free dense", 3, "heavy", 4, "rigid", "zero", "mixed", "few", "static", "point"
     ),

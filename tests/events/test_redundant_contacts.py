@@ -93,3 +93,24 @@ def test_the_stops_between_the_ends_change_no_motion(left, right, at):
     assert np.min([five.gap(f"c{i}", t) for i in range(5)]) > -ROUND_OFF
     assert_allclose([forces(five, 3.0).sum(), forces(five, 3.0) @ PLACES], [LOAD, LOAD * at], rtol=1e-9, atol=1e-9)
     assert np.all(forces(five, 3.0) >= 0)
+
+
+@pytest.mark.usefixtures("both_ways")
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_stops_at_one_place_pull_no_more_than_one_does_where_truncation_brings_them_back_at_once(speed):
+    """A damper to a fast mass takes the pressure off the stop; open, one mode does not hold the fast mass any more.
+
+    It presses again at once, so an instant after which the same stop is closed has happened nevertheless.
+    """
+    structure = LinearStructure(np.eye(2), np.diag([1.0, 1e4]), 3.0 * np.ones((2, 2)), {"slow": 0, "fast": 1})
+    load, t = ConstantLoad("slow", 3.0), np.linspace(0, 0.2, 401)
+    runs = []
+    for count in (1, 2, 3):
+        stops = [UnilateralContact(f"c{i}", {"slow": -1.0}, 0.0) for i in range(count)]
+        runs.append(simulate(MultiPhiModel(structure, stops, modes=1), 0.2, velocity=[0.0, speed], loads=[load]))
+    for run in runs:
+        assert run.status == "ok"
+        assert np.min(run.contact_force("c0", t)) > -ROUND_OFF
+        assert not complaints(run)
+        assert [event.kind for event in run.events] == ["close", "open", "close"]
+        assert_allclose(run.displacement(t), runs[0].displacement(t), rtol=0, atol=ROUND_OFF)

@@ -93,3 +93,13 @@ def test_a_start_without_a_way_out_is_a_failed_run_without_a_motion():
         "at t = 0 s: rigid contacts floor, ceiling: their stops move against each other and leave no way out"
     )
     assert math.isfinite(run.start_loss.total)
+
+
+def test_a_stiff_mass_starts_where_it_is_put_however_far_from_its_rest_another_one_is():
+    """x = f / k (1 - cos w t), f / k = 1e-12 m, beside one whose rest is 100 m away and that shares no mode with it."""
+    stiffness, force = 1e14, 100.0
+    structure = mp.LinearStructure(np.eye(2), np.diag([1.0, stiffness]), points={"soft": 0, "stiff": 1})
+    model = mp.MultiPhiModel(structure, [stop("stiff", 1.0)], modes="all")
+    t = np.linspace(0, 1e-6, 11)
+    run = mp.simulate(model, 1e-6, loads=[mp.ConstantLoad(np.ones(2), force)])
+    assert_allclose(run.at("stiff", t), force / stiffness * (1 - np.cos(1e7 * t)), rtol=1e-6, atol=1e-18)

@@ -19,6 +19,7 @@ from multiphi_exudyn import (
     MultiPhiModel,
     MultiPhiTypeError,
     MultiPhiValueError,
+    MultiPhiWarning,
     StopMotion,
     SweepLoad,
     UnilateralContact,
@@ -59,6 +60,19 @@ def test_round_off_of_what_the_load_or_the_velocity_or_another_gap_makes_is_in_t
         run = simulate(MultiPhiModel(structure, stops, modes="all"), 1.0, [-1e-17], velocity, loads)
         assert run.status == "ok"
     assert_allclose(run.at("m", math.pi / 4), 0, atol=1e-16)
+
+
+@pytest.mark.parametrize("far", [0.5, 1e3])
+def test_a_compliant_contact_that_lies_inside_by_little_is_closed_whatever_gap_another_one_has(far):
+    """x = -d cos(w t), w^2 = 4 + k, until it opens; a rigid one may be inside by more, for the gap of the other one."""
+    structure, stiffness, depth = LinearStructure([[1.0]], [[4.0]], points={"m": 0}), 1e8, 1e-13
+    stops = [UnilateralContact("near", "m", 0.0, stiffness), UnilateralContact("far", {"m": -1.0}, far, 1e6)]
+    with pytest.warns(MultiPhiWarning, match="slow model"):
+        run = simulate(MultiPhiModel(structure, stops, modes="all"), 1e-3, [-depth])
+    omega, t = math.sqrt(4.0 + stiffness), np.linspace(0, 1e-4, 11)
+    assert_allclose(run.at("m", t), -depth * np.cos(omega * t), rtol=1e-9, atol=1e-12 * depth)
+    assert [(event.contact, event.kind) for event in run.events] == [("near", "open")]
+    assert_allclose(run.events[0].time, math.pi / (2 * omega), rtol=1e-9)
 
 
 class TestFromATrajectory:

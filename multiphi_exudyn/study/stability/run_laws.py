@@ -24,8 +24,8 @@ RUBBED = 1e-10  # the same where there is friction
 NO_TRUNCATION = 1e-9  # of the largest energy: what a complete basis may lose between levels
 MISSED = 1e-11  # of a signal's largest possible value: a dip that is no round-off
 LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
-DIFFERENCE = 1e-3  # of a level's potential: energies are differences of it, with 1e-3 of CLOSES for round-off
-PASSED = 1e-5  # the same of what a start or an instant passes through: a few round-offs of its potential
+DIFFERENCE = 1e-2  # of a level's potential: energies are differences of it; of CLOSES it is round-off, of omega^2 too
+PASSED = 1e-5  # the same of what a start, an instant or a sum passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
@@ -88,7 +88,7 @@ def largest_energy(run: Trajectory, segments: Sequence[Segment], joule: float = 
     rests = DIFFERENCE * max(map(_potential, segments))
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
     passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
-    passed = max(passed, PASSED * _stretched(run))
+    passed = max(passed, PASSED * _stretched(run), PASSED * max(_summed(run, segment) for segment in segments))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST * joule, rests, passed)
 
 
@@ -100,6 +100,12 @@ def _stretched(run: Trajectory) -> float:
         for link, place in zip(links, places.tolist(), strict=True)
         if link.held and not link.rigid
     )
+
+
+def _summed(run: Trajectory, segment: Segment) -> float:
+    """What the loads would do [J] over all terms of a motion, which may cancel: t and exp(-c t) where it is damped."""
+    terms = np.abs(segment.level.level.vectors) @ np.sum(np.abs(segment.rows), axis=1)
+    return float(np.abs(_load(run, segment)) @ terms)
 
 
 def _potential(segment: Segment) -> float:
@@ -152,7 +158,8 @@ def missed(
     """No contact leaves its state's admissible range unheard: s >= 0 (events/decision.py) on every segment.
 
     In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
-    of the whole run: an impact that stops all motion leaves a state that is round-off of the one before.
+    of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a reaction
+    has that of its coordinates.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
     largest: dict[tuple[int, str], float] = {}
@@ -166,7 +173,7 @@ def missed(
             continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
-        unresolved = np.finfo(float).eps * segment.end * signal.steepness(at)
+        unresolved = np.finfo(float).eps * (segment.end * signal.steepness(at) + signal.grain * reach)
         if lowest < -(MISSED if heard else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"

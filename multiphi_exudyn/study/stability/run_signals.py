@@ -21,7 +21,8 @@ class Signal:
     """s of a link on a segment: constant + Re sum a_j t^d_j exp(lambda_j t).
 
     of: what it is made of, a "gap", its "rate", a "reaction" or the "tension" of a spring. arm: what a coordinate, or
-    a load, of 1 can at most make of it.
+    a load, of 1 can at most make of it. grain: what coordinates of 1 m make of a reaction, term by term: it has the
+    round-off of that, the force of a stiff spring at a place of 1 m.
     """
 
     def __init__(self, segment: Segment, link: int, of: str, sign: float, constant: float) -> None:
@@ -44,6 +45,9 @@ class Signal:
         if of == "gap":
             self.terms = float(row @ (np.abs(own.vectors) @ np.sum(np.abs(modal), axis=1)))
             self.terms += float(row @ np.abs(level.asymptotic.configuration)) + abs(float(own.base.gaps[link]))
+        self.grain, shapes = 0.0, level.modal.vectors
+        if of == "reaction":
+            self.grain = float(np.sum(np.abs(shapes) @ np.abs(own.force_rows[k][: shapes.shape[1]])))
         self.coefficients, self.constant = sign * self.coefficients, sign * self.constant + constant
         self.stiffness = float(own.base.stiffnesses[link])
 

@@ -12,6 +12,7 @@ ZERO = 1e-12  # of the lengths and speeds of the scene: what is at a stop
 MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
 SOONER = (1e-5, 1e-7, 1e-9)  # the same where no set is admissible: a slip may be over before
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
+BACKWARDS = 1e-9  # of the speed of the scene: a slip against its direction is no round-off
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
 
@@ -22,20 +23,24 @@ class Instants:
         self.levels, self.length, self.speed, self.touch = levels, length, speed, touch
         self.n, self.rows, self.inverse = levels.n, levels.rows, levels.inverse
 
-    def settled(self, before, y, t, answer):
-        """The state after an instant, and y behind its impacts."""
+    def settled(self, before, y, t, answer, again=False):
+        """The state after an instant, and y behind its impacts.
+
+        again: it has come back at once: what round-off has allowed, by little, is not allowed any more.
+        """
+        allowed = 0.0 if again else ZERO
         w = self.levels.inputs(np.array([t]))[0]
         touching = self._touching(y, w)
         y = self._without_drift(y, w, touching)
         y = self._struck(y, w, touching, answer)
         resting = [i for i in touching if abs(self._rate(i, y, w)) <= ZERO * self.speed * 10]
         for moment in (MOMENT, *SOONER) if self.levels.system.sliders else (MOMENT,):
-            best, worst = self._least_violating(before, resting, y, t, moment)
-            if worst <= ZERO:
+            best, worst = self._least_violating(before, resting, y, t, moment, allowed)
+            if worst <= allowed:
                 break
         fallen = self.levels.sliding.fallen(before, y, w)
         if worst > ZERO and fallen is not y:  # sticks again with the limit that it has fallen to
-            best, worst = self._least_violating(before, resting, fallen, t, MOMENT)
+            best, worst = self._least_violating(before, resting, fallen, t, MOMENT, ZERO)
         if best is None or worst > 1e-3:
             raise NoAnswer(f"no admissible set at t = {t:g}")
         answer.rubbed += self.levels.sliding.let_go(before, best[0], y, w)
@@ -44,7 +49,7 @@ class Instants:
                 answer.events.append((t, i, new))
         return best
 
-    def _least_violating(self, before, resting, y, t, moment):
+    def _least_violating(self, before, resting, y, t, moment, allowed):
         """(state, y in it) whose motion is admissible a moment later, or is most nearly, and by how much it is not.
 
         Of several, as where friction wedges a contact that may open as well, the one in which fewest contacts change.
@@ -53,7 +58,7 @@ class Instants:
         every = [held for count in range(len(resting) + 1) for held in itertools.combinations(resting, count)]
         for slides in self.levels.sliding.choices(before, y, w, self.speed, resting):
             for held in sorted(every, key=lambda held: sum((before[i] == "closed") != (i in held) for i in resting)):
-                if worst <= ZERO or not self._independent(held, slides):
+                if worst <= allowed or not self._independent(held, slides):
                     continue
                 state = self._compliant(before, held, slides, y, t)
                 after = self.levels.sliding.entered(before, state, y, w)
@@ -261,7 +266,7 @@ class Instants:
     def _violation(self, state, resting, y, t, moment):
         """By how much the motion of a state leaves what is admissible a moment later, of what it could.
 
-        Of what sticks at once, too: it may be within its limit again a moment later.
+        Of what sticks, or slips, at once, too: it may be within its limit, or slip its way, again a moment later.
         """
         first = self.levels.sliding.first
         if not resting and len(state) == first:
@@ -276,6 +281,8 @@ class Instants:
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
             for value, i, size in zip(s, level.turns, sizes, strict=True):
                 at_once = i >= first and state[i] == "stick" and self._pressed(i - first, level, y, t)
+                if share == 0 and state[i] in SIGNS and value < -BACKWARDS * self.speed:
+                    worst = max(worst, -value / self.speed)
                 if at_once or (share > 0 and (i in resting or i >= first)):
                     if state[i] == "open":
                         value = value if abs(value) > ROUND_OFF * size else 0.0

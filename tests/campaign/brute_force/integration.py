@@ -16,6 +16,7 @@ SOON = 1e-7  # of a step: after which a signal that an instant has left at zero 
 LEAST, BLOCK = 8, 64  # steps between two looks at the signs
 MOST_EVENTS = 2000  # more are given up
 MOST_ROCKING = 6  # instants close together: an end of endless impacts
+MOST_AGAIN = 2  # of the same, from which on what was decided by round-off is decided by less
 SLOW = 1e-7  # of the scene's speeds: what they end with
 FINE = 17  # places in two steps at which a dip is looked for
 
@@ -71,7 +72,7 @@ class _Integration:
                 before = t
                 if rocking > self.rocking:
                     y = instants.at_rest(state, y, t, self.slow)
-                state, y = instants.settled(state, y, t, answer)
+                state, y = instants.settled(state, y, t, answer, again=rocking > MOST_AGAIN)
         if shown < len(self.times):
             answer.displacement[:, shown:], answer.velocity[:, shown:] = (
                 y[: self.n, None],

@@ -10,6 +10,7 @@ import itertools
 import numpy as np
 
 MOST_ALIKE = 1e10  # condition of what is held together
+TIMED = 1e-14  # of the run: the instant of a root is not known better
 ZERO = 1e-11  # of the scene's speeds and of a limit: a slider is at rest, a spring is as tight as it may be
 SIGNS = {"+": 1.0, "-": -1.0}
 
@@ -209,8 +210,8 @@ class Sliding:
         most = level.limits[0][e] @ y + level.limits[1][e] @ w
         if self.rigid(e):
             row, row_w = self.rate(e)
-            moving = row @ y + row_w @ w
-            if abs(moving) > ZERO * speed:
+            moving, turning = row @ y + row_w @ w, row @ (level.matrix @ y + level.inputs @ w)
+            if abs(moving) > ZERO * speed + TIMED * self.levels.nodes[-1] * abs(turning):
                 return ["+" if moving > 0 else "-"], True
             return ["stick", "+", "-"], state != "stick" or abs(tension) >= most * (1 - ZERO)
         if state in SIGNS:
