@@ -52,7 +52,7 @@ from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["INDICATOR", "RunSummary", "looked_into", "warnings_of", "warnings_of_body"]
+__all__ = ["INDICATOR", "RunSummary", "left_alone", "looked_into", "warnings_of", "warnings_of_body"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
@@ -172,7 +172,7 @@ def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance |
         return []
     samples, found = Samples(segments, trajectory.t_end), list[str]()
     if much:
-        alone = _left_alone(trajectory, segments)
+        alone = left_alone(trajectory.model, segments.levels[0].excitation)
         found += _energy_warning(lost, given if alone else max(samples.largest_energy, given))
     if far:
         found += _truncation(trajectory, indicator(defects, samples), tolerance)
@@ -194,10 +194,9 @@ def _given_energy(trajectory: Trajectory) -> float:
     return trajectory.ending.given_energy + float(trajectory.load.dot(trajectory.start.displacement))
 
 
-def _left_alone(trajectory: Trajectory, segments: Segments) -> bool:
+def left_alone(model: MultiPhiModel, excitation: Excitation) -> bool:
     """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
-    model = trajectory.model
-    return segments.levels[0].excitation.nothing and not (model.general or model.overrides)
+    return excitation.nothing and not (model.general or model.overrides)
 
 
 def _energy_warning(lost: float, largest: float) -> Iterator[str]:
