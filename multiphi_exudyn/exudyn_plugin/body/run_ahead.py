@@ -54,7 +54,8 @@ class RunAhead:
         self._step, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
         self._state = np.array(here.views)
-        self._way = _way(here.stepped)
+        states = here.stepped.states
+        self._way = body.own.levels.further(states, "way", lambda: _way(here.stepped))
         self._past, self._truncated = list[Sequence[Event]](), 0.0
         self._stretch = self._motion.advance(self._until(time))
         self._place = self._done = 0

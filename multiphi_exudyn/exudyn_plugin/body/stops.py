@@ -98,7 +98,7 @@ def stops_of(
     places = np.maximum(places + (start.time + start.step * places < coming), 0).astype(int)
     coming, places = coming[places <= last], places[places <= last]
     every = np.arange(last + 1) if body.varies else places if not missed else np.append(0, places)
-    first = np.flatnonzero(np.diff(every, prepend=-1))
+    first = np.flatnonzero(every > np.append(-1, every)[:-1])
     stops = every[first]
     times = start.time + start.step * stops
     if stretch.failure:
