@@ -19,7 +19,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.defects import Samples, indicator, is_small
 from multiphi_exudyn.time.known_warnings import REMEDY
 
-__all__ = ["LeftOut", "energy_warning", "left_out_warnings"]
+__all__ = ["LeftOut", "energy_warning", "left_alone", "left_out_warnings"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 INDICATOR = 0.03  # of the motion, where every contact that is struck is compliant
@@ -59,11 +59,16 @@ def left_out_warnings(
     """
     (much, far), found = looked, list[str]()
     if much:
-        alone = excitation.nothing and not (model.general or model.overrides)  # no more energy than at its start
+        alone = left_alone(model, excitation)
         found += energy_warning(taken.energy, taken.given if alone else max(samples.largest_energy, taken.given))
     if far:
         found += _of_motion(model, indicator(taken.defects, samples), tolerance, struck)
     return found
+
+
+def left_alone(model: MultiPhiModel, excitation: Excitation) -> bool:
+    """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
+    return excitation.nothing and not (model.general or model.overrides)
 
 
 def energy_warning(lost: float, largest: float) -> Iterator[str]:

@@ -107,10 +107,6 @@ class Motion:
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
-    def go_on_with(self, state: State, time: float) -> None:
-        """``go_on_from`` a state under static loads alone."""
-        self.go_on_from(self.levels.with_channels(state), time)
-
     @property
     def static_state(self) -> State:
         """The present state as one under static loads alone."""

@@ -304,7 +304,7 @@ class MultiPhiBody:
         """Compute the motion ahead, from the present state and time on."""
         alone = motion_of(self.own.loaded, self._motion.start)
         alone.sums_works = False  # nobody asks a body for them
-        motion, here = KnownMotion(alone.begin(), self._state, self.time), self.coordinates
+        motion, here = KnownMotion(alone, self._state, self.time), self.coordinates
         here.enter(mbs, here.stepped, here.stepped.drive)
         self._run_ahead = RunAhead(self, motion, self._record, self.time, step, end)
         self._run_ahead.begin(mbs)

@@ -110,8 +110,8 @@ class Coordinates:
 
     def write(self, stepped: SteppedLevel, held: np.ndarray, values: Iterable[np.ndarray]) -> None:
         """Write q, q', q'' (s,) in a level with places that links hold (h,), and what follows on the interface."""
-        for view, value in zip(self.views, values, strict=True):
-            view[:] = value
+        q, q_t, q_tt = self.views
+        q[:], q_t[:], q_tt[:] = values
         if self.interface is not None:
             self.interface.write(stepped, held, self.views)
 

@@ -7,6 +7,7 @@ at given times and for the events with theirs. A run that fails does so at an in
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -14,10 +15,11 @@ import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import Event, Phase, State, event_table
+from multiphi_exudyn.events.state import Event, Phase, State
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.segment import Segments, listed
+from multiphi_exudyn.time.recorded import Recorded
+from multiphi_exudyn.time.segment import Segments
 
 __all__ = ["KnownMotion", "Moments", "Stretch"]
 
@@ -85,14 +87,22 @@ class Stretch:
         r = level.modal.modes
         given = slice(r, r + level.excitation.prescribed)
         alone = self.alone.level(level.states)
-        return Moments(places, alone, np.delete(xi, given, axis=1), np.delete(xi_t, given, axis=1), phases)
+        if level.excitation.prescribed:
+            xi, xi_t = np.delete(xi, given, axis=1), np.delete(xi_t, given, axis=1)
+        return Moments(places, alone, xi, xi_t, phases)
 
-    def levels(self, until: float) -> Iterator[tuple[Level, float]]:
-        """Levels entered up to a time [s], with the largest energy [J] there."""
-        starts = self.segments.starts
+    def levels(self, until: float) -> Iterator[Level]:
+        """Levels entered up to a time [s]."""
+        for number in set(self.segments.numbers[self.segments.starts <= until].tolist()):
+            yield self.alone.level(self.segments.levels[number].states).level
+
+    def largest_energy(self, until: float) -> float:
+        """Of the states in which levels were entered up to a time [s], kinetic and strain [J]."""
+        starts, largest = self.segments.starts, 0.0
         for moments in self.at(starts[starts <= until]):
             eta, eta_t = moments.displacement.T, moments.velocity.T
-            yield moments.level.level, float(np.max(moments.level.kinetic(eta_t) + moments.level.strain(eta)))
+            largest = max(largest, float(np.max(moments.level.kinetic(eta_t) + moments.level.strain(eta))))
+        return largest
 
 
 class KnownMotion:
@@ -100,18 +110,18 @@ class KnownMotion:
 
     def __init__(self, motion: Motion, state: State, time: float) -> None:
         self._motion = motion
-        motion.go_on_with(state, time)
+        self._reached = motion.levels.with_channels(state), time
 
     def advance(self, until: float) -> Stretch:
         """The next stretch, up to ``until`` [s]."""
         motion = self._motion
-        motion.go_on_from(motion.state, motion.time)
+        motion.go_on_from(*self._reached)
         motion.advance(until)
-        trajectory = motion.trajectory(until)
-        events = trajectory.events
-        times, _, _, truncated = event_table(events, motion.model.index).T
-        given = motion.state, motion.message, listed(trajectory.segments), motion.record.standings()
-        return Stretch(motion.time, events, times, truncated, *given, motion.levels.alone)
+        self._reached = motion.state, motion.time
+        times, _, _, truncated = motion.events.table().T
+        segments = Recorded(motion.record, math.nan, math.nan, ())  # nobody asks a body for defects and works
+        given = motion.state, motion.message, segments, motion.record.standings()
+        return Stretch(motion.time, motion.events, times, truncated, *given, motion.levels.alone)
 
 
 def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:

@@ -51,6 +51,8 @@ class OwnLoads:
 
     def forces(self, states: tuple[int, ...], times: np.ndarray) -> np.ndarray:
         """Modal forces (k, s) at times (k,) [s], in a level."""
+        if not self.varies:
+            return np.zeros((len(times), self._size))
         return self._forces(states, self.excitation.values(times))
 
     def force_at(self, states: tuple[int, ...], time: float) -> np.ndarray:
@@ -99,6 +101,8 @@ class OwnLoads:
 
     def phases_of(self, state: State, time: float) -> tuple[Phase, ...]:
         """Phases of a state that was entered with others: who has risen since is armed again, or still lands."""
+        if all(phase is Phase.ARMED for phase in state.phases):
+            return state.phases
         level, r, drive = self.loaded.level(state.states), state.level.modal.modes, self.excitation.drive(time)
         given = (state.displacement, drive.values[0]), (state.velocity, drive.values[1]), (state.reach, drive.sizes[0])
         xi, xi_t, reach = (np.concatenate([x[:r], w, x[r:]]) for x, w in given)

@@ -26,6 +26,7 @@ from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.time.left_out import left_alone
 
 __all__ = ["RunAhead"]
 
@@ -53,7 +54,8 @@ class RunAhead:
         self._step, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
         self._state = np.array(here.views)
-        self._way = _way(here.stepped)
+        states = here.stepped.states
+        self._way = body.own.levels.further(states, "way", lambda: _way(here.stepped))
         self._past, self._truncated = list[Sequence[Event]](), 0.0
         self._stretch = self._motion.advance(self._until(time))
         self._place = self._done = 0
@@ -67,8 +69,10 @@ class RunAhead:
 
     def recorded(self) -> float:
         """Bring the record up to date; energy [J] that truncation took so far."""
-        for level, energy in self._stretch.levels(self.time):
-            self._record.include(level, energy)
+        for level in self._stretch.levels(self.time):
+            self._record.include(level)
+        if not left_alone(self._body.model, self._body.own.excitation):
+            self._record.reach(self._stretch.largest_energy(self.time))
         return self._truncated + float(np.sum(self._stretch.truncated[: self._told]))
 
     @property
@@ -82,7 +86,7 @@ class RunAhead:
 
     def begin(self, mbs: Any) -> None:
         """The run begins."""
-        if self._meets(self.time):
+        if self._stops_at(self.time):
             self._write(mbs)
         self.next_time = self._next()
 
@@ -91,20 +95,30 @@ class RunAhead:
         k, stops, here = self._place, self._stops, self._body.coordinates
         if self._meets(t) and index == stops.indices[k]:
             self._check(here.views[0], stops.expected[k], stops.largest[k], t)
-        else:
-            if index > self.index:
-                self._check_steps(t, index)
+        elif index > self.index:
+            self._check_steps(t, index)
+        if not self._stops_at(t):
             self._state = np.array(here.views)
-            if not self._meets(t):
+            if not self._is_over(t):
                 self._plan(t, index)
-        if self._meets(t):
+        if self._stops_at(t):
             self._write(mbs)
         self.time, self.index, self.next_time = t, index, self._next()
 
     def _meets(self, t: float) -> bool:
-        """Whether the next stop is the end of the step at t."""
+        """Whether the next step that is planned ends at t."""
         times = self._stops.times
         return self._place < len(times) and abs(times[self._place] - t) <= SAME_TIME * t
+
+    def _stops_at(self, t: float) -> bool:
+        """Whether it does, and is a stop."""
+        return self._place < len(self._stops.levels) and self._meets(t)
+
+    def _is_over(self, t: float) -> bool:
+        """Whether the run ends at t, where nothing is left to be told."""
+        stretch = self._stretch
+        told = self._done == len(stretch.changes) and not (stretch.failure or self._body.varies)
+        return told and min(t, stretch.end) >= self._end - self._rounding
 
     def _write(self, mbs: Any) -> None:
         stops, k, here = self._stops, self._place, self._body.coordinates
@@ -134,7 +148,7 @@ class RunAhead:
                 return
         steps = self._steps_of(here.stepped) if regular else UndisturbedSteps(here.stepped, step)
         expected = steps.after(self._state[None], np.array([count]))[0, 0]
-        self._check(here.views[0], expected, float(swings(here.stepped, self._state[None])[0]), t)
+        self._check(here.views[0], expected, float(swings(self._state[None], steps.periods)[0]), t)
 
     def _check(self, q: np.ndarray, expected: np.ndarray, largest: float, t: float) -> None:
         """Raises if somebody has changed the coordinates since the last stop."""
@@ -161,8 +175,10 @@ class RunAhead:
         if self._stretch.failure and t >= self._stretch.end:
             self._done = len(self._stretch.changes)
             raise NumericalFailure(f"body {self._body.name!r}: {self._stretch.failure}")
-        missed = self._done < len(self._stretch.changes) and self._stretch.end <= t
-        if self._stretch.end <= t and (missed or t < self._end - self._rounding):
+        left = self._done < len(self._stretch.changes)
+        spent = self._stretch.end <= t + (0.0 if left else self._rounding)
+        missed = left and spent
+        if missed or (spent and self._stretch.end < self._end - self._rounding):
             self._done = len(self._stretch.changes)
             self._truncated = self.recorded()
             self._past.append(self._stretch.events)

@@ -20,11 +20,15 @@ class RunRecord:
 
     def see(self, state: State, lost: float = 0.0) -> None:
         """Count a state among those of the run; lost: energy [J] that it had before besides."""
-        self.include(state.level.level, state.kinetic + float(state.level.strain(state.displacement)) + lost)
+        self.include(state.level.level)
+        self.reach(state.kinetic + float(state.level.strain(state.displacement)) + lost)
 
-    def include(self, level: Level, energy: float) -> None:
-        """Count a level of the run, and an energy [J] in it."""
+    def include(self, level: Level) -> None:
+        """Count a level among those of the run."""
         self._levels.setdefault(level.indices, level)
+
+    def reach(self, energy: float) -> None:
+        """Count an energy [J] among those of the run."""
         self._energy = max(self._energy, energy)
 
     def of(self, lost: Loss, truncated: float) -> RunSummary:

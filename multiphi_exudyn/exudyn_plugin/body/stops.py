@@ -6,6 +6,7 @@ vary it is the end of every step. It is planned for steps of equal length, h, fr
     t_k = t + k h,   k = 0, 1, ...
 
 with the exact state at t_k, and with the one that Exudyn's own steps make of the last stop, if nobody disturbs them.
+Behind the stops the last of these steps is planned too, at which nothing is written.
 """
 
 from __future__ import annotations
@@ -66,11 +67,11 @@ class Departure:
 
 @dataclass(frozen=True)
 class Stops:
-    """n stops. times: [s]; due: a step that ends at this time [s] or later is the stop. indices: of these steps.
+    """n stops, and maybe the last step behind them, k = n or n + 1 in all.
 
-    done: how many changes of the stretch are then behind. levels, states (n, 3, s): what is written; data (n, width):
-    what goes into the data node. expected (n, s): q that Exudyn has before, largest (n,): how far the modes have gone
-    so far.
+    times: [s]; due: a step that ends at this time [s] or later is the one. indices: of these steps. done: how many
+    changes of the stretch are then behind. expected (k, s): q that Exudyn has before, largest (k,): how far the modes
+    have gone so far. levels, states (n, 3, s): what is written; data (n, width): what goes into the data node.
     """
 
     times: list[float]
@@ -97,7 +98,8 @@ def stops_of(
     places = np.maximum(places + (start.time + start.step * places < coming), 0).astype(int)
     coming, places = coming[places <= last], places[places <= last]
     every = np.arange(last + 1) if body.varies else places if not missed else np.append(0, places)
-    stops, first = np.unique(every, return_index=True)
+    first = np.flatnonzero(every > np.append(-1, every)[:-1])
+    stops = every[first]
     times = start.time + start.step * stops
     if stretch.failure:
         known = times < stretch.end
@@ -105,56 +107,68 @@ def stops_of(
     due = times - SAME_PLACE * start.step
     if not (body.varies or missed):
         due = np.minimum(due, coming[first])
-    levels, states, data = _states(body, stretch, times)
+    levels, numbers, states, data = _states(body, stretch, times, start.level)
+    if last > (stops[-1] if len(stops) else 0) and not stretch.failure:
+        stops, until = np.append(stops, last), start.time + start.step * last
+        times, due = np.append(times, until), np.append(due, until - SAME_PLACE * start.step)
     done = start.done + np.searchsorted(places, stops, side="right")
-    expected, reached = _expected(start, stops, levels, states, steps_of)
+    expected, reached = _expected(start, stops, levels, numbers, states, steps_of)
     largest = np.maximum.accumulate(reached).tolist()
     given = times.tolist(), due.tolist(), (start.index + stops).tolist(), done.tolist()
-    return Stops(*given, levels, states, data, expected, largest)
+    return Stops(*given, [levels[number] for number in numbers.tolist()], states, data, expected, largest)
 
 
-def swings(stepped: SteppedLevel, states: np.ndarray) -> np.ndarray:
-    """How far the modes go (k,) from states (q, q', q'') (k, 3, s): the largest of |q| and |q'| / omega."""
-    omega = stepped.loaded.modal.omega
-    periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
-    ways = np.abs(states[:, 1, : len(omega)]) * periods
-    return np.asarray(np.maximum(_largest(states[:, 0]), _largest(ways)))
+def swings(states: np.ndarray, periods: np.ndarray) -> np.ndarray:
+    """How far the modes go (k,) from states (q, q', q'') (k, 3, s): the largest of |q| and |q'| / omega.
+
+    periods: 1 / omega (s,) [s] or (k, s), zero of those that are free.
+    """
+    return np.asarray(np.maximum(_largest(states[:, 0]), _largest(states[:, 1] * periods)))
 
 
 def _largest(rows: np.ndarray) -> np.ndarray:
     return np.asarray(np.max(np.abs(rows), axis=1, initial=0.0))
 
 
-def _states(body: KnownBody, stretch: Stretch, times: np.ndarray) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray]:
-    """Levels, states (n, 3, s) and data (n, width) at times (n,) [s], the phases as on entering the level."""
-    here, layout, count = body.coordinates.stepped, body.coordinates.layout, len(times)
-    levels, states, data = [here] * count, np.empty((count, 3, here.size)), np.zeros((count, layout.width))
+def _states(
+    body: KnownBody, stretch: Stretch, times: np.ndarray, first: SteppedLevel
+) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray, np.ndarray]:
+    """Levels, the ``first`` at their head; at times (n,) [s] which of them holds, states (n, 3, s), data (n, width).
+
+    The phases are those with which the level was entered.
+    """
+    layout, count, levels = body.coordinates.layout, len(times), [first]
+    numbers, states, data = np.zeros(count, int), np.empty((count, 3, first.size)), np.zeros((count, layout.width))
     for moments in stretch.at(times) if count else ():
         places, own = moments.places, moments.level.states
         stepped, forces = body.stepped_level(own), body.own.forces(own, times[places])
         states[places] = stepped.shown(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
         data[places] = layout.rows(own, moments.phases, moments.displacement[:, stepped.modes :])
-        for place in places.tolist():
-            levels[place] = stepped
-    return levels, states, data
+        if own != first.states:
+            numbers[places] = len(levels)
+            levels.append(stepped)
+    return levels, numbers, states, data
 
 
 def _expected(
-    start: Departure, stops: np.ndarray, levels: list[SteppedLevel], states: np.ndarray, steps_of: StepsOf
+    start: Departure,
+    stops: np.ndarray,
+    levels: list[SteppedLevel],
+    numbers: np.ndarray,
+    states: np.ndarray,
+    steps_of: StepsOf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """q (n, s) that undisturbed steps make of the state at the departure and at every stop up to the next one.
 
     Beside it how far the modes go on that way (n,).
     """
-    if not len(stops):
-        return np.zeros((0, start.level.size)), np.zeros(0)
-    before, counts = np.concatenate([start.state[None], states[:-1]]), np.diff(stops, prepend=0)
-    found, given = np.empty((len(stops), start.level.size)), [start.level, *levels[:-1]]
-    ways = np.empty(len(stops))
-    numbers = {stepped.states: (number, stepped) for number, stepped in enumerate(given)}
-    number = np.array([numbers[stepped.states][0] for stepped in given])
-    for mark, stepped in numbers.values():
-        here = number == mark
-        found[here] = steps_of(stepped).after(before[here], counts[here])[:, 0]
-        ways[here] = swings(stepped, before[here])
-    return found, np.maximum(ways, _largest(found))
+    count, counts = len(stops), np.diff(stops, prepend=0)
+    before, given = np.concatenate([start.state[None], states])[:count], np.append(0, numbers)[:count]
+    found, periods = np.empty((2, count, start.level.size))
+    for number, stepped in enumerate(levels):
+        here = np.flatnonzero(given == number)
+        if len(here):
+            steps = steps_of(stepped)
+            found[here] = steps.after(before[here], counts[here])[:, 0]
+            periods[here] = steps.periods
+    return found, np.maximum(swings(before, periods), _largest(found))

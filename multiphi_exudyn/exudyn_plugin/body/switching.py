@@ -123,8 +123,8 @@ class Switching(dict[str, SwitchingBody]):
             self.end = math.inf
             self._warn()
         elif self.following is None:
-            self.clock.next_time = min(self.end, *(body.next_time for body in self.values()))
-            self.clock.clear = _all_of([body.clear for body in self.values() if body.clear is not None])
+            self.clock.next_time = min([self.end, *[body.next_time for body in self.values()]])
+            self.clock.clear = _all_of([clear for body in self.values() if (clear := body.clear) is not None])
         return self.following is None or self.following(mbs, t)
 
     def begin(self) -> None:

@@ -16,19 +16,21 @@ __all__ = ["UndisturbedSteps"]
 
 
 class UndisturbedSteps:
-    """Steps of length ``step`` [s] in one level."""
+    """Steps of length ``step`` [s] in one level; periods: 1 / omega of its modes (s,) [s], zero where they are free."""
 
     def __init__(self, stepped: SteppedLevel, step: float) -> None:
         self._powers = [_one_step(stepped, step).T]
+        omega, self.periods = stepped.loaded.modal.omega, np.zeros(stepped.size)
+        np.divide(1.0, omega, out=self.periods[: len(omega)], where=omega > 0)
 
     def after(self, states: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """(q, q', q'') (k, 3, s) after as many steps from ``states`` (k, 3, s) as ``counts`` (k,) says."""
-        k = len(states)
-        x = np.hstack([states.reshape(k, -1), np.ones((k, 1))])
+        x = np.ones((len(states), len(self._powers[0])))
+        x[:, :-1] = states.reshape(len(states), -1)
         for power in range(int(np.max(counts, initial=0)).bit_length()):
             if power == len(self._powers):
                 self._powers.append(self._powers[-1] @ self._powers[-1])
-            moved = (counts >> power) & 1 == 1
+            moved = np.flatnonzero((counts >> power) & 1)
             x[moved] = x[moved] @ self._powers[power]
         return x[:, :-1].reshape(states.shape)
 
