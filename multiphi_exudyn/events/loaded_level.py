@@ -159,7 +159,7 @@ class LoadedLevel(Shown):
     def pushes(self) -> np.ndarray:
         """Constant forces (l,) [N] of its elements along their links' directions: of the first ones."""
         base = self.level.base
-        given = [element.states[state].push for element, state in zip(base.contacts, self.states, strict=True)]
+        given = [pushed[state] for pushed, state in zip(base.pushes_of_states, self.states, strict=True)]
         return np.array([*given, *[0.0] * (len(base.links) - len(given))])
 
     @functools.cached_property

@@ -58,18 +58,17 @@ def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
     """
     response, r = level.response, level.modes
     rates, given = response.basis.rates, (damping[:r, :r] + damping[:r, :r].T) / 2
-    if np.any(response.basis.powers):
+    if not response.basis.pure:
         return None
     speeds = response.shapes * rates
-    lengths, parts = np.linalg.norm(speeds, axis=0), []
-    for other, rate in ((speeds, rates), (speeds.conj(), rates.conj())):
-        power, sums = speeds.T @ given @ other, rates[:, None] + rate
-        if np.any(np.abs(power) > LARGEST_PRIMITIVE * np.outer(lengths, lengths) * np.abs(sums)):
-            return None
-        parts.append(np.divide(power, sums, out=np.zeros_like(power), where=power != 0))
+    lengths, damped = np.linalg.norm(speeds, axis=0), given @ speeds
+    powers = np.matmul(speeds.T, [damped, damped.conj()])
+    sums = rates[:, None] + np.array([rates, rates.conj()])[:, None]
+    if (np.abs(powers) > LARGEST_PRIMITIVE * lengths[:, None] * lengths * np.abs(sums)).any():
+        return None
+    a, b = np.divide(powers, sums, out=np.zeros_like(powers), where=powers != 0)
     z = np.hstack([response.from_displacement, response.from_velocity])
-    parted = np.vstack([z.real, z.imag])
-    return np.asarray(parted.T @ _real(*parts) @ parted)
+    return np.asarray(0.5 * (z.T @ (a @ z + b @ z.conj())).real)
 
 
 def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
@@ -81,7 +80,7 @@ def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
     speeds = response.shapes * response.basis.rates
     held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
     moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)
-    return np.column_stack([speeds.T, (held @ speeds).T, moved.T])
+    return np.concatenate([speeds, held @ speeds, moved]).T
 
 
 def driven_forms(
