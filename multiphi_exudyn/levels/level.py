@@ -259,13 +259,15 @@ class Level(Shown):
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
-        base, gaps = self.base, self.base.gaps[list(self.indices)]
-        closed_directions = base.closed_directions(self.indices, gaps)
+        base, index = self.base, list(self.indices)
+        closed_directions = base.closed_directions(index, base.gaps[index])
         along, configuration, pushing = self._response(closed_directions, load + base.preload)
-        strain = base.strain(configuration, self.indices)
+        gaps = base.gaps_at(configuration, base.gaps)
+        strain = base.strain(configuration, index, gaps)
         return Asymptotic(
             configuration=configuration,
-            forces=self._forces(closed_directions, along, configuration, gaps),
+            gaps=gaps,
+            forces=base.contact_forces(closed_directions, along, gaps)[index],
             drive=np.zeros(self.modes) if self.squares.all() else np.where(self.squares, 0.0, self.vectors.T @ pushing),
             load=self.vectors.T @ load,
             strain=strain,
@@ -274,9 +276,12 @@ class Level(Shown):
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
-        closed_directions = self.base.closed_directions(self.indices, gaps)
+        base, index, initial = self.base, list(self.indices), np.zeros(len(self.base.links))
+        initial[index] = gaps
+        closed_directions = base.closed_directions(index, gaps)
         along, configuration, _ = self._response(closed_directions, load)
-        return self._forces(closed_directions, along, configuration, gaps), configuration
+        forces = base.contact_forces(closed_directions, along, base.gaps_at(configuration, initial))
+        return forces[index], configuration
 
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray
@@ -286,11 +291,3 @@ class Level(Shown):
             return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
         return along, configuration, total + closed_directions.vectors @ along
-
-    def _forces(
-        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """lambda (k,) of the closed contacts from the forces along their directions."""
-        index, every = list(self.indices), np.zeros(len(self.base.links))
-        every[index] = gaps
-        return self.base.contact_forces(closed_directions, along, configuration, every)[index]
