@@ -216,8 +216,9 @@ class LevelArrays:
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
-        self.scratch.reserve(n, free, int(np.sum(self._exits.of(level.states))))
-        record = put_level(self.buffers, level, number, self._exits)
+        kept = self._exits.of(level.states)
+        self.scratch.reserve(n, free, int(np.count_nonzero(kept)))
+        record = put_level(self.buffers, level, number, self._exits, kept)
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
 

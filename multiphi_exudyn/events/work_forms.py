@@ -50,18 +50,17 @@ class DrivenForms:
 def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
     """F (2 r, 2 r): y.F y grows by the work of damping in a free response; None where it has powers of time.
 
-    Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, in which eta' = Re S z,
+    damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, eta' = Re S z,
 
         eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
 
     and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
     """
     response, r = level.response, level.modes
-    rates, given = response.basis.rates, (damping[:r, :r] + damping[:r, :r].T) / 2
     if not response.basis.pure:
         return None
-    speeds = response.shapes * rates
-    lengths, damped = np.linalg.norm(speeds, axis=0), given @ speeds
+    rates, speeds = response.basis.rates, response.shapes * response.basis.rates
+    lengths, damped = np.linalg.norm(speeds, axis=0), damping[:r, :r] @ speeds
     powers = np.matmul(speeds.T, [damped, damped.conj()])
     sums = rates[:, None] + np.array([rates, rates.conj()])[:, None]
     if (np.abs(powers) > LARGEST_PRIMITIVE * lengths[:, None] * lengths * np.abs(sums)).any():
