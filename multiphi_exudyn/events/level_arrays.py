@@ -69,6 +69,7 @@ class LevelArrays:
         piece: the last one of the channels that they are about.
         """
         self.channels.reserve_until(self.buffers, piece)
+        self._weigh()
         self.owner = None
         return self.buffers.all
 
@@ -81,9 +82,13 @@ class LevelArrays:
     @property
     def full(self) -> bool:
         """Whether the arrays are too large; those that their model keeps beside them go first."""
+        self._weigh()
+        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
+
+    def _weigh(self) -> None:
+        """Look at what others take where the arrays have grown, for levels or for questions."""
         if self.buffers.size != self._weighed:
             self._let_others_go()
-        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
 
     def _let_others_go(self) -> None:
         """Of all that a model keeps the least recently used goes, until there is room."""

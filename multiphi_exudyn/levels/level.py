@@ -157,11 +157,12 @@ class Level(Shown):
         rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
-        closed_directions, _ = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)]).orthogonal
+        base, index = self.base, list(self.indices)
+        closed_directions, _ = base.closed_directions(index, base.gaps[index]).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
-        names = [self.base.label(closed_directions.members[s][0]) for s in springs.tolist()]
-        rows, elastic = closed_directions.vectors[:, springs].T, self.base.modes.omega > 0
-        own = np.sum((rows[:, elastic] / self.base.modes.omega[elastic]) ** 2, axis=1)
+        names = [base.label(closed_directions.members[s][0]) for s in springs.tolist()]
+        rows = closed_directions.vectors[:, springs].T
+        own = np.sum((rows * base.periods) ** 2, axis=1)
         kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
         left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
         whole = left + np.sum(np.abs(kept), axis=1)
@@ -171,11 +172,11 @@ class Level(Shown):
 
     def _flexibilities(self, closed_directions: ClosedDirections) -> np.ndarray:
         """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
-        stiffness = closed_directions.stiffness
+        stiffness, vectors = closed_directions.stiffness, closed_directions.vectors
         if self.base.modes.rigid or np.any(stiffness == 0):
-            rows, gaps = closed_directions.vectors.T, np.zeros(len(self.indices))
-            return np.array([row @ self.static_response(row, gaps)[1] for row in rows])
-        free = closed_directions.vectors.T @ (self.base.modes.omega[:, None] ** -2.0 * closed_directions.vectors)
+            gaps = np.zeros(len(self.indices))
+            return np.array([row @ self.static_response(row, gaps)[1] for row in vectors.T])
+        free = vectors.T @ (self.base.compliance[:, None] * vectors)
         yielding = 1 / stiffness
         return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
 
