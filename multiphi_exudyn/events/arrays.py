@@ -20,7 +20,8 @@ level     ints[level ...]         its key (c,), a small integer for every elemen
 exit      ints[exit ...]          element, the state it asks for, whether it never recovers, its signal, and the signal
                                   that the element would have in the level entered alone, -1 while nobody needed it;
                                   the speed on which the state asked for hangs, and the others
-signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V, (2, p), begin
+signal    ints[signal ...]        s = row . (xi, xi', 1): where its row (2n + 1,) and the row times V begin, (2, p), or
+                                  (p,) where it is not rated: no part of xi' is in it
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; where places
                                   are set, of which terms T and c are sums, (n_m, n_l + 1), else -1; where levels leave
                                   modes out, what a defect is read from (defect_sums.py), else -1

@@ -51,5 +51,7 @@ class ExitTable:
 
     def turning(self, kept: np.ndarray) -> list[tuple[int, Exit]]:
         """Those that a speed may turn, by their numbers among those that are kept."""
+        if not self._turns:
+            return []
         numbers = np.cumsum(kept) - 1
         return [(int(numbers[k]), self._exits[k]) for k in self._turns if kept[k]]

@@ -209,9 +209,10 @@ def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
     n, row, c = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_WAVES]
     moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, rate = ints[FLOW_FREE], ints[FLOW_COUNT], ints[WORK_WAVES] + ints[FLOW_COUNT]
+    rated = ints[signal + RATED] == 1
     for j in range(free):
         waves[result + j] = waves[ints[signal + WAVE] + j] * waves[c + j]
-        waves[rate + j] = waves[ints[signal + WAVE] + free + j] * waves[c + j]
+        waves[rate + j] = waves[ints[signal + WAVE] + free + j] * waves[c + j] if rated else 0j
     for j in range(free, count):
         forced = ints[FLOW_FORCED] + (j - free) * moving
         value = 0j
@@ -221,7 +222,7 @@ def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
             slope += numbers[row + n + i] * waves[forced + i]
         waves[result + j] = value
         waves[rate + j] = slope
-    if ints[signal + RATED] == 1:
+    if rated:
         differentiate(ints, numbers, waves, ints[FLOW_BASIS], rate, rate)
         for j in range(count):
             waves[result + j] += waves[rate + j]
@@ -236,11 +237,13 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
     n, row, basis = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_BASIS]
     moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
+    rated = ints[signal + RATED] == 1
     for j in range(count):
         value = 0.0
         slope = 0.0
         if j < free:
-            value, slope = abs(waves[ints[signal + WAVE] + j]), abs(waves[ints[signal + WAVE] + free + j])
+            value = abs(waves[ints[signal + WAVE] + j])
+            slope = abs(waves[ints[signal + WAVE] + free + j]) if rated else 0.0
         else:
             forced = ints[FLOW_FORCED] + (j - free) * moving
             whole = 0j
@@ -251,7 +254,7 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
             value, slope = abs(whole), abs(changed)
         terms = numbers[ints[FLOW_TERMS] + j]
         numbers[result + j] = value * terms
-        if ints[signal + RATED] == 1:
+        if rated:
             numbers[result + j] += slope * terms * abs(waves[ints[basis + RATES] + j])
             if ints[ints[basis + POWERS] + j] > 0:
                 numbers[result + j - 1] += ints[ints[basis + POWERS] + j] / unit * slope * terms

@@ -69,6 +69,7 @@ class LevelArrays:
         piece: the last one of the channels that they are about.
         """
         self.channels.reserve_until(self.buffers, piece)
+        self._weigh()
         self.owner = None
         return self.buffers.all
 
@@ -81,9 +82,13 @@ class LevelArrays:
     @property
     def full(self) -> bool:
         """Whether the arrays are too large; those that their model keeps beside them go first."""
+        self._weigh()
+        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
+
+    def _weigh(self) -> None:
+        """Look at what others take where the arrays have grown, for levels or for questions."""
         if self.buffers.size != self._weighed:
             self._let_others_go()
-        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
 
     def _let_others_go(self) -> None:
         """Of all that a model keeps the least recently used goes, until there is room."""
@@ -225,8 +230,9 @@ class LevelArrays:
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
-        self.scratch.reserve(n, free, int(np.sum(self._exits.of(level.states))))
-        record = put_level(self.buffers, level, number, self._exits)
+        kept = self._exits.of(level.states)
+        self.scratch.reserve(n, free, int(np.count_nonzero(kept)))
+        record = put_level(self.buffers, level, number, self._exits, kept)
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
 

@@ -63,10 +63,14 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py.
 
     And of friction that goes with other forces (s, 4 n + 1): T, the speed on which it works, that of its constant part,
-    and this.
+    and this. Without channels only the first and the third are not empty.
     """
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
-    modal, patterns, static = level.modal, level.excitation.patterns, level.excitation.static + base.preload
+    modal, patterns, friction = level.modal, level.excitation.patterns, -(level.pushes @ own.gap_rows)
+    if not level.excitation.channels:
+        empty = np.zeros((0, 4 * own.modes + 1))
+        return modal.damping, empty, friction, empty
+    static = level.excitation.static + base.preload
     moved = np.hstack([modal.vectors, carried])
     springs = base.springs[index]
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
@@ -94,4 +98,4 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
     varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
     rubbing = np.array(pairs).reshape(-1, 4 * own.modes + 1)
-    return damping, varying, -(level.pushes @ own.gap_rows), rubbing
+    return damping, varying, friction, rubbing

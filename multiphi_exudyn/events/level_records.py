@@ -43,9 +43,9 @@ def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     return record
 
 
-def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable) -> int:
-    """The record of a level with a number."""
-    own, modal, parts, kept = level.level, level.modal, level_parts(level), exits.of(level.states)
+def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, kept: np.ndarray) -> int:
+    """The record of a level with a number, and of its exits, those of the table that are kept (e,)."""
+    own, modal, parts = level.level, level.modal, level_parts(level)
     batch, firsts = Batch(buffers), exits.firsts(kept)
     put = batch.put
     basis = _put_basis(batch, modal.response.basis)
@@ -74,8 +74,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapping[complex, int]) -> None:
     """Give the record of a level the power of damping, of what varies and of friction, and their primitives."""
     damping, varying, rubbing, pairs = powers(level)
-    damping = (damping + damping.T) / 2
-    friction = np.append(rubbing, pairs)
+    damping, friction = (damping + damping.T) / 2, np.append(rubbing, pairs)
     given = {
         a.DISSIPATION: buffers.put("numbers", damping),
         a.POWER: buffers.put("numbers", varying),
@@ -129,14 +128,13 @@ def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
 def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
     """The records (e, 3) of signals (exits.signals_of)."""
     n, r, shapes = level.width, level.modal.modes, level.modal.response.shapes
-    waves, records = np.zeros((len(table), 2 * shapes.shape[1]), complex), np.zeros((len(table), 3), int)
-    np.matmul(table[:, :r], shapes, out=waves[:, : shapes.shape[1]])
-    moves = table[:, n:-1].any(axis=1)
+    waves, moves, records = table[:, :r] @ shapes, table[:, n:-1].any(axis=1), np.empty((len(table), 3), int)
     if moves.any():
-        waves[:, shapes.shape[1] :] = table[:, n : n + r] @ shapes
-        records[:, a.RATED] = moves
-    records[:, a.ROW] = put("numbers", table) + table.shape[1] * np.arange(len(table))
-    records[:, a.WAVE] = put("waves", waves) + waves.shape[1] * np.arange(len(table))
+        waves = np.hstack([waves, table[:, n : n + r] @ shapes])
+    steps = np.arange(len(table))
+    records[:, a.ROW] = put("numbers", table) + table.shape[1] * steps
+    records[:, a.WAVE] = put("waves", waves) + waves.shape[1] * steps
+    records[:, a.RATED] = moves
     return records
 
 
@@ -184,7 +182,7 @@ def _put_exits(batch: Batch, level: LoadedLevel, exits: ExitTable, kept: np.ndar
     """Records of the exits of a level, those of the table that are kept (e,)."""
     signals = _put_signals(batch.put, level, signals_of(level, exits.shares(kept)))
     table = np.full((len(signals), a.EXIT_INTS), -1)
-    table[:, :3], table[:, 3:6] = exits.described[kept], signals
+    table[:, : a.SIGNAL], table[:, a.SIGNAL : a.ENTERED] = exits.described[kept], signals
     for k, exit_ in exits.turning(kept):
         table[k, a.TURN :] = _turn(batch.put, level, int(table[k, 0]), exit_)
     return batch.put("ints", table)

@@ -97,16 +97,25 @@ class LoadedLevel(Shown):
         yield "channels", str(self.level.modes - self.modal.modes)
 
     @classmethod
-    def of(cls, level: Level, load: np.ndarray, states: tuple[int, ...] | None = None) -> LoadedLevel:
-        """``level`` under a static load (m,) in base coordinates, its elements in these states."""
+    def of(
+        cls,
+        level: Level,
+        load: np.ndarray,
+        states: tuple[int, ...] | None = None,
+        excitation: Excitation | None = None,
+    ) -> LoadedLevel:
+        """``level`` under a static load (m,) in base coordinates, its elements in these states.
+
+        excitation: of this load alone, None for one of its own.
+        """
         rest = level.asymptotic(load)
         magnitudes, initial = level.base.magnitudes
-        gaps = level.base.directions.T @ rest.configuration + level.base.gaps
         terms = initial + np.abs(rest.configuration) @ magnitudes
         if level.following.any():
             terms[level.following] *= FOLLOWING / ZERO
-        gaps = drop_round_off(gaps, terms)
-        return cls(level, rest, gaps, Excitation.constant(load, len(gaps)), Channels.none(level), own_states=states)
+        gaps = drop_round_off(rest.gaps, terms)
+        constant = excitation or Excitation.constant(load, len(gaps))
+        return cls(level, rest, gaps, constant, Channels.none(level), own_states=states)
 
     def under(self, excitation: Excitation) -> LoadedLevel:
         """This one with the channels of an excitation; the last one is kept for other histories of these channels."""
@@ -159,7 +168,7 @@ class LoadedLevel(Shown):
     def pushes(self) -> np.ndarray:
         """Constant forces (l,) [N] of its elements along their links' directions: of the first ones."""
         base = self.level.base
-        given = [element.states[state].push for element, state in zip(base.contacts, self.states, strict=True)]
+        given = [pushed[state] for pushed, state in zip(base.pushes_of_states, self.states, strict=True)]
         return np.array([*given, *[0.0] * (len(base.links) - len(given))])
 
     @functools.cached_property

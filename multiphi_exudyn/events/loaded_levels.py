@@ -142,8 +142,9 @@ class LoadedLevels:
 
     def _made(self, states: tuple[int, ...]) -> LoadedLevel:
         level = self.model.level_at(self.model.links_held(states))
-        load = self.load + self.model.push(states) if self.model.general else self.load
-        return LoadedLevel.of(level, load, states)
+        if self.model.general:
+            return LoadedLevel.of(level, self.load + self.model.push(states), states)
+        return LoadedLevel.of(level, self.load, states, self.excitation)
 
     def with_channels(self, state: State) -> State:
         """A state under the static loads alone as one of these levels, at the time at which they set out."""

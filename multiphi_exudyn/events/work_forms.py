@@ -50,26 +50,24 @@ class DrivenForms:
 def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
     """F (2 r, 2 r): y.F y grows by the work of damping in a free response; None where it has powers of time.
 
-    Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, in which eta' = Re S z,
+    damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, eta' = Re S z,
 
         eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
 
     and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
     """
     response, r = level.response, level.modes
-    rates, given = response.basis.rates, (damping[:r, :r] + damping[:r, :r].T) / 2
-    if np.any(response.basis.powers):
+    if not response.basis.pure:
         return None
-    speeds = response.shapes * rates
-    lengths, parts = np.linalg.norm(speeds, axis=0), []
-    for other, rate in ((speeds, rates), (speeds.conj(), rates.conj())):
-        power, sums = speeds.T @ given @ other, rates[:, None] + rate
-        if np.any(np.abs(power) > LARGEST_PRIMITIVE * np.outer(lengths, lengths) * np.abs(sums)):
-            return None
-        parts.append(np.divide(power, sums, out=np.zeros_like(power), where=power != 0))
+    rates, speeds = response.basis.rates, response.shapes * response.basis.rates
+    lengths, damped = np.linalg.norm(speeds, axis=0), damping[:r, :r] @ speeds
+    powers = np.matmul(speeds.T, [damped, damped.conj()])
+    sums = rates[:, None] + np.array([rates, rates.conj()])[:, None]
+    if (np.abs(powers) > LARGEST_PRIMITIVE * lengths[:, None] * lengths * np.abs(sums)).any():
+        return None
+    a, b = np.divide(powers, sums, out=np.zeros_like(powers), where=powers != 0)
     z = np.hstack([response.from_displacement, response.from_velocity])
-    parted = np.vstack([z.real, z.imag])
-    return np.asarray(parted.T @ _real(*parts) @ parted)
+    return np.asarray(0.5 * (z.T @ (a @ z + b @ z.conj())).real)
 
 
 def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
@@ -81,7 +79,7 @@ def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
     speeds = response.shapes * response.basis.rates
     held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
     moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)
-    return np.column_stack([speeds.T, (held @ speeds).T, moved.T])
+    return np.concatenate([speeds, held @ speeds, moved]).T
 
 
 def driven_forms(

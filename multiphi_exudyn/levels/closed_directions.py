@@ -32,16 +32,19 @@ class ClosedDirections:
         """(d,) bool."""
         return np.isinf(self.stiffness)
 
-    @functools.cached_property
+    @property
     def orthogonal(self) -> tuple[ClosedDirections, np.ndarray]:
         """The same with the directions of rigid contacts orthogonal to each other, Q, and R (k, k): they are Q R.
 
         Nearly parallel ones would leave the difference of their small difference to round-off. Q keeps their unit.
         """
+        count = int(np.count_nonzero(self.rigid))
+        return (self, np.eye(count)) if count < 2 else self._turned  # not kept: what keeps itself is let go late
+
+    @functools.cached_property
+    def _turned(self) -> tuple[ClosedDirections, np.ndarray]:
+        """``orthogonal`` where there is something to turn."""
         rigid = self.rigid
-        count = int(np.count_nonzero(rigid))
-        if count < 2:
-            return self, np.eye(count)
         own = self.vectors[:, rigid]
         length = float(np.max(np.linalg.norm(own, axis=0))) or 1.0
         q, r = np.linalg.qr(own / length)

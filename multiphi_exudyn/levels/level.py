@@ -157,11 +157,12 @@ class Level(Shown):
         rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
-        closed_directions, _ = self.base.closed_directions(self.indices, self.base.gaps[list(self.indices)]).orthogonal
+        base, index = self.base, list(self.indices)
+        closed_directions, _ = base.closed_directions(index, base.gaps[index]).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
-        names = [self.base.label(closed_directions.members[s][0]) for s in springs.tolist()]
-        rows, elastic = closed_directions.vectors[:, springs].T, self.base.modes.omega > 0
-        own = np.sum((rows[:, elastic] / self.base.modes.omega[elastic]) ** 2, axis=1)
+        names = [base.label(closed_directions.members[s][0]) for s in springs.tolist()]
+        rows = closed_directions.vectors[:, springs].T
+        own = np.sum((rows * base.periods) ** 2, axis=1)
         kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
         left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
         whole = left + np.sum(np.abs(kept), axis=1)
@@ -171,11 +172,11 @@ class Level(Shown):
 
     def _flexibilities(self, closed_directions: ClosedDirections) -> np.ndarray:
         """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
-        stiffness = closed_directions.stiffness
+        stiffness, vectors = closed_directions.stiffness, closed_directions.vectors
         if self.base.modes.rigid or np.any(stiffness == 0):
-            rows, gaps = closed_directions.vectors.T, np.zeros(len(self.indices))
-            return np.array([row @ self.static_response(row, gaps)[1] for row in rows])
-        free = closed_directions.vectors.T @ (self.base.modes.omega[:, None] ** -2.0 * closed_directions.vectors)
+            gaps = np.zeros(len(self.indices))
+            return np.array([row @ self.static_response(row, gaps)[1] for row in vectors.T])
+        free = vectors.T @ (self.base.compliance[:, None] * vectors)
         yielding = 1 / stiffness
         return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
 
@@ -259,13 +260,15 @@ class Level(Shown):
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
-        base, gaps = self.base, self.base.gaps[list(self.indices)]
-        closed_directions = base.closed_directions(self.indices, gaps)
+        base, index = self.base, list(self.indices)
+        closed_directions = base.closed_directions(index, base.gaps[index])
         along, configuration, pushing = self._response(closed_directions, load + base.preload)
-        strain = base.strain(configuration, self.indices)
+        gaps = base.gaps_at(configuration, base.gaps)
+        strain = base.strain(configuration, index, gaps)
         return Asymptotic(
             configuration=configuration,
-            forces=self._forces(closed_directions, along, configuration, gaps),
+            gaps=gaps,
+            forces=base.contact_forces(closed_directions, along, gaps)[index],
             drive=np.zeros(self.modes) if self.squares.all() else np.where(self.squares, 0.0, self.vectors.T @ pushing),
             load=self.vectors.T @ load,
             strain=strain,
@@ -274,9 +277,12 @@ class Level(Shown):
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
-        closed_directions = self.base.closed_directions(self.indices, gaps)
+        base, index, initial = self.base, list(self.indices), np.zeros(len(self.base.links))
+        initial[index] = gaps
+        closed_directions = base.closed_directions(index, gaps)
         along, configuration, _ = self._response(closed_directions, load)
-        return self._forces(closed_directions, along, configuration, gaps), configuration
+        forces = base.contact_forces(closed_directions, along, base.gaps_at(configuration, initial))
+        return forces[index], configuration
 
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray
@@ -286,11 +292,3 @@ class Level(Shown):
             return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
         return along, configuration, total + closed_directions.vectors @ along
-
-    def _forces(
-        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """lambda (k,) of the closed contacts from the forces along their directions."""
-        index, every = list(self.indices), np.zeros(len(self.base.links))
-        every[index] = gaps
-        return self.base.contact_forces(closed_directions, along, configuration, every)[index]

@@ -32,6 +32,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse.linalg
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.modes import right_singular_vectors
@@ -44,15 +45,36 @@ FEW = 4  # modes of the base for each mode asked for: from there on the complian
 ROOTED = 50  # modes of a base from which roots of the secular equation are cheaper than all singular values
 LARGE = 150  # modes of a base from which iterations are the cheaper way to the few
 ORTHOGONAL = 1e-12  # product of two modes, above which they are taken anew from what they span
+ORTHONORMAL = 1e-10  # |Phi^T M Phi - I| a level may show
 APART = 1e-6  # relative distance of two compliances at least, to count what lies beyond the middle between them
 
 
 def level_modes(
     base: ModalBase, closed_directions: ClosedDirections, modes: int | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """omega^2 ascending, modes (m, r), the lowest ``modes`` at least or all, and the mu that limits their accuracy."""
+    """omega^2 ascending, modes (m, r), the lowest ``modes`` at least or all, and the mu that limits their accuracy.
+
+    Raises NumericalFailure where they are not orthogonal.
+    """
     if not closed_directions.members:
         return base.squares[:modes].copy(), np.eye(base.modes.count, modes), 0.0
+    found = _found(base, closed_directions, modes)
+    error = _error(found[1])
+    if error > ORTHOGONAL:
+        found = _modes(base, closed_directions, np.linalg.qr(found[1])[0])
+        error = _error(found[1])
+    if not error <= ORTHONORMAL:
+        raise NumericalFailure(
+            f"level: its modes are not accurate (mass normalisation off by {error:g}); are units and magnitudes of "
+            "mass and stiffness right?"
+        )
+    return found
+
+
+def _found(
+    base: ModalBase, closed_directions: ClosedDirections, modes: int | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """``level_modes`` of closed directions by the way that costs least."""
     if modes is not None and base.modes.count >= ROOTED:
         found = _rank_one(base, closed_directions, modes)
         if found is not None:
@@ -60,6 +82,13 @@ def level_modes(
     if modes is not None and _few(base, closed_directions, modes):
         return _lowest(base, closed_directions, modes)
     return _modes(base, closed_directions, _null_space(closed_directions.vectors[:, closed_directions.rigid]))
+
+
+def _error(vectors: np.ndarray) -> float:
+    """The largest number in Phi^T Phi - 1."""
+    products = vectors.T @ vectors
+    products.flat[:: len(products) + 1] -= 1.0
+    return float(np.abs(products).max(initial=0.0))
 
 
 def _rank_one(
@@ -76,10 +105,6 @@ def _rank_one(
     squares, vectors = found
     if math.isinf(stiffness):
         vectors = vectors - np.outer(along, along @ vectors) / (along @ along)
-    products = vectors.T @ vectors
-    products.flat[:: len(products) + 1] -= 1.0
-    if np.abs(products).max() > ORTHOGONAL:
-        return _modes(base, closed_directions, np.linalg.qr(vectors)[0])
     return squares, vectors, 0.0
 
 

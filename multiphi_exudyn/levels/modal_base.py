@@ -136,10 +136,14 @@ class ModalBase(ElementTable, Shown):
         """Strain energy [J] of the constant forces of all force laws at q = 0: a law has none at its centre."""
         return -sum(law.constant * law.centre for law in self.laws.values())
 
-    def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray | None = None) -> float:
+    def gaps_at(self, configuration: np.ndarray, initial: np.ndarray) -> np.ndarray:
+        """Gaps (l,) [m] at y (m,), from those at y = 0."""
+        return np.asarray(self.directions.T @ configuration + initial)
+
+    def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray) -> float:
         """Strain energy [J] of y (m,), of the compliant ones among these closed contacts, and of constant forces.
 
-        gaps: (c,) of all contacts, None for their own.
+        gaps: (l,) there.
         """
         constant = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
         if self.laws:
@@ -147,7 +151,7 @@ class ModalBase(ElementTable, Shown):
         if not len(closed):
             return constant
         index = list(closed)
-        closing = (self.gaps if gaps is None else gaps)[index] + self.directions[:, index].T @ configuration
+        closing = gaps[index]
         return constant + 0.5 * float(self.springs[index] @ (closing * closing))
 
     @functools.cached_property
@@ -227,27 +231,22 @@ class ModalBase(ElementTable, Shown):
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
-    def contact_forces(
-        self, closed_directions: ClosedDirections, along: np.ndarray, configuration: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """lambda (l,) [N] from the forces (d,) along closed directions and y (m,) there; zero where open.
+    def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """lambda (l,) [N] from the forces (d,) along closed directions and the gaps (l,) there; zero where open.
 
-        gaps: (l,) at y = 0. Springs of one direction have what their gaps say, and a rigid contact among them the rest.
+        Springs of one direction have what their gaps say, and a rigid contact among them the rest.
         """
         forces = np.zeros(len(self.links))
         if all(len(members) == 1 for members in closed_directions.members):
             index = [i for (i,) in closed_directions.members]
             forces[index] = self.direction_signs[index] * along
             return forces
-        closing = self.directions.T @ configuration + gaps
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:
                 springs = [i for i in index if i not in held]
-                moved = self.direction_signs[held[0]] * closing[held[0]] if held else 0.0  # round-off of zero
-                forces[springs] = -self.stiffnesses[springs] * (
-                    closing[springs] - self.direction_signs[springs] * moved
-                )
+                moved = self.direction_signs[held[0]] * gaps[held[0]] if held else 0.0  # round-off of zero
+                forces[springs] = -self.stiffnesses[springs] * (gaps[springs] - self.direction_signs[springs] * moved)
                 force -= self.direction_signs[springs] @ forces[springs]
                 index = held
             forces[index] = self.direction_signs[index] * force

@@ -45,7 +45,7 @@ def _at_rest(base: ModalBase, index: list[int], gaps: np.ndarray, load: np.ndarr
         )
     closed_directions = base.closed_directions(index, gaps[index])
     along, configuration = static_response(base, closed_directions, load)
-    return base.contact_forces(closed_directions, along, configuration, gaps), configuration
+    return base.contact_forces(closed_directions, along, base.gaps_at(configuration, gaps)), configuration
 
 
 def _check_unique(base: ModalBase, sliders: list[int], own: np.ndarray) -> None:

@@ -26,12 +26,13 @@ __all__ = ["Asymptotic", "neutral_response", "static_response"]
 class Asymptotic:
     """What a level's modes cannot represent: its state of rest under gaps and static loads.
 
-    configuration: y_inf (m,). forces: lambda_inf of the closed contacts (k,) [N]. drive: force (r,) on the
-    zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain, potential: strain energy of
-    y_inf [J], and the same less f.y_inf.
+    configuration: y_inf (m,). gaps: of all links there (l,) [m]. forces: lambda_inf of the closed contacts (k,) [N].
+    drive: force (r,) on the zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain,
+    potential: strain energy of y_inf [J], and the same less f.y_inf.
     """
 
     configuration: np.ndarray
+    gaps: np.ndarray
     forces: np.ndarray
     drive: np.ndarray
     load: np.ndarray
@@ -81,14 +82,15 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
     carried = np.zeros((rigid, 0))
     if rigid:
         carried = _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
-    solved = _solver(touching.T @ (compliance[:, None] * touching), own, sprung, free.T @ carried)
-    pressed = -offsets - sprung * (touching.T @ (compliance * pressing))
+    bent = compliance[:, None] * touching
+    solved = _solver(touching.T @ bent, own, sprung, free.T @ carried)
+    pressed = -offsets - sprung * (bent.T @ pressing)
     forces, moved = solved(pressed, -carried.T @ load[:rigid])
     total = drop_round_off(pressing + touching @ forces, np.abs(pressing) + np.abs(touching) @ np.abs(forces))
     configuration = np.concatenate([carried @ moved, compliance * total])
     left = offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
     further, moved = solved(-left, np.zeros(len(moved)))  # what soft modes magnified
-    added = np.concatenate([carried @ moved, compliance * (touching @ further)])
+    added = np.concatenate([carried @ moved, bent @ further])
     return forces + further, configuration + added
 
 

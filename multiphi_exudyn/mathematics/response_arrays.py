@@ -72,10 +72,11 @@ CHAIN = 4  # ints of a chain
 def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
     """The modes (p, 2) of every exponential, first and one past the last of those where a map (p, r) is not 0."""
     p, r = maps[0].shape
+    reached = np.zeros((p, 2), int)
     if any(part.all() for part in maps):
-        return np.tile([0, r], (p, 1))
-    part, reached = functools.reduce(np.logical_or, maps), np.zeros((p, 2), int)
-    if r:
+        reached[:, 1] = r
+    elif r:
+        part = functools.reduce(np.logical_or, maps)
         some = part.any(axis=1)
         reached[:, 0] = np.where(some, part.argmax(axis=1), r)
         reached[:, 1] = np.where(some, r - part[:, ::-1].argmax(axis=1), 0)

@@ -75,13 +75,14 @@ def _roots(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[
     """The ``count`` lowest roots, and their vectors of unit length; None where the iteration fails."""
     omega, length = np.sqrt(d), math.sqrt(p @ p)
     along, size = p / length, stiffness * length**2
-    apart, further = np.empty((2, count, len(d)))
+    apart = np.empty((count, len(d)))  # d - x
     for i in range(count):
-        apart[i], _, further[i], failed = dlasd4(i, omega, along, size)
+        below, _, above, failed = dlasd4(i, omega, along, size)
         if failed:
             return None
-    apart *= further  # d - x
+        np.multiply(below, above, out=apart[i])
     index = np.arange(count)
     nearer = index + (apart[index, index + 1] < -apart[index, index])
-    vectors = (along / apart).T
-    return d[nearer] - apart[index, nearer], vectors / np.sqrt(np.einsum("ij,ij->j", vectors, vectors))
+    vectors = along / apart
+    vectors /= np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return d[nearer] - apart[index, nearer], vectors.T

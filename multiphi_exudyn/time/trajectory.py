@@ -198,7 +198,9 @@ class Trajectory(ModelHistories):
         start = self.start
         if start.state is not None:
             return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
-        strain = self.model.base.strain(start.displacement, start.penetrating, start.gaps)
+        base = self.model.base
+        gaps = base.gaps_at(start.displacement, start.gaps)
+        strain = base.strain(start.displacement, start.penetrating, gaps)
         return 0.5 * float(start.velocity.dot(start.velocity)) + strain
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
