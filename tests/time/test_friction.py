@@ -125,7 +125,7 @@ class TestBelt:
         assert_allclose(run.slip("belt", 12.0), run.at("m", 12.0) - 0.3 * 12.0, rtol=1e-14)
 
     def test_its_search_is_as_fine_as_its_doubts(self):
-        """A beam of twelve modes on a slow belt: samples of small remainders decide more than divisions of large ones."""
+        """A beam of twelve modes on a slow belt: samples of small remainders decide what divisions would."""
         structure = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
         model = mp.MultiPhiModel(structure, [mp.Friction("belt", "node1", 0.2, 0.3, velocity=0.002)], modes=12)
         bent = mp.MultiPhiModel(structure, modes=12).static_equilibrium({"node3": 1.0})
