@@ -25,7 +25,7 @@ __all__ = ["LOCAL", "NONE", "descent_in_block"]
 
 NONE = -1  # instead of the signal that falls
 WIDEST = 3  # doublings of an interval where all signals are far from zero
-ROOMY = 8.0  # of the remainder: above it at the end of an interval the next one may be wider
+ROOMY = 24.0  # of the remainder: above it at the end of an interval the next one may be wider
 DOUBTFUL, NO_ROOT, ROOM = 0, 1, 2  # what an interval leaves to a signal
 
 # Waves, in p: rows of the suspect, phi at the left and the right end of an interval, factors of phi over 1, 2, 4, ...
@@ -68,7 +68,7 @@ def descent_in_block(
         numbers[suspect + SAMPLES] += 1.0
         room = least_room(numbers, constants, noise, bounds, count, 0, count, values, width, place)
         if room == DOUBTFUL and wide > 0:
-            wide = 0
+            wide -= 1
             continue
         if room == DOUBTFUL:
             found = descent_in_interval(

@@ -27,7 +27,8 @@ Forced response, as forced_response.py has it, to p = Re( exp(mu t) sum_d p_d u^
     eta = Re( exp(mu t) sum_k x_k u^k )
 
 as the sum of equations of first order, z' = s z + exp(mu t) p(t), for every pole s; two poles that (nearly) coincide
-are one equation of second order.
+are one equation of second order. On the carrier mu = 0 only the real parts count, and of a pole and its conjugate one
+is solved: twice the real part of its response is that to both.
 """
 
 from __future__ import annotations
@@ -148,7 +149,7 @@ def forced_response(
             rows = force_mode(waves, square, delta, carrier, forces, degree, horizon, i, r, rows, most, scratch, result)
     for j in range(ints[basis + SIZE]):
         if ints[ints[response + POLES] + j] == 1:
-            for mirrored in range(2):
+            for mirrored in range(1 if waves[carrier] == 0 else 2):
                 rows = force_pole(
                     ints, waves, response, j, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
                 )
@@ -182,6 +183,7 @@ def force_mode(
     Poles -delta +- (delta^2 - omega^2)^(1/2), apart or together.
     """
     mu, difference, given = waves[carrier], delta * delta - square, scratch + most
+    both = mu == 0 and difference < 0.0
     root = math.sqrt(abs(difference))
     if 2 * root <= COINCIDING * math.sqrt(abs(square)):
         for d in range(degree + 1):
@@ -191,11 +193,14 @@ def force_mode(
     fast = complex(-delta - root, 0.0) if difference > 0.0 else complex(-delta, -root)
     ratio = square / (fast.real * fast.real + fast.imag * fast.imag)
     weight = complex(0.5 / root, 0.0) if difference > 0.0 else complex(0.0, -0.5 / root)
-    for sign in range(2):
+    for sign in range(1 if both else 2):
         pole = fast - mu if sign == 1 else complex(ratio * fast.real, -ratio * fast.imag) - mu
         for d in range(degree + 1):
-            waves[given + d] = weight * waves[forces + d * r + mode]
+            push = waves[forces + d * r + mode]
+            waves[given + d] = weight * (complex(2.0 * push.real, 0.0) if both else push)
         own = first_order(waves, pole.real, pole.imag, given, degree, horizon, most, scratch)
+        for k in range(min(own, most) if both else 0):
+            waves[scratch + k] = complex(waves[scratch + k].real, 0.0)
         rows = add_mode(waves, scratch, own, mode, r, rows, most, x)
         weight = -weight
     return rows
@@ -230,16 +235,21 @@ def force_pole(
 ) -> int:
     """Adds the response of one exponential of coupled modes, or of its conjugate, to x (rows, r): its rows then.
 
-    w' = (lambda - mu) w + B p / 2 along V, with conj(lambda), conj(B), conj(V) where ``mirrored`` is 1.
+    w' = (lambda - mu) w + B p / 2 along V, with conj(lambda), conj(B), conj(V) where ``mirrored`` is 1; of both where
+    mu = 0.
     """
     r, reached, given = ints[response + MODES], ints[response + REACHED] + 2 * j, scratch + most
     maps, shapes = ints[response + FROM_VELOCITY] + j * r, ints[response + SHAPES] + j * r
     pole, mu, sign = waves[ints[ints[response + FREE] + RATES] + j], waves[carrier], 1.0 - 2.0 * mirrored
+    both = mu == 0
     for d in range(degree + 1):
         push = 0j
         for i in range(ints[reached], ints[reached + 1]):
-            weight = waves[maps + i]
-            push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * waves[forces + d * r + i]
+            weight, force = waves[maps + i], waves[forces + d * r + i]
+            if both:
+                push += weight * force.real
+            else:
+                push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * force
         waves[given + d] = push
     distance = complex(pole.real, sign * pole.imag) - mu
     own = first_order(waves, distance.real, distance.imag, given, degree, horizon, most, scratch)
@@ -249,7 +259,8 @@ def force_pole(
     for k in range(own):
         for i in range(ints[reached], ints[reached + 1]):
             shape = waves[shapes + i]
-            waves[x + k * r + i] += waves[scratch + k] * complex(shape.real, sign * shape.imag)
+            moved = waves[scratch + k] * complex(shape.real, sign * shape.imag)
+            waves[x + k * r + i] += complex(moved.real, 0.0) if both else moved
     return rows
 
 

@@ -37,7 +37,7 @@ __all__ = [
 DERIVATIVES = 7  # g and its derivatives up to the sixth are bounded
 BOUNDING = 4  # in p: numbers that are worked in behind the bounds
 INTERVALS = 64  # in a block
-RESOLUTION = 0.02  # wanted remainder of a block's intervals, of the signal's typical size
+RESOLUTION = 0.004  # wanted remainder of a block's intervals, of the signal's typical size
 HERMITE = 1 / 384
 LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
 

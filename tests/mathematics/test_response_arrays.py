@@ -100,6 +100,8 @@ def test_it_is_so_for_any_modes_and_loads(seed):
     expected = particular(omega**2, damping, modal_response(omega**2, damping), rate, forces, horizon)
     rows, x = forced(omega**2, damping, rate, forces, horizon)
     assert rows == len(expected)
+    if rate == 0.0:  # of a force that does not turn the real part is all
+        x, expected = x.real, expected.real
     assert_allclose(x, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))
 
 

@@ -124,6 +124,15 @@ class TestBelt:
         assert len(set(run.slip("belt", t))) == 1
         assert_allclose(run.slip("belt", 12.0), run.at("m", 12.0) - 0.3 * 12.0, rtol=1e-14)
 
+    def test_its_search_is_as_fine_as_its_doubts(self):
+        """A beam of twelve modes on a slow belt: samples of small remainders decide what divisions would."""
+        structure = mp.planar_beam(rig_beam(), elements=20, damping=rig_damping())
+        model = mp.MultiPhiModel(structure, [mp.Friction("belt", "node1", 0.2, 0.3, velocity=0.002)], modes=12)
+        bent = mp.MultiPhiModel(structure, modes=12).static_equilibrium({"node3": 1.0})
+        run = quietly(model, 2.0, displacement=0.02 * bent / float(structure.row("node3") @ bent))
+        assert len(run.events) > 30
+        assert run.stats.function_evaluations < 70 * len(run.events)
+
     @pytest.mark.parametrize("stiffness", [math.inf, 200.0])
     def test_goes_on_where_another_run_has_ended(self, stiffness):
         model = belt(stiffness=stiffness)
