@@ -39,12 +39,24 @@ def test_equals_the_matrix_exponential(seed, r, ratio, t):
 def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
     squares, damping = chain(1, 12, ratio)
     monkeypatch.setattr(light_damping, "MOST_STEPS", 12)
+    monkeypatch.setattr(light_damping, "find_pairs", light_damping.light_pairs)
     response = modal_response(squares, damping)
     assert not response.diagonal
     assert np.array_equal(response.shapes.diagonal(), np.ones(12))
     left = squares[:, None] * response.shapes + damping @ response.shapes * response.basis.rates
     left += response.shapes * response.basis.rates**2
     assert np.max(np.abs(left)) < 1e-13 * np.max(squares)
+
+
+def test_the_plain_iteration_is_the_compiled_one(monkeypatch):
+    squares, damping = chain(3, 9, 1e-3)
+    compiled = lightly_damped(squares, damping)
+    monkeypatch.setattr(light_damping, "find_pairs", light_damping.light_pairs)
+    plain = lightly_damped(squares, damping)
+    for name in ("shapes", "from_displacement", "from_velocity", "from_force"):
+        own = getattr(plain, name)
+        assert_allclose(getattr(compiled, name), own, rtol=0, atol=1e-15 * np.max(np.abs(own)))
+    assert_allclose(compiled.basis.rates, plain.basis.rates, rtol=1e-15)
 
 
 def test_starts_are_their_own_to_round_off():
