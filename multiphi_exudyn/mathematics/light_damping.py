@@ -101,10 +101,8 @@ def light_pair(numbers: Numbers, waves: Waves, r: int, i: int, v: int) -> int:
         waves[r + j] = numbers[r + j * r + i]
     before, falls = 1.0, 0.0
     for _ in range(MOST_STEPS):
-        whole = waves[r + i]
-        square, step = numbers[i] - 0.25 * whole * whole, 0.0
-        root = math.sqrt(0.5 * (abs(square) + square.real))
-        rate = complex(-0.5 * square.imag / root, root) - 0.5 * whole
+        set_rate(numbers, waves, r, i)
+        rate, whole, step = waves[i], waves[r + i], 0.0
         for j in range(r):
             if j != i:
                 own = numbers[r + j * r + j]
@@ -115,17 +113,26 @@ def light_pair(numbers: Numbers, waves: Waves, r: int, i: int, v: int) -> int:
                 change = found - waves[v + j]
                 step += abs(change.real) + abs(change.imag)
                 waves[v + j] = found
-        falls = max(falls, step / before)
-        before = step
-        if step * falls <= LAST:
-            waves[i] = rate
-            return 1
         for j in range(r):
             damped = 0j
             for k in range(r):
                 damped += numbers[r + j * r + k] * waves[v + k]
             waves[r + j] = damped
+        falls = max(falls, step / before)
+        before = step
+        if step * falls <= LAST:
+            set_rate(numbers, waves, r, i)
+            return 1
     return 0
+
+
+@compiled
+def set_rate(numbers: Numbers, waves: Waves, r: int, i: int) -> None:
+    """lambda of pair i, of lambda^2 + lambda (D v)_i + omega_i^2 = 0 the root above the real axis."""
+    whole = waves[r + i]
+    left = numbers[i] - 0.25 * whole * whole
+    root = math.sqrt(0.5 * (abs(left) + left.real))
+    waves[i] = complex(-0.5 * left.imag / root, root) - 0.5 * whole
 
 
 find_pairs = entry(light_pairs)

@@ -71,6 +71,15 @@ def test_starts_are_their_own_to_round_off():
         assert_allclose((rows @ other).real, np.zeros((10, 10)), atol=1e-13 * np.max(squares) ** 0.5)
 
 
+def test_modes_far_apart_start_where_they_are_put():
+    """Their vectors are known after one step; a rate from before it would start 6e-11 beside."""
+    response = lightly_damped(np.array([6.9, 1.8e8]), np.array([[0.32, 0.12], [0.12, 0.22]]))
+    given = np.array([-0.75, 1.5e-8])
+    c = response.from_displacement @ given
+    assert_allclose((response.shapes @ c).real, given, rtol=1e-15, atol=1e-20)
+    assert_allclose((response.shapes @ (c * response.basis.rates)).real, 0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
 def test_units_of_time_change_nothing(scale):
     squares, damping = chain(3, 6, 1e-2)
