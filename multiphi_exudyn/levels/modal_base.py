@@ -69,7 +69,7 @@ class ModalBase(ElementTable, Shown):
         if self.complete:
             onto, round_off = self._projection
             y = onto.dot(x)
-            y[np.abs(y) <= round_off.dot(np.abs(x))] = 0.0
+            np.putmask(y, np.abs(y) <= round_off.dot(np.abs(x)), 0.0)
             return y
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))

@@ -6,9 +6,7 @@ A start that meets something on its way, a level that is not there yet, a full r
 from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
-    CHANNELS,
     COORDINATE_COUNT,
-    CURRENT,
     DECISIONS,
     DRIVE_NEXT,
     END_REACHED,
@@ -19,15 +17,12 @@ from multiphi_exudyn.events.arrays import (
     HORIZON,
     LARGEST_ENERGY,
     LEFT_OUT_COUNT,
-    LEVEL,
     MEAN_SQUARE,
-    MODES,
     NEED,
     OF_A_RUN,
     OK,
     PHASE_COUNT,
     PIECE,
-    PLACE,
     PRESCRIBED,
     SEGMENT_COUNT,
     SEGMENT_ROOM,
@@ -79,7 +74,7 @@ def carry_starts(
             set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], until)
             keep_drive(ints, waves)
         status = advance(ints, numbers, waves, end)
-        if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM] or is_finite(ints, numbers) == 0:
+        if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
             before = ENDS * k
             ints[SEGMENT_COUNT], ints[COORDINATE_COUNT] = ends[before], ends[before + 1]
             ints[PHASE_COUNT], ints[EVENT_COUNT] = ends[before + 2], ends[before + 3]
@@ -95,16 +90,6 @@ def carry_starts(
         ends[after], ends[after + 1], ends[after + 2] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT], ints[PHASE_COUNT]
         ends[after + 3], ends[after + 4] = ints[EVENT_COUNT], ints[LEFT_OUT_COUNT]
     return count
-
-
-@compiled
-def is_finite(ints: Ints, numbers: Numbers) -> int:
-    """1 where all coordinates of the present state are finite."""
-    x = ints[CURRENT + PLACE]
-    for i in range(ints[ints[CURRENT + LEVEL] + MODES] + ints[CHANNELS]):
-        if numbers[x + i] - numbers[x + i] != 0.0:
-            return 0
-    return 1
 
 
 @compiled

@@ -12,9 +12,7 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.loop_record import ACCUMULATED
 
-__all__ = ["NOT_FINITE", "failure"]
-
-NOT_FINITE = "the motion is not finite"
+__all__ = ["failure"]
 
 
 def failure(arrays: LevelArrays) -> NumericalFailure:
@@ -26,7 +24,7 @@ def failure(arrays: LevelArrays) -> NumericalFailure:
     complete = model.level_at(()).modes == model.base.modes.count
     window, allowed = limits(model)
     sentences = {
-        a.NOT_FINITE: NOT_FINITE,
+        a.NOT_FINITE: "the motion is not finite",
         a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
         f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
         "need fewer modes or a shorter run",

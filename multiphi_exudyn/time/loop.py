@@ -136,7 +136,20 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
             status = EVENT
         if status < 0 or (status == EVENT and ints[STOP_AT_EVENT] == 1):
             return status
+    if is_finite(ints, numbers) == 0:  # a growing mode that no exit watches
+        ints[CAUSE] = NOT_FINITE
+        return FAILED
     return END_REACHED
+
+
+@compiled
+def is_finite(ints: Ints, numbers: Numbers) -> int:
+    """1 where all coordinates of the present state are finite."""
+    x = ints[CURRENT + PLACE]
+    for i in range(ints[ints[CURRENT + LEVEL] + MODES] + ints[CHANNELS]):
+        if numbers[x + i] - numbers[x + i] != 0.0:
+            return 0
+    return 1
 
 
 @compiled

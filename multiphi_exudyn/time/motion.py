@@ -21,10 +21,9 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.state import Loss, State
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import entry
-from multiphi_exudyn.mathematics.round_off import all_finite
 from multiphi_exudyn.time.chatter import limits
 from multiphi_exudyn.time.ending import Ending
-from multiphi_exudyn.time.failures import NOT_FINITE, failure
+from multiphi_exudyn.time.failures import failure
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.recorded import Events, Recorded
@@ -145,8 +144,6 @@ class Motion:
             self._leave()
             if answer == a.FAILED:
                 raise self.failure()
-            if not all_finite(self._ending.displacement):
-                raise NumericalFailure(NOT_FINITE)  # a growing mode that no exit watches
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
             self.message = f"at t = {self.time:.9g} s: {singular}{error}"
