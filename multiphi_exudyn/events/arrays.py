@@ -190,7 +190,7 @@ class Buffers:
     """The three buffers, which grow by doubling; whatever is put in them stays where it is."""
 
     def __init__(self) -> None:
-        self.ints, self.numbers, self.waves = np.zeros(1024, np.int64), np.zeros(4096), np.zeros(1024, complex)
+        self.ints, self.numbers, self.waves = np.zeros(1024, np.int64), np.zeros(4096), np.zeros(4096, complex)
         self._used = {"ints": 0, "numbers": 0, "waves": 0}
 
     @property
@@ -245,4 +245,7 @@ class Batch:
         """Put all of them in the buffers."""
         for name, parts in self._parts.items():
             if parts:
-                self.buffers.put(name, np.concatenate(parts, axis=None))
+                start, end = self.buffers.used(name), self._ends[name]
+                self.buffers.take(name, end - start)
+                place = getattr(self.buffers, name)[start:end]
+                np.concatenate(parts, axis=None, out=place, casting="unsafe")  # an empty list is one of floats

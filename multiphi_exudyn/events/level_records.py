@@ -74,14 +74,14 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapping[complex, int]) -> None:
     """Give the record of a level the power of damping, of what varies and of friction, and their primitives."""
     damping, varying, rubbing, pairs = powers(level)
-    damping, friction = (damping + damping.T) / 2, np.append(rubbing, pairs)
+    damping, friction = (damping + damping.T) / 2, np.concatenate([rubbing, pairs], axis=None)
     given = {
         a.DISSIPATION: buffers.put("numbers", damping),
         a.POWER: buffers.put("numbers", varying),
-        a.RUBBING: buffers.put("numbers", friction) if np.any(friction) else -1,
+        a.RUBBING: buffers.put("numbers", friction) if friction.any() else -1,
         a.RUBBINGS: len(pairs),
         **_put_dissipated(buffers, None if len(pairs) else primitive(level.modal, damping)),
-        a.SWINGS: buffers.put("waves", swings(level, varying)),
+        a.SWINGS: buffers.put("waves", swings(level, varying)) if level.excitation.channels else -1,
         a.DRIVEN: -1,
     }
     if given[a.DISSIPATED] >= 0 and (forms := driven_forms(level, damping, varying, carriers)) is not None:

@@ -136,5 +136,6 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     In its place it would give a contact at rest, which no other mode moves, a speed. The modes' own round-off, larger
     where there are many, is not seen here.
     """
-    products = target.vectors.T @ source.vectors
-    return np.where(np.abs(products) <= UNMIXED, 0.0, products)
+    products: np.ndarray = target.vectors.T @ source.vectors
+    np.putmask(products, np.abs(products) <= UNMIXED, 0.0)
+    return products

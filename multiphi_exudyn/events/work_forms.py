@@ -65,7 +65,7 @@ def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
     sums = rates[:, None] + np.array([rates, rates.conj()])[:, None]
     if (np.abs(powers) > LARGEST_PRIMITIVE * lengths[:, None] * lengths * np.abs(sums)).any():
         return None
-    a, b = np.divide(powers, sums, out=np.zeros_like(powers), where=powers != 0)
+    a, b = np.divide(powers, sums, out=powers, where=powers != 0)
     z = np.hstack([response.from_displacement, response.from_velocity])
     return np.asarray(0.5 * (z.T @ (a @ z + b @ z.conj())).real)
 

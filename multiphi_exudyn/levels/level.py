@@ -178,6 +178,8 @@ class Level(Shown):
             return np.array([row @ self.static_response(row, gaps)[1] for row in vectors.T])
         free = vectors.T @ (self.base.compliance[:, None] * vectors)
         yielding = 1 / stiffness
+        if len(yielding) == 1:
+            return np.asarray(yielding * free[0] / (free[0] + yielding))
         return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
 
     @functools.cached_property

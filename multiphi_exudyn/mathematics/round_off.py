@@ -31,7 +31,7 @@ def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndar
     The gap of a contact that another one holds does not move; what is left of it has no sign.
     """
     kept = sums.copy()
-    kept[np.abs(sums) <= ZERO * sizes] = 0.0
+    np.putmask(kept, np.abs(sums) <= ZERO * sizes, 0.0)
     return kept
 
 

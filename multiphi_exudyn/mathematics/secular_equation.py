@@ -81,8 +81,8 @@ def _roots(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[
         if failed:
             return None
         np.multiply(below, above, out=apart[i])
-    index = np.arange(count)
-    nearer = index + (apart[index, index + 1] < -apart[index, index])
+    before, after = (apart.ravel()[i :: len(d) + 1][:count] for i in range(2))  # the neighbours'
+    values = np.where(after < -before, d[1 : count + 1] - after, d[:count] - before)
     vectors = along / apart
-    vectors /= np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return d[nearer] - apart[index, nearer], vectors.T
+    vectors *= 1 / np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return values, vectors.T
