@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.compiled import Numbers, Waves, compiled, entry
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 
-__all__ = ["lightly_damped"]
+__all__ = ["find_pairs", "lightly_damped"]
 
 LIGHT = 0.2  # of omega, and of a distance of two modes: more damping is not light
 SYMMETRIC = 1e-13  # of the largest damping: round-off of a symmetric matrix
