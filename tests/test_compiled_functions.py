@@ -454,7 +454,6 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
     assert names == [
         "advance",
         "integrate_works",
-        "light_pairs",
         "measure",
         "sample_rows",
         "sample_sizes",

@@ -90,11 +90,6 @@ class Entry:
         function.entry = self  # which keeps the machine code
         return functools.partial(function, *given)
 
-    @property
-    def is_compiled(self) -> bool:
-        """Whether it is compiled, where it can be; else it is the plain function."""
-        return self.native() is not self.function
-
     def native(self) -> Callable[..., Any]:
         """The function as ctypes calls it, made at the first call; the plain one without numba."""
         with _one_at_a_time:

@@ -21,7 +21,7 @@ import scipy.linalg
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import Chain, ModalResponse, uncoupled
-from multiphi_exudyn.mathematics.light_damping import find_pairs, lightly_damped
+from multiphi_exudyn.mathematics.light_damping import lightly_damped
 from multiphi_exudyn.mathematics.motion_parts import Parts, parts_of
 
 __all__ = ["modal_response"]
@@ -37,9 +37,7 @@ def modal_response(squares: np.ndarray, damping: np.ndarray, coupling: np.ndarra
     alone = coupling is None or not coupling.any()
     if alone and _uncoupled(damping):
         return uncoupled(squares, np.diagonal(damping))
-    found = (
-        lightly_damped(squares, damping) if alone and find_pairs.is_compiled else None
-    )  # else eigenvalues are faster
+    found = lightly_damped(squares, damping) if alone else None
     return found or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from multiphi_exudyn.mathematics import compiled, coupled_response, light_damping
+from multiphi_exudyn.mathematics import light_damping
 from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.light_damping import lightly_damped
 
@@ -39,34 +39,12 @@ def test_equals_the_matrix_exponential(seed, r, ratio, t):
 def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
     squares, damping = chain(1, 12, ratio)
     monkeypatch.setattr(light_damping, "MOST_STEPS", 12)
-    monkeypatch.setattr(light_damping, "find_pairs", light_damping.light_pairs)
     response = modal_response(squares, damping)
     assert not response.diagonal
     assert np.array_equal(response.shapes.diagonal(), np.ones(12))
     left = squares[:, None] * response.shapes + damping @ response.shapes * response.basis.rates
     left += response.shapes * response.basis.rates**2
     assert np.max(np.abs(left)) < 1e-13 * np.max(squares)
-
-
-def test_the_plain_iteration_is_the_compiled_one(monkeypatch):
-    squares, damping = chain(3, 9, 1e-3)
-    compiled = lightly_damped(squares, damping)
-    monkeypatch.setattr(light_damping, "find_pairs", light_damping.light_pairs)
-    plain = lightly_damped(squares, damping)
-    for name in ("shapes", "from_displacement", "from_velocity", "from_force"):
-        own = getattr(plain, name)
-        assert_allclose(getattr(compiled, name), own, rtol=0, atol=1e-15 * np.max(np.abs(own)))
-    assert_allclose(compiled.basis.rates, plain.basis.rates, rtol=1e-15)
-
-
-def test_without_numba_eigenvalues_are_taken_which_are_faster_than_plain_python(monkeypatch):
-    squares, damping = chain(3, 9, 1e-3)
-    start = np.random.default_rng(1).normal(size=(2, 9))
-    iterated = modal_response(squares, damping)
-    monkeypatch.setattr(compiled, "available", lambda: False)
-    monkeypatch.setattr(coupled_response, "find_pairs", compiled.Entry(light_damping.light_pairs))
-    monkeypatch.setattr(coupled_response, "lightly_damped", None)
-    assert_allclose(moved(modal_response(squares, damping), start, 2.0), moved(iterated, start, 2.0), atol=1e-12)
 
 
 def test_starts_are_their_own_to_round_off():
