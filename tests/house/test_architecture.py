@@ -110,6 +110,10 @@ def test_a_package_names_all_that_is_in_it(package):
     assert sorted(order(package)) == sorted(inside)
 
 
+def test_no_code_stands_beside_the_rooms():
+    assert [path.name for path in ROOT.glob("*.py")] == []
+
+
 def test_imports_go_to_earlier_rooms_and_files_only():
     assert {name: found for name, path in NAMES.items() if (found := breaches(name, tree(path)))} == {}
 
