@@ -207,7 +207,7 @@ class LevelArrays:
 
     def _supply_room(self) -> None:
         """Room for the powers that a response to a term has taken."""
-        self.scratch.reserve_powers(max(len(level.modal.response.basis.rates) for level in self.loaded.values()))
+        self.scratch.reserve_powers(max(len(level.response.basis.rates) for level in self.loaded.values()))
 
     def reserve_starts(self, count: int) -> None:
         """Room for so many starts, and the base in which they are; where there was less, none stands there any more."""
@@ -229,7 +229,7 @@ class LevelArrays:
 
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
-        n, free = modal.modes + int(self.ints[a.CHANNELS]), len(modal.response.basis.rates)
+        n, free = modal.modes + int(self.ints[a.CHANNELS]), len(level.response.basis.rates)
         kept = self._exits.of(level.states)
         self.scratch.reserve(n, free, int(np.count_nonzero(kept)))
         record = put_level(self.buffers, level, number, self._exits, kept)

@@ -17,7 +17,6 @@ from multiphi_exudyn.events.level_parts import base_parts, level_parts, powers
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.events.work_forms import DrivenForms, driven_forms, primitive, swings
-from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics import basis_arrays, response_arrays
 from multiphi_exudyn.mathematics.exponentials import Exponentials
@@ -48,13 +47,13 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     own, modal, parts = level.level, level.modal, level_parts(level)
     batch, firsts = Batch(buffers), exits.firsts(kept)
     put = batch.put
-    basis = _put_basis(batch, modal.response.basis)
+    basis = _put_basis(batch, level.response.basis)
     given = {
         a.NUMBER: number,
         a.MODES: modal.modes,
         a.STATES: put("ints", level.states),
-        a.RESPONSE: _put_response(batch, modal, basis),
-        a.FREE_SIZES: put("numbers", _free_sizes(modal)) if buffers.ints[a.PRESCRIBED] else -1,
+        a.RESPONSE: _put_response(batch, level, basis),
+        a.FREE_SIZES: put("numbers", _free_sizes(level)) if buffers.ints[a.PRESCRIBED] else -1,
         a.STRUCK_DEFECTS: put("numbers", struck_defects(level)) if buffers.ints[a.JUDGED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(batch, level, exits, kept),
@@ -80,7 +79,7 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapp
         a.POWER: buffers.put("numbers", varying),
         a.RUBBING: buffers.put("numbers", friction) if friction.any() else -1,
         a.RUBBINGS: len(pairs),
-        **_put_dissipated(buffers, None if len(pairs) else primitive(level.modal, damping)),
+        **_put_dissipated(buffers, None if len(pairs) else primitive(level, damping)),
         a.SWINGS: buffers.put("waves", swings(level, varying)) if level.excitation.channels else -1,
         a.DRIVEN: -1,
     }
@@ -127,7 +126,7 @@ def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
 
 def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
     """The records (e, 3) of signals (exits.signals_of)."""
-    n, r, shapes = level.width, level.modal.modes, level.modal.response.shapes
+    n, r, shapes = level.width, level.modal.modes, level.response.shapes
     waves, moves, records = table[:, :r] @ shapes, table[:, n:-1].any(axis=1), np.empty((len(table), 3), int)
     if moves.any():
         waves = np.hstack([waves, table[:, n : n + r] @ shapes])
@@ -150,22 +149,22 @@ def _frequencies(batch: Batch, omega: np.ndarray) -> dict[int, int]:
     return {a.FREQUENCIES: batch.put("numbers", omega), a.PERIODS: batch.put("numbers", periods)}
 
 
-def _put_response(batch: Batch, level: Level, basis: int) -> int:
+def _put_response(batch: Batch, level: LoadedLevel, basis: int) -> int:
     """The record of a level's response (response_arrays.py)."""
-    response, put = level.response, batch.put
+    response, modal, put = level.response, level.modal, batch.put
     maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
     reached = put("ints", response_arrays.reached_modes(maps))
     places = [put("waves", values) for values in maps]
-    places += [put("numbers", level.squares), put("numbers", level.damping.diagonal() / 2)]
+    places += [put("numbers", modal.squares), put("numbers", modal.damping.diagonal() / 2)]
     chains = [len(response.chains)]
     for chain in response.chains:
         parts = chain.mixing, chain.shapes.T, chain.pushes
         chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
     places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
-    return put("ints", [level.modes, basis, reached, *places])
+    return put("ints", [modal.modes, basis, reached, *places])
 
 
-def _free_sizes(level: Level) -> np.ndarray:
+def _free_sizes(level: LoadedLevel) -> np.ndarray:
     """|A|, |B|, |P| (3, p, r) of a level's response."""
     response = level.response
     return np.abs([response.from_displacement, response.from_velocity, response.from_force])

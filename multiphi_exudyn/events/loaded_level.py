@@ -8,6 +8,7 @@ In xi rows, maps between levels, events and energies are those of a level under 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,6 +20,7 @@ from multiphi_exudyn.events.channels import Channels
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.levels.level import Asymptotic, Level
 from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics.free_response import ModalResponse
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
@@ -78,7 +80,7 @@ class LoadedLevel(Shown):
     static: the level under its static loads alone, None where that is this one. own_states: numbers of its elements'
     states, None where they are what the closed contacts say. stored: strain energy [J] of links that keep a stretch and
     do not hold. entries: what is kept of this level and of the ways into it (exits.py, defects.py); of levels
-    that differ by their histories alone it is the same.
+    that differ by their histories alone it is the same. lasting: the longest time [s] that a motion in it takes.
     """
 
     level: Level
@@ -89,6 +91,7 @@ class LoadedLevel(Shown):
     static: LoadedLevel | None = None
     own_states: tuple[int, ...] | None = None
     stored: float = 0.0
+    lasting: float = math.inf
     entries: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def _facts(self) -> Iterator[tuple[str, str]]:
@@ -103,10 +106,11 @@ class LoadedLevel(Shown):
         load: np.ndarray,
         states: tuple[int, ...] | None = None,
         excitation: Excitation | None = None,
+        lasting: float = math.inf,
     ) -> LoadedLevel:
         """``level`` under a static load (m,) in base coordinates, its elements in these states.
 
-        excitation: of this load alone, None for one of its own.
+        excitation: of this load alone, None for one of its own. lasting: for motions of that time [s] at most.
         """
         rest = level.asymptotic(load)
         magnitudes, initial = level.base.magnitudes
@@ -115,7 +119,7 @@ class LoadedLevel(Shown):
             terms[level.following] *= FOLLOWING / ZERO
         gaps = drop_round_off(rest.gaps, terms)
         constant = excitation or Excitation.constant(load, len(gaps))
-        return cls(level, rest, gaps, constant, Channels.none(level), own_states=states)
+        return cls(level, rest, gaps, constant, Channels.none(level), own_states=states, lasting=lasting)
 
     def under(self, excitation: Excitation) -> LoadedLevel:
         """This one with the channels of an excitation; the last one is kept for other histories of these channels."""
@@ -155,6 +159,11 @@ class LoadedLevel(Shown):
     def modal(self) -> Level:
         """The level with its r modes, without channels."""
         return self.alone.level
+
+    @functools.cached_property
+    def response(self) -> ModalResponse:
+        """Closed form of the modes' motion."""
+        return self.alone.response if self.static else self.level.response_within(self.lasting)
 
     @functools.cached_property
     def states(self) -> tuple[int, ...]:

@@ -18,6 +18,7 @@ from multiphi_exudyn.events.state import State
 from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.signal_bounds import power_of_two_above
 
 __all__ = ["LoadedLevels"]
 
@@ -45,6 +46,7 @@ class LoadedLevels:
 
     A level goes by the states of all elements, a number each. alone: those under its static loads alone, with held
     places for channels, which outlast a run; these where nothing varies.
+    lasting: the longest time [s] that a motion takes.
     arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
     for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py).
     """
@@ -56,10 +58,12 @@ class LoadedLevels:
         time: float = 0.0,
         until: float = math.inf,
         alone: LoadedLevels | None = None,
+        lasting: float = math.inf,
     ) -> None:
         self.model = model
         self.excitation = excitation
         self.alone = alone or self
+        self.lasting = lasting
         self.set_out(time, until)
         self.arrays: Any = None
         self.held: Any = None
@@ -71,18 +75,22 @@ class LoadedLevels:
         return {**vars(self), "arrays": None, "held": None}
 
     @classmethod
-    def static(cls, model: MultiPhiModel, load: np.ndarray) -> LoadedLevels:
-        """Levels under a static ``load`` (m,) in base coordinates alone."""
-        return cls(model, Excitation.constant(load, len(model.links), model.held))
+    def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:
+        """Levels under a static ``load`` (m,) in base coordinates alone, for motions of a time [s] at most."""
+        return cls(model, Excitation.constant(load, len(model.links), model.held), lasting=lasting)
 
     @classmethod
-    def under(cls, model: MultiPhiModel, excitation: Excitation, time: float, end: float) -> LoadedLevels:
-        """Levels under an excitation, for motions from a time [s] to an end.
+    def under(
+        cls, model: MultiPhiModel, excitation: Excitation, time: float, end: float, lasting: float = math.inf
+    ) -> LoadedLevels:
+        """Levels under an excitation, for motions from a time [s] to an end, each of a time [s] at most.
 
-        Those under its static loads are kept by the model: the maps between them serve every run.
+        Those under its static loads are kept by the model: the maps between them serve every run. How long motions may
+        last counts where zero-frequency modes are damped, by powers of two.
         """
-        load = excitation.static
-        alone: LoadedLevels = model.loaded.get_or_build(load.tobytes(), lambda: cls.static(model, load))
+        load, longest = excitation.static, power_of_two_above(lasting) if _damps_free_modes(model) else math.inf
+        key = load.tobytes(), longest
+        alone: LoadedLevels = model.loaded.get_or_build(key, lambda: cls.static(model, load, longest))
         return cls(model, excitation, time, end, alone) if excitation.prescribed else alone
 
     def set_out(self, time: float, until: float) -> None:
@@ -143,8 +151,8 @@ class LoadedLevels:
     def _made(self, states: tuple[int, ...]) -> LoadedLevel:
         level = self.model.level_at(self.model.links_held(states))
         if self.model.general:
-            return LoadedLevel.of(level, self.load + self.model.push(states), states)
-        return LoadedLevel.of(level, self.load, states, self.excitation)
+            return LoadedLevel.of(level, self.load + self.model.push(states), states, lasting=self.lasting)
+        return LoadedLevel.of(level, self.load, states, self.excitation, self.lasting)
 
     def with_channels(self, state: State) -> State:
         """A state under the static loads alone as one of these levels, at the time at which they set out."""
@@ -181,3 +189,10 @@ class LoadedLevels:
         if target.states not in ways:
             ways[target.states] = Transition(source, target)
         return ways[target.states]
+
+
+def _damps_free_modes(model: MultiPhiModel) -> bool:
+    """Whether the structure, or an element, may damp zero-frequency modes."""
+    base = model.base
+    rigid = base.modes.rigid
+    return rigid > 0 and bool(np.any(base.damping[:rigid, :rigid]) or np.any(base.dampings))

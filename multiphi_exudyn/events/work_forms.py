@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.levels.level import Level
 
 __all__ = ["MOST_COEFFICIENTS", "DrivenForms", "driven_forms", "primitive", "swings"]
 
@@ -47,7 +46,7 @@ class DrivenForms:
     weights: np.ndarray
 
 
-def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
+def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
     """F (2 r, 2 r): y.F y grows by the work of damping in a free response; None where it has powers of time.
 
     damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, eta' = Re S z,
@@ -56,7 +55,7 @@ def primitive(level: Level, damping: np.ndarray) -> np.ndarray | None:
 
     and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
     """
-    response, r = level.response, level.modes
+    response, r = level.response, level.modal.modes
     if not response.basis.pure:
         return None
     rates, speeds = response.basis.rates, response.shapes * response.basis.rates
@@ -75,7 +74,7 @@ def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
 
     varying: the power of what varies (``powers``).
     """
-    response, r, n = level.modal.response, level.modal.modes, level.level.modes
+    response, r, n = level.response, level.modal.modes, level.level.modes
     speeds = response.shapes * response.basis.rates
     held, place, speed, change = (varying[:, k * n : k * n + r] for k in range(4))
     moved = place @ response.shapes + speed @ speeds + change @ (speeds * response.basis.rates)

@@ -28,7 +28,7 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
 from multiphi_exudyn.levels.static_response import Asymptotic, neutral_response, static_response
 from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.free_response import ModalResponse
+from multiphi_exudyn.mathematics.free_response import ModalResponse, is_slow
 from multiphi_exudyn.mathematics.modes import NEAR
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.arguments import real_array
@@ -195,8 +195,15 @@ class Level(Shown):
 
     @functools.cached_property
     def response(self) -> ModalResponse:
-        """Closed form of the level's motion."""
+        """Closed form of the level's motion, however long."""
         return modal_response(self.squares, self.damping_matrix, self.coupling)
+
+    def response_within(self, lasting: float) -> ModalResponse:
+        """Closed form of motions that last so long [s] at most: zero-frequency modes may be damped slowly beside it."""
+        rates = self.response.basis.rates
+        if self.squares.all() or not np.any((rates != 0) & is_slow(rates, lasting)):
+            return self.response
+        return modal_response(self.squares, self.damping_matrix, self.coupling, lasting)
 
     def apart(self, modes: int) -> int | None:
         """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""

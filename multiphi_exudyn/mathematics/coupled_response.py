@@ -8,11 +8,16 @@ eta_f' is part of z, and eta_f its integral. Those that are not, a, are moved by
 
     eta_a'' = R y + p_a,   eta_a = R T^-2 y + a + b t + p_a t^2 / 2
 
-p is constant on zero-frequency modes, and zero on the others.
+p is constant on zero-frequency modes, and zero on the others. With B the columns of W for eta', it brings the parts to
+y = -T^-1 B p, at which the damped ones of these modes drift.
+
+Of a part y' = lambda y that is slow beside the time that a motion lasts at most, the integral y / lambda would be a
+large term with small differences: q' = y stays a motion of its own, in powers of time.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -20,25 +25,28 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.exponentials import Exponentials
-from multiphi_exudyn.mathematics.free_response import Chain, ModalResponse, uncoupled
+from multiphi_exudyn.mathematics.free_response import SLOW_POWERS, Chain, ModalResponse, is_slow, uncoupled
 from multiphi_exudyn.mathematics.light_damping import lightly_damped
-from multiphi_exudyn.mathematics.motion_parts import Parts, parts_of
+from multiphi_exudyn.mathematics.motion_parts import Parts, matrix_powers, parts_of
 
 __all__ = ["modal_response"]
 
 DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 
 
-def modal_response(squares: np.ndarray, damping: np.ndarray, coupling: np.ndarray | None = None) -> ModalResponse:
+def modal_response(
+    squares: np.ndarray, damping: np.ndarray, coupling: np.ndarray | None = None, lasting: float = math.inf
+) -> ModalResponse:
     """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, damping D [1/s] and S - diag(omega^2) (r, r).
 
-    Raises NumericalFailure where the rates are not told apart by more than round-off.
+    lasting: for motions of that time [s] at most. Raises NumericalFailure where the rates are not told apart by more
+    than round-off.
     """
     alone = coupling is None or not coupling.any()
     if alone and _uncoupled(damping):
-        return uncoupled(squares, np.diagonal(damping))
+        return uncoupled(squares, np.diagonal(damping), lasting)
     found = lightly_damped(squares, damping) if alone else None
-    return found or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping)
+    return found or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping, lasting)
 
 
 def _uncoupled(damping: np.ndarray) -> bool:
@@ -52,7 +60,7 @@ def _uncoupled(damping: np.ndarray) -> bool:
     return bool((beside <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
 
 
-def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> ModalResponse:
+def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, lasting: float) -> ModalResponse:
     own = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
     elastic = own[squares[own] != 0]
     scale = np.sqrt(np.abs(squares[elastic]))
@@ -65,13 +73,73 @@ def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) ->
     shapes[elastic], speeds[own] = parts.vectors[:e] / scale[:, None], parts.vectors[e:]
     maps[0][:, elastic], maps[1][:, own] = parts.inverse[:, :e] * scale, parts.inverse[:, e:]
     free, alone = own[squares[own] == 0], np.setdiff1d(np.arange(r), own)
+    driven = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
+    slow = _slow(parts, speeds[free], driven, lasting)
+    if not slow.any():
+        return _of_parts(parts, shapes, speeds, maps, driven, stiffness, damping, free, alone)
+    given, fast = (shapes[:, slow], speeds[:, slow], maps[:, slow]), ~slow
+    still = np.zeros((len(alone), int(fast.sum())))
+    others = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], still
+    return _joined(_of_parts(*others, stiffness, damping, free, alone), _slow_motion(parts.rates[slow], *given, free))
+
+
+def _of_parts(
+    parts: Parts,
+    shapes: np.ndarray,
+    speeds: np.ndarray,
+    maps: np.ndarray,
+    driven: np.ndarray,
+    stiffness: np.ndarray,
+    damping: np.ndarray,
+    free: np.ndarray,
+    alone: np.ndarray,
+) -> ModalResponse:
+    """What moves by the parts, and what the zero-frequency modes have beside; shapes (r, k) of elastic modes so far."""
     if len(free):
         shapes[free] = _integrated(speeds[free], parts)
-    driven = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
     if np.any(driven):
         shapes[alone] = _integrated(_integrated(driven, parts), parts)
     response = _joined(_moving(parts, shapes, maps), _following(parts, shapes, maps, free, alone))
-    return _with_drift(response, stiffness, damping, free, alone) if len(free) else response
+    if not len(free):
+        return response
+    return _with_drift(response, parts, shapes, speeds, maps, stiffness, damping, free, alone)
+
+
+def _slow(parts: Parts, speeds: np.ndarray, driven: np.ndarray, lasting: float) -> np.ndarray:
+    """Which components (k,) are slow; none where none moves damped zero-frequency modes, by the speeds (f, k).
+
+    driven: accelerations (a, k) of modes that others drive; where there are any, all is integrated as it is.
+    """
+    found = np.zeros(len(parts.rates), bool)
+    if not np.any(driven) and np.any(speeds):
+        for first, end in parts.groups:
+            found[first] = end - first == 1 and bool(is_slow(parts.rates[first], lasting))
+    return found
+
+
+def _slow_motion(
+    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray
+) -> ModalResponse:
+    """What moves by slow parts (s,): of each q' = y, y' = lambda y + p, p' = 0, by powers of time.
+
+    shapes, speeds (r, s): V of elastic modes, and eta'. maps (2, s, r): y(0) from eta and eta', and p as from eta'.
+    """
+    count, r, powers = len(rates), len(shapes), SLOW_POWERS + 1
+    found, moving = np.zeros((3, count, 2, powers, r), complex), np.zeros((r, count, 2), complex)
+    moving[free, :, 0], moving[:, :, 1] = speeds[free], shapes
+    chains = list[Chain]()
+    for k in range(count):
+        mixing = np.array([[0.0, 1.0, 0.0], [0.0, rates[k], 1.0], [0.0, 0.0, 0.0]])
+        raised = matrix_powers(mixing, powers)[:, :2]
+        found[:2, k] = np.einsum("di,mr->midr", raised[:, :, 1], maps[:, k])
+        found[2, k][:, :, free] = np.einsum("di,r->idr", raised[:, :, 2], maps[1, k, free])
+        chains.append(Chain(mixing[:2, :2], moving[:, k], np.vstack([np.zeros(r), maps[1, k]])))
+    p = 2 * powers * count
+    basis = Exponentials(np.zeros(p, complex), np.tile(np.arange(powers), 2 * count))
+    own = found.reshape(3, p, r)
+    columns = np.repeat(moving.reshape(r, 2 * count), powers, axis=1)
+    still = np.zeros(r, bool), np.zeros(p, bool)
+    return ModalResponse(basis, columns, own[0], own[1], own[2], False, *still, tuple(chains))
 
 
 def _integrated(rows: np.ndarray, parts: Parts) -> np.ndarray:
@@ -166,25 +234,28 @@ def _joined(one: ModalResponse, other: ModalResponse) -> ModalResponse:
 
 
 def _with_drift(
-    response: ModalResponse, stiffness: np.ndarray, damping: np.ndarray, free: np.ndarray, alone: np.ndarray
+    response: ModalResponse,
+    parts: Parts,
+    shapes: np.ndarray,
+    speeds: np.ndarray,
+    maps: np.ndarray,
+    stiffness: np.ndarray,
+    damping: np.ndarray,
+    free: np.ndarray,
+    alone: np.ndarray,
 ) -> ModalResponse:
-    """Adds the motion u + w t of damped zero-frequency modes under a constant force: S u + D w = p."""
+    """Adds the motion u + w t of damped zero-frequency modes under a constant force, as far as it moves the parts."""
     r, count = len(stiffness), len(free)
-    moving = np.setdiff1d(np.arange(r), alone)
-    unknowns, given = stiffness.copy(), np.eye(r)[:, free]
-    unknowns[:, free] = damping[:, free]
-    solution = np.zeros((r, count))
-    solution[moving] = np.linalg.solve(unknowns[np.ix_(moving, moving)], given[moving])
-    drift = np.zeros_like(solution)
-    drift[free] = solution[free]
-    offset = solution - drift
+    steady = -scipy.linalg.solve_triangular(parts.mixing, maps[1][:, free])  # y of the parts, at rest under a force
+    offset, moving, drift = (shapes @ steady).real, (speeds @ steady).real, np.zeros((r, count))
+    drift[free], offset[free], offset[alone] = moving[free], 0.0, 0.0
     powers = np.tile([0, 0, 1], count)  # u, then w t with its derivative w
     basis = Exponentials(np.zeros(3 * count, complex), powers)
     added = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count).astype(complex)
     maps = np.zeros((3, 3 * count, r), complex)
     maps[2][::3, free] = maps[2][2::3, free] = np.eye(count)
     forced = response.from_force.copy()
-    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ drift
+    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ moving
     carried = -(stiffness[alone] @ offset + damping[alone] @ drift)  # what that does to the modes that others move
     forced[:, free] += response.from_force[:, alone] @ carried
     still = np.zeros(r, bool), np.zeros(3 * count, bool)

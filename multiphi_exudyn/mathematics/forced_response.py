@@ -15,8 +15,9 @@ and near to it, at resonance included, that of the motion from rest, a Taylor se
 
     w_k+1 = T ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
 
-Two poles that (nearly) coincide, of a critically damped or a rigid-body mode, are solved as one equation of second
-order in the same two ways. Nothing grows beyond the load's own size, whatever the distance from a pole.
+Two poles that (nearly) coincide, of a critically damped mode or a rigid-body mode of slow damping or none, are solved
+as one equation of second order in the same two ways. Nothing grows beyond the load's own size, whatever the distance
+from a pole.
 """
 
 from __future__ import annotations
@@ -24,13 +25,16 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.mathematics.free_response import ModalResponse
+from multiphi_exudyn.mathematics.round_off import SLOW
 
 __all__ = ["particular"]
 
 TAYLOR = 1e-18  # of a Taylor series: terms below it are left out
 NEAREST_FAR = 0.5  # |s - mu| T from which the finite polynomial is taken for a constant p,
 PER_DEGREE = 0.5  # and more for each degree of p: D! / (|s - mu| T)^D is what the finite polynomial loses
-COINCIDING = 2e-2  # of |s|: poles closer than this are solved together
+COINCIDING = (
+    2e-2  # of |s|: poles closer than this are solved together; with a pole zero, closer than SLOW of 1 / T or mu
+)
 
 
 def particular(
@@ -79,7 +83,8 @@ def _chained(mixing: np.ndarray, forces: np.ndarray, rate: complex, horizon: flo
 def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float) -> np.ndarray:
     """x (K + 1, r) of modes with poles -delta +- sqrt(delta^2 - omega^2)."""
     root = np.sqrt((delta**2 - squares).astype(complex))
-    together = 2 * np.abs(root) <= COINCIDING * np.sqrt(np.abs(squares))
+    near = np.where(squares == 0, SLOW * max(1 / horizon, abs(rate)), COINCIDING * np.sqrt(np.abs(squares)))
+    together = 2 * np.abs(root) <= near
     both = _second_order(squares[together], delta[together], rate, forces[:, together], horizon)
     apart = ~together
     fast = -(delta[apart] + root[apart])

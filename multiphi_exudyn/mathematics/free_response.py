@@ -4,23 +4,27 @@
     eta(t) = Re sum_j V_j c_j t^d_j exp(lambda_j t),   c = A eta(0) + B eta'(0) + P p
 
 omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: then each mode has its own closed
-form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). Modes that are coupled
-are in coupled_response.py. Constant forces on modes of non-zero frequency belong to the asymptotic configuration, not
-here.
+form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). A zero-frequency mode
+whose damping is slow beside the time that its motion lasts moves by powers of time: exponentials would be large terms,
+of eta' / D and p / D^2, with small differences. Modes that are coupled are in coupled_response.py. Constant forces on
+modes of non-zero frequency belong to the asymptotic configuration, not here.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.mathematics.round_off import SLOW
 
-__all__ = ["Chain", "ModalResponse", "uncoupled"]
+__all__ = ["SLOW_POWERS", "Chain", "ModalResponse", "is_slow", "uncoupled"]
 
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
+SLOW_POWERS = 10  # of time, for what is slow: the next one is below round-off, in accelerations under a force too
 
 
 @dataclass(frozen=True)
@@ -88,9 +92,17 @@ class ModalResponse:
         return np.stack([both.real, -both.imag], axis=2).reshape(both.shape[0], 2 * both.shape[1])
 
 
-def uncoupled(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
-    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s]."""
-    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2)]
+def is_slow(rates: np.ndarray | complex, lasting: float) -> np.ndarray:
+    """Which rates [1/s] are slow beside the time [s] that a motion lasts at most; zero alone where that is infinite."""
+    return np.asarray(np.abs(rates) <= SLOW / lasting)
+
+
+def uncoupled(squares: np.ndarray, damping: np.ndarray, lasting: float = math.inf) -> ModalResponse:
+    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
+
+    lasting: for motions of that time [s] at most.
+    """
+    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2, lasting)]
     p, r = len(terms), len(squares)
     shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
     for j, (k, _, _, weights) in enumerate(terms):
@@ -104,10 +116,10 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray) -> ModalResponse:
 Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
 
 
-def _mode_terms(k: int, square: float, delta: float) -> list[Term]:
+def _mode_terms(k: int, square: float, delta: float, lasting: float) -> list[Term]:
     """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
     if square == 0.0:
-        return _free_terms(k, delta)
+        return _free_terms(k, delta, lasting)
     if square < 0:
         return _growing_terms(k, square, delta)
     omega = np.sqrt(square)
@@ -138,11 +150,17 @@ def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
     ]
 
 
-def _free_terms(k: int, delta: float) -> list[Term]:
-    """Terms of eta'' + 2 delta eta' = p."""
+def _free_terms(k: int, delta: float, lasting: float) -> list[Term]:
+    """Terms of eta'' + 2 delta eta' = p.
+
+    Slow: eta(0) + sum_n t^n / n! ((-2 delta)^(n - 1) eta'(0) + (-2 delta)^(n - 2) p).
+    """
+    rate, first = 2 * delta, [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0))]
     if delta == 0.0:
-        return [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0)), (k, 0.0, 2, (0.0, 0.0, 0.5))]
-    rate = 2 * delta
+        return [*first, (k, 0.0, 2, (0.0, 0.0, 0.5))]
+    if is_slow(rate, lasting):
+        weights = [(-rate) ** n / math.factorial(n + 2) for n in range(SLOW_POWERS - 1)]
+        return [*first, *((k, 0.0, n + 2, (0.0, -rate * weight, weight)) for n, weight in enumerate(weights))]
     return [
         (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),
         (k, 0.0, 1, (0.0, 0.0, 1 / rate)),

@@ -43,6 +43,7 @@ from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate,
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.forced_orders import clear_rows, first_order, is_forced, second_order
 from multiphi_exudyn.mathematics.forced_response import COINCIDING
+from multiphi_exudyn.mathematics.round_off import SLOW
 
 __all__ = [
     "CHAINS",
@@ -184,8 +185,10 @@ def force_mode(
     """
     mu, difference, given = waves[carrier], delta * delta - square, scratch + most
     both = mu == 0 and difference < 0.0
-    root = math.sqrt(abs(difference))
-    if 2 * root <= COINCIDING * math.sqrt(abs(square)):
+    root, near = math.sqrt(abs(difference)), COINCIDING * math.sqrt(abs(square))
+    if square == 0.0:
+        near = SLOW * max(1.0 / horizon, math.hypot(mu.real, mu.imag))
+    if 2 * root <= near:
         for d in range(degree + 1):
             waves[given + d] = waves[forces + d * r + mode]
         own = second_order(waves, square, delta, mu.real, mu.imag, given, degree, horizon, most, scratch)

@@ -11,11 +11,22 @@ import math
 
 import numpy as np
 
-__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
+__all__ = [
+    "BALANCED",
+    "CLEAR",
+    "DEFECTIVE",
+    "SLOW",
+    "WORST_CONDITION",
+    "ZERO",
+    "all_finite",
+    "drop_round_off",
+    "sign_of",
+]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors from which on those near each other are one cluster; at a double root 1e8
 WORST_CONDITION = 1e7  # of eigenvectors of which no clusters are found; times round-off it is the motion's error
+SLOW = 0.1  # of 1 / |lambda|: a motion no longer than that is a few powers of time, without 1 / lambda in them
 BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of their directions and of modes
 CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
 

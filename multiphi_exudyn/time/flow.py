@@ -33,7 +33,7 @@ class Flow:
     @classmethod
     def of(cls, level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
         """The motion from xi, xi' under a drive, good for [0, horizon], a power of two."""
-        response, steady = level.modal.response, level.asymptotic.drive if level.driven else None
+        response, steady = level.response, level.asymptotic.drive if level.driven else None
         blocks = [_forced(level, rate, terms, horizon) for rate, terms in drive.terms]
         for (rate, _), block in zip(drive.terms, blocks, strict=True):
             xi, xi_t = xi - block[0].real, xi_t - differentiated(rate, block, horizon)[0].real
@@ -61,7 +61,7 @@ def _forced(level: LoadedLevel, rate: complex, terms: np.ndarray, horizon: float
     forces = given @ channels.force.T
     if np.any(channels.force_rate):
         forces = forces + differentiated(rate, given, horizon) @ channels.force_rate.T
-    x = particular(own.squares, own.damping, own.response, rate, forces, horizon)
+    x = particular(own.squares, own.damping, level.response, rate, forces, horizon)
     block = np.zeros((max(len(x), len(given)), own.modes + given.shape[1]), complex)
     block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
     return block

@@ -100,7 +100,7 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``; in closed form at once where no channel is a function of time."""
         if level.excitation.prescribed:
             return super()._integral(level, row, places, starts, ends)
-        response, r, n = level.modal.response, level.modal.modes, level.width
+        response, r, n = level.response, level.modal.modes, level.width
         x, v = self.states(places, starts - self.starts[places])[:, :, :n]
         c = x[:, :r] @ response.from_displacement.T + v[:, :r] @ response.from_velocity.T
         if level.driven:

@@ -240,7 +240,8 @@ class Run:
         time = 0.0 if before is None or self.rewound else before.t_end
 
         def made() -> LoadedLevels:
-            return LoadedLevels.under(model, Excitation.of(model, self.loads, self.t_end, finer), time, self.t_end)
+            excitation = Excitation.of(model, self.loads, self.t_end, finer)
+            return LoadedLevels.under(model, excitation, time, self.t_end, lasting=self.t_end)
 
         if self.shared is not None:
             return self.shared.levels((id(model), finer), made)

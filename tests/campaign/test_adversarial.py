@@ -84,6 +84,9 @@ FOUND = {
     "a contact that hardly holds a body": Recipe(
         1085108, "free dense", 6, "modal", 4, "mixed", "mixed", "mixed", "all", "static", "point"
     ),
+    "a free body that a dashpot hardly slows down": Recipe(
+        1162984, "free chain", 7, "dashpot", 4, "mixed", "preload", "mixed", "all", "striking", "none"
+    ),
     "a load that a stop carries without any motion": Recipe(
         16004, "free dense", 3, "heavy", 4, "rigid", "zero", "mixed", "few", "static", "point"
     ),

@@ -173,3 +173,13 @@ def distance_in_buffers(rows, least, sizes, run=fast):
     if answer == complementarity.UNDECIDED:
         raise NumericalFailure("least distance: round-off decides which inequalities push")
     return x, p
+
+
+def in_buffers(response, squares, damping, rate, forces, horizon):
+    """``particular`` by the functions of the loop: x (K + 1, r)."""
+    buffers, (degree, r), most = Buffers(), (len(forces) - 1, len(squares)), 200
+    record = buffers.put_response(response, squares, damping)
+    carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
+    scratch, result = buffers.put_waves(np.zeros(8 * most)), buffers.put_waves(np.zeros(most * r))
+    rows = response_arrays.forced_response(*buffers.all, record, carrier, given, degree, horizon, most, scratch, result)
+    return buffers.waves[result : result + rows * r].reshape(rows, r)

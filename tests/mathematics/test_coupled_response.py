@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from buffer_records import Buffers
+from buffer_records import in_buffers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -11,7 +11,6 @@ from scipy.linalg import expm
 from multiphi_exudyn.mathematics.coupled_response import modal_response
 from multiphi_exudyn.mathematics.forced_response import particular
 from multiphi_exudyn.mathematics.motion_parts import parts_of
-from multiphi_exudyn.mathematics.response_arrays import forced_response
 
 
 def exactly(squares, damping, coupling, start, force, t, rate=0.0):
@@ -118,7 +117,7 @@ class TestForced:
             given = (t / horizon) ** np.arange(2) @ forces
             size = np.max(np.abs(powers @ np.abs(acceleration))) + 1
             assert_allclose(powers @ left, given, rtol=0, atol=1e-11 * size)
-        found = flat(response, squares, damping, rate, forces, horizon)
+        found = in_buffers(response, squares, damping, rate, forces, horizon)
         if rate == 0.0:  # of a force that does not turn the real part is all
             found, x = found.real, x.real
         assert_allclose(found, x, rtol=0, atol=1e-10 * np.max(np.abs(x)))
@@ -138,16 +137,6 @@ class TestForced:
         system[2:4, 4], system[4, 5], system[5, 4] = [1.0, 0.5], -0.7, 0.7
         exact = (expm(system * t) @ np.concatenate([*start, [1.0, 0.0]]))[:2]
         assert_allclose(found, exact, rtol=0, atol=1e-12)
-
-
-def flat(response, squares, damping, rate, forces, horizon):
-    """The same by the functions of the loop."""
-    buffers, (degree, r), most = Buffers(), (len(forces) - 1, len(squares)), 200
-    record = buffers.put_response(response, squares, damping)
-    carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
-    scratch, result = buffers.put_waves(np.zeros(8 * most)), buffers.put_waves(np.zeros(most * r))
-    rows = forced_response(*buffers.all, record, carrier, given, degree, horizon, most, scratch, result)
-    return buffers.waves[result : result + rows * r].reshape(rows, r)
 
 
 def test_parts_give_back_their_matrix():

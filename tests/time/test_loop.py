@@ -208,7 +208,7 @@ class TestBedOfStops:
 
 def rules_of(model):
     """What a model keeps of its runs without loads."""
-    return model.loaded.find(np.zeros(model.base.modes.count).tobytes())
+    return model.loaded.find((np.zeros(model.base.modes.count).tobytes(), math.inf))
 
 
 def test_runs_of_one_model_may_take_turns():
