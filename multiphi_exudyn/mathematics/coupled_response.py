@@ -25,9 +25,9 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.exponentials import Exponentials
-from multiphi_exudyn.mathematics.free_response import SLOW_POWERS, Chain, ModalResponse, is_slow, uncoupled
+from multiphi_exudyn.mathematics.free_response import Chain, ModalResponse, is_slow, slow_powers, uncoupled
 from multiphi_exudyn.mathematics.light_damping import lightly_damped
-from multiphi_exudyn.mathematics.motion_parts import Parts, matrix_powers, parts_of
+from multiphi_exudyn.mathematics.motion_parts import Parts, parts_of
 
 __all__ = ["modal_response"]
 
@@ -80,7 +80,8 @@ def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, la
     given, fast = (shapes[:, slow], speeds[:, slow], maps[:, slow]), ~slow
     still = np.zeros((len(alone), int(fast.sum())))
     others = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], still
-    return _joined(_of_parts(*others, stiffness, damping, free, alone), _slow_motion(parts.rates[slow], *given, free))
+    beside = _slow_motion(parts.rates[slow], *given, free, lasting)
+    return _joined(_of_parts(*others, stiffness, damping, free, alone), beside)
 
 
 def _of_parts(
@@ -118,28 +119,29 @@ def _slow(parts: Parts, speeds: np.ndarray, driven: np.ndarray, lasting: float) 
 
 
 def _slow_motion(
-    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray
+    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray, lasting: float
 ) -> ModalResponse:
-    """What moves by slow parts (s,): of each q' = y, y' = lambda y + p, p' = 0, by powers of time.
+    """What moves by slow parts (s,): V y, on zero-frequency modes X q, q' = y, y' = lambda y + p; by powers of time.
 
-    shapes, speeds (r, s): V of elastic modes, and eta'. maps (2, s, r): y(0) from eta and eta', and p as from eta'.
+    q = y(0) t + ..., y = y(0) + ... and what follows is a exp(lambda t) integrated twice and once, a = lambda y(0) + p.
+    shapes, speeds (r, s): V of elastic modes, and eta', X of the others. maps (2, s, r): y(0) from eta and eta'.
     """
-    count, r, powers = len(rates), len(shapes), SLOW_POWERS + 1
-    found, moving = np.zeros((3, count, 2, powers, r), complex), np.zeros((r, count, 2), complex)
-    moving[free, :, 0], moving[:, :, 1] = speeds[free], shapes
-    chains = list[Chain]()
-    for k in range(count):
-        mixing = np.array([[0.0, 1.0, 0.0], [0.0, rates[k], 1.0], [0.0, 0.0, 0.0]])
-        raised = matrix_powers(mixing, powers)[:, :2]
-        found[:2, k] = np.einsum("di,mr->midr", raised[:, :, 1], maps[:, k])
-        found[2, k][:, :, free] = np.einsum("di,r->idr", raised[:, :, 2], maps[1, k, free])
-        chains.append(Chain(mixing[:2, :2], moving[:, k], np.vstack([np.zeros(r), maps[1, k]])))
-    p = 2 * powers * count
-    basis = Exponentials(np.zeros(p, complex), np.tile(np.arange(powers), 2 * count))
-    own = found.reshape(3, p, r)
-    columns = np.repeat(moving.reshape(r, 2 * count), powers, axis=1)
-    still = np.zeros(r, bool), np.zeros(p, bool)
-    return ModalResponse(basis, columns, own[0], own[1], own[2], False, *still, tuple(chains))
+    r, powers, columns, rows, chains = len(shapes), list[int](), list[np.ndarray](), list[np.ndarray](), list[Chain]()
+    for k, rate in enumerate(rates.tolist()):
+        drawn, weights = np.zeros(r, complex), slow_powers(rate, lasting)
+        drawn[free] = speeds[free, k]
+        start = np.stack([maps[0, k], maps[1, k], np.zeros(r)])
+        pushed = rate * start
+        pushed[2, free] = maps[1, k, free]
+        powers += 2 * [*range(len(weights) + 2)]
+        columns += [drawn] * (len(weights) + 2) + [shapes[:, k]] * (len(weights) + 2)
+        rows += [0 * start, start, *(weight * pushed for weight in weights)]
+        rows += [start, pushed, *(weight * rate * pushed for weight in weights)]
+        mixing = np.array([[0.0, 1.0], [0.0, rate]])
+        chains.append(Chain(mixing, np.column_stack([drawn, shapes[:, k]]), np.stack([np.zeros(r), maps[1, k]])))
+    found, still = np.stack(rows, axis=1), (np.zeros(r, bool), np.zeros(len(powers), bool))
+    basis = Exponentials(np.zeros(len(powers), complex), np.array(powers))
+    return ModalResponse(basis, np.column_stack(columns), found[0], found[1], found[2], False, *still, tuple(chains))
 
 
 def _integrated(rows: np.ndarray, parts: Parts) -> np.ndarray:

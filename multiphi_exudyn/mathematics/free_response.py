@@ -21,10 +21,10 @@ import numpy as np
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.round_off import SLOW
 
-__all__ = ["SLOW_POWERS", "Chain", "ModalResponse", "is_slow", "uncoupled"]
+__all__ = ["Chain", "ModalResponse", "is_slow", "slow_powers", "uncoupled"]
 
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
-SLOW_POWERS = 10  # of time, for what is slow: the next one is below round-off, in accelerations under a force too
+LAST_POWER = 1e-17  # of the first: a power of time, in the speed of what is slow, that is left out
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,16 @@ def is_slow(rates: np.ndarray | complex, lasting: float) -> np.ndarray:
     return np.asarray(np.abs(rates) <= SLOW / lasting)
 
 
+def slow_powers(rate: complex, lasting: float) -> list[complex]:
+    """rate^n / (n + 2)!, n = 0, 1, ..., of a slow rate: exp(rate t) integrated twice is t^2 sum_n t^n of these."""
+    found, size = [0.5 + 0j], abs(rate) * lasting
+    speed = size / 2  # of the next power, in units of the first
+    while speed > LAST_POWER:
+        found.append(found[-1] * rate / (len(found) + 2))
+        speed *= size / (len(found) + 1)
+    return found
+
+
 def uncoupled(squares: np.ndarray, damping: np.ndarray, lasting: float = math.inf) -> ModalResponse:
     """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
 
@@ -151,16 +161,13 @@ def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
 
 
 def _free_terms(k: int, delta: float, lasting: float) -> list[Term]:
-    """Terms of eta'' + 2 delta eta' = p.
-
-    Slow: eta(0) + sum_n t^n / n! ((-2 delta)^(n - 1) eta'(0) + (-2 delta)^(n - 2) p).
-    """
+    """Terms of eta'' + 2 delta eta' = p; of what is slow p - 2 delta eta'(0) with its decay is integrated twice."""
     rate, first = 2 * delta, [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0))]
     if delta == 0.0:
         return [*first, (k, 0.0, 2, (0.0, 0.0, 0.5))]
     if is_slow(rate, lasting):
-        weights = [(-rate) ** n / math.factorial(n + 2) for n in range(SLOW_POWERS - 1)]
-        return [*first, *((k, 0.0, n + 2, (0.0, -rate * weight, weight)) for n, weight in enumerate(weights))]
+        further = enumerate(slow_powers(-rate, lasting), start=2)
+        return [*first, *((k, 0.0, n, (0.0, -rate * weight, weight)) for n, weight in further)]
     return [
         (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),
         (k, 0.0, 1, (0.0, 0.0, 1 / rate)),

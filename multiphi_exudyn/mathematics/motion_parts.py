@@ -22,7 +22,7 @@ import scipy.linalg
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.round_off import DEFECTIVE, WORST_CONDITION
 
-__all__ = ["Parts", "matrix_powers", "parts_of"]
+__all__ = ["Parts", "parts_of"]
 
 STEP = 1e-3  # of an eigenvector: a larger step of its refinement is none of round-off
 CLUSTERS = 10.0 ** np.arange(-12.0, -3.0)  # of the rates: distances up to which they make a cluster, tried in turn
@@ -43,7 +43,10 @@ class Parts:
         """N^d / d! (d, m, m) of a part, d = 0, 1, ..."""
         size = end - first
         nilpotent = self.mixing[first:end, first:end] - self.rates[first] * np.eye(size)
-        return matrix_powers(nilpotent, size + BEYOND if size > 1 else 1)
+        found = [np.eye(size, dtype=complex)]
+        for d in range(1, size + BEYOND if size > 1 else 1):
+            found.append(found[-1] @ nilpotent / d)
+        return np.array(found)
 
     def only(self, kept: np.ndarray) -> Parts:
         """Some of the parts, by which of the components (k,) are kept."""
@@ -51,14 +54,6 @@ class Parts:
         groups = tuple((int(place[first]) - 1, int(place[end - 1])) for first, end in self.groups if kept[first])
         mixing = self.mixing[np.ix_(kept, kept)]
         return Parts(self.rates[kept], self.vectors[:, kept], self.inverse[kept], mixing, groups)
-
-
-def matrix_powers(matrix: np.ndarray, count: int) -> np.ndarray:
-    """N^d / d! (d, m, m) of N (m, m), d below ``count``."""
-    found = [np.eye(len(matrix), dtype=complex)]
-    for d in range(1, count):
-        found.append(found[-1] @ matrix / d)
-    return np.array(found)
 
 
 def parts_of(system: np.ndarray) -> Parts:
