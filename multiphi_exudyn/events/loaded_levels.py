@@ -85,10 +85,9 @@ class LoadedLevels:
     ) -> LoadedLevels:
         """Levels under an excitation, for motions from a time [s] to an end, each of a time [s] at most.
 
-        Those under its static loads are kept by the model: the maps between them serve every run. How long motions may
-        last counts where zero-frequency modes are damped, by powers of two.
+        Those under its static loads are kept by the model: the maps between them serve every run.
         """
-        load, longest = excitation.static, power_of_two_above(lasting) if _damps_free_modes(model) else math.inf
+        load, longest = excitation.static, _longest(model, lasting)
         key = load.tobytes(), longest
         alone: LoadedLevels = model.loaded.get_or_build(key, lambda: cls.static(model, load, longest))
         return cls(model, excitation, time, end, alone) if excitation.prescribed else alone
@@ -191,8 +190,12 @@ class LoadedLevels:
         return ways[target.states]
 
 
-def _damps_free_modes(model: MultiPhiModel) -> bool:
-    """Whether the structure, or an element, may damp zero-frequency modes."""
+def _longest(model: MultiPhiModel, lasting: float) -> float:
+    """A power of two [s] above a time, at which motions of that time are looked at; infinite where it does not count.
+
+    It counts where the structure, or an element, may damp zero-frequency modes.
+    """
     base = model.base
     rigid = base.modes.rigid
-    return rigid > 0 and bool(np.any(base.damping[:rigid, :rigid]) or np.any(base.dampings))
+    damped = rigid > 0 and (np.any(base.damping[:rigid, :rigid]) or np.any(base.dampings))
+    return power_of_two_above(lasting) if damped and lasting < math.inf else math.inf

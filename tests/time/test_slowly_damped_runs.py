@@ -1,11 +1,15 @@
 """Runs of bodies that nothing holds and a dashpot hardly slows down: exact, and their ledgers close to round-off."""
 
+import math
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from slow_mass import free_mass
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 RATES = [1e-14, 1e-11, 4e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0]  # 1/s
@@ -96,6 +100,14 @@ class TestChain:
             for rate in (0.0, 1e-30)
         ]
         assert_allclose(times[1], times[0], rtol=0, atol=1e-10)
+
+
+def test_levels_for_motions_of_any_length_take_no_form_that_ends():
+    """Those of a body in Exudyn, which asks for no time."""
+    model = mass(1e-2)
+    levels = LoadedLevels.under(model, Excitation.of(model, (), 1.0), 0.0, 1.0)
+    assert levels.lasting == levels.level(()).lasting == math.inf
+    assert levels.level(()).response is model.level().response
 
 
 def test_a_longer_run_of_the_same_model_takes_the_form_for_its_time():
