@@ -100,7 +100,7 @@ class TestTheJudgeSees:
     def test_a_loss_that_is_not_in_the_ledger(self):
         problem = Problem(chain(4), [stop("m2", 0.2)], 20.0, displacement=np.linspace(0.5, 2.0, 4))
         trajectory = simulate(problem.model(), 20.0, problem.displacement)
-        free = [dataclasses.replace(e, loss=dataclasses.replace(e.loss, impact=0.0)) for e in trajectory.events]
+        free = [dataclasses.replace(e, loss=e.loss._replace(impact=0.0)) for e in trajectory.events]
         assert "ledger: residual" in complaints(problem, dataclasses.replace(trajectory, events=tuple(free)))
 
     def test_a_force_that_is_not_the_law(self):
