@@ -8,8 +8,7 @@ passed before, sampling.py looks at them all, if somebody asks.
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from collections.abc import Sequence
 
 from multiphi_exudyn.events.arrays import (
     AFTER,
@@ -52,10 +51,11 @@ def is_small(lost: float, limit: float, square: float) -> int:
     return 1 if lost * (1.0 + HALVES / limit) ** 2 < square else 0
 
 
-def looked(numbers: np.ndarray, end: float) -> tuple[float, float] | None:
+def looked(numbers: Sequence[float], end: float) -> tuple[float, float] | None:
     """Mean of |y|^2 and largest energy of a run to ``end`` [s], from its numbers; None where the loop did not look."""
-    count, square, largest, _, until = numbers[LOOKED : LOOK_END + 1].tolist()
-    return (square, largest) if count == SAMPLES and until == end else None
+    if numbers[LOOKED] != SAMPLES or numbers[LOOK_END] != end:
+        return None
+    return numbers[LOOKED + 1], numbers[LOOKED + 2]
 
 
 @compiled

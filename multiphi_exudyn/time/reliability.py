@@ -162,18 +162,18 @@ def _left_out(trajectory: Trajectory, known: Known, segments: Segments, toleranc
     """Of what truncation took of a run, whatever its sign at an instant."""
     if known.whole:
         return ()
-    ending, y, excitation = trajectory.ending, trajectory.start.displacement, segments.levels[0].excitation
-    lost = segments.truncated
+    numbers, excitation = trajectory.ending.numbers.tolist(), segments.levels[0].excitation
+    lost, y = segments.truncated, trajectory.start.displacement
     if math.isnan(lost):
         lost = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost += abs(ending.truncated_at_start)
-    given = ending.given_energy if excitation.nothing else ending.given_energy + float(trajectory.load.dot(y))
-    square = float(ending.numbers[a.GIVEN_SQUARE]) or float(y.dot(y))
+    lost += abs(numbers[a.LOST_AT_START + a.KINETIC] + numbers[a.LOST_AT_START + a.STRAIN])
+    given = numbers[a.GIVEN_ENERGY] + (0.0 if excitation.nothing else float(trajectory.load.dot(y)))
+    square = numbers[a.GIVEN_SQUARE] or float(y.dot(y))
     taken = LeftOut(lost, total_defect(trajectory, segments), abs(given), square)
     told = taken.looked_into(tolerance)
     if told == (False, False):
         return ()
-    sizes = looked(ending.numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
+    sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
     struck = known.rigid and _struck(trajectory)
     return left_out_warnings(trajectory.model, excitation, taken, told, tolerance, sizes, struck)
 

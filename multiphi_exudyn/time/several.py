@@ -119,7 +119,7 @@ class Several:
 
     def sizes(self, asked: Sequence[int]) -> dict[int, tuple[float, float]]:
         """Mean of |y|^2 [m2 kg] and largest energy [J] of some runs, see ``Segments``."""
-        known = {k: looked(self.told[k], self.end) for k in asked}
+        known = {k: looked(self.told[k].tolist(), self.end) for k in asked}
         found = {k: sizes for k, sizes in known.items() if sizes is not None}
         if further := [k for k in asked if k not in found]:
             sizes = np.empty((len(further), 2))
