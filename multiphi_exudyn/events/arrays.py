@@ -128,10 +128,13 @@ WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segm
 SWUNG = 47  # twice the largest energy so far, as far as it was looked for
 GIVEN_ENERGY = 48  # kinetic and strain energy [J] that the run was given, less the potential of static loads
 LOST_SO_FAR = 49  # energies lost at events
-INDEPENDENCE = 55  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 56  # of the segment under way
-MEAN_SQUARE, LARGEST_ENERGY = 59, 60  # of samples of a run that is over (time/sampling.py)
-RUN_NUMBERS = 61
+LOOKED = 55  # instants of the motion looked at; of these the mean of |y|^2, and the largest energy (time/looking.py)
+LOOK_FIRST, LOOK_END = 58, 59  # the first and the last such instant, one and the same where nobody looks on
+GIVEN_SQUARE = 60  # |y|^2 at the start, zero where a run goes on from another
+INDEPENDENCE = 61  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 62  # of the segment under way
+SEEN = 65  # like LOOKED, with the segment under way; of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 68
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -166,6 +169,7 @@ ROW, WAVE, RATED = 0, 1, 2
 MATRIX, OFFSET, RATE_MATRIX, RATE_OFFSET, MAP_TERMS, MAP_DEFECT = 0, 1, 2, 3, 5, 6
 MAP_SIZES = 4  # of a map from the base: of the terms that channels, w = 1, and a level's rest give modes, (r, q + 1)
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
+LOOK_WIDTH = 3  # numbers of LOOKED, and of SEEN
 
 LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)
 STATE_INTS = 8
@@ -182,7 +186,7 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 8
 # ---------------------------------------------------------------------- answers
 
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
-NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM, NEED_POWERS = 1, 2, 3, 4, 5, 6
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM, NEED_POWERS, NEED_SIZES = 1, 2, 3, 4, 5, 6, 7
 NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE, MIXED, GAINING = range(1, 10)
 
 

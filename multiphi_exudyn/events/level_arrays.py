@@ -205,6 +205,8 @@ class LevelArrays:
             self.channels.reserve(self.buffers)
         elif self.ints[a.NEEDED] == a.NEED_POWERS:
             self.add_powers(source)
+        elif self.ints[a.NEEDED] == a.NEED_SIZES:
+            self._add_sizes(source)
         else:
             self._supply_room()
 
@@ -244,10 +246,9 @@ class LevelArrays:
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
 
-    def add_sizes(self, level: int) -> None:
+    def _add_sizes(self, level: int) -> None:
         """Pack what |y| and the work of static loads are read from in a level that stands in the ints."""
-        if not self.ints[level + a.SIZES]:
-            put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
+        put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """The signal that an exit's element would have in the level entered alone."""

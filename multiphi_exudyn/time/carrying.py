@@ -15,15 +15,14 @@ from multiphi_exudyn.events.arrays import (
     FRESH,
     GIVEN_UP,
     HORIZON,
-    LARGEST_ENERGY,
     LEFT_OUT_COUNT,
-    MEAN_SQUARE,
     NEED,
     OF_A_RUN,
     OK,
     PHASE_COUNT,
     PIECE,
     PRESCRIBED,
+    SEEN,
     SEGMENT_COUNT,
     SEGMENT_ROOM,
     START,
@@ -140,16 +139,13 @@ def measure_starts(
     asked: Ints,
     runs: int,
     end: float,
-    count: int,
     sizes: Numbers,
 ) -> int:
     """Mean of |y|^2 and largest energy (runs, 2) of those ``asked`` for, by ``sample_sizes``; OK or NEED."""
     for i in range(runs):
         first, last = ends[ENDS * asked[i]], ends[ENDS * (asked[i] + 1)] - 1
-        status = sample_sizes(
-            ints, numbers, waves, rows, spans, coordinates, offsets, first, last, end, count
-        )  # fmt: skip
+        status = sample_sizes(ints, numbers, waves, rows, spans, coordinates, offsets, first, last, end)
         if status == NEED:
             return NEED
-        sizes[2 * i], sizes[2 * i + 1] = numbers[MEAN_SQUARE], numbers[LARGEST_ENERGY]
+        sizes[2 * i], sizes[2 * i + 1] = numbers[SEEN + 1], numbers[SEEN + 2]
     return OK

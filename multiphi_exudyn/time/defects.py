@@ -15,10 +15,8 @@ numbers per pair of levels.
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,9 +27,7 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["SAMPLES", "Defect", "DefectHistory", "Samples", "defects", "indicator", "total_defect"]
-
-SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
+__all__ = ["Defect", "DefectHistory", "defects", "indicator", "total_defect"]
 
 
 @dataclass(frozen=True)
@@ -86,53 +82,14 @@ class DefectHistory:
     def indicator(self, end: float) -> float:
         """The truncation indicator of [0, end] (truncation.py)."""
         lost = float(np.sum(self.squares[self.segments.starts[self.places] <= end]))
-        return indicator(lost, Samples.of(self.segments, end))
+        return indicator(lost, self.segments.sizes(end)[0])
 
 
-class Samples:
-    """The motion at SAMPLES times evenly spaced; looked at when somebody asks.
-
-    sizes: gives the mean of |y|^2 and the largest energy, see ``Segments``.
-    """
-
-    def __init__(self, sizes: Callable[[], tuple[float, float]]) -> None:
-        self._asked = sizes
-
-    @classmethod
-    def of(cls, segments: Segments, end: float) -> Samples:
-        """Of a run up to ``end`` [s]."""
-        return cls(lambda: segments.sizes(end, SAMPLES))
-
-    @property
-    def amplitude(self) -> float:
-        """Root of the mean of |y|^2 [m sqrt(kg)]."""
-        return math.sqrt(self._sizes[0])
-
-    @property
-    def largest_energy(self) -> float:
-        """The largest kinetic + strain energy [J], without its sign."""
-        return self._sizes[1]
-
-    @functools.cached_property
-    def _sizes(self) -> tuple[float, float]:
-        return self._asked()
-
-
-def is_small(lost: float, limit: float, start: np.ndarray) -> bool:
-    """Whether the indicator of a sum of |defect|^2 is below a limit, as y (m,) at the start tells already.
-
-    A defect has changed it there by no more than its size; it is the first of the samples, which count by half.
-    """
-    first = math.sqrt(start.dot(start)) - math.sqrt(lost)
-    return first > 0 and limit**2 * first**2 > 2 * SAMPLES * lost
-
-
-def indicator(lost: float, samples: Samples) -> float:
-    """The truncation indicator of a sum of |defect|^2 (truncation.py)."""
-    amplitude = samples.amplitude
-    if amplitude == 0:
+def indicator(lost: float, square: float) -> float:
+    """The truncation indicator of a sum of |defect|^2 and the mean of |y|^2 (truncation.py)."""
+    if square == 0:
         return math.inf if lost else 0.0
-    return math.sqrt(lost) / amplitude
+    return math.sqrt(lost / square)
 
 
 def total_defect(trajectory: Trajectory, segments: Segments) -> float:

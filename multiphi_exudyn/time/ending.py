@@ -65,20 +65,9 @@ class Ending(NamedTuple):
         return Loss(*self.numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
 
     @property
-    def truncated_at_start(self) -> float:
-        """Energy [J] that truncation took at the start, where no event carries it."""
-        lost = self.numbers
-        return float(lost[a.LOST_AT_START + a.KINETIC] + lost[a.LOST_AT_START + a.STRAIN])
-
-    @property
     def work(self) -> float:
         """Work [J] that varying loads and stops have done on the last state."""
         return float(self.numbers[a.WORK])
-
-    @property
-    def given_energy(self) -> float:
-        """Kinetic and strain energy [J] that the run was given, less the potential of static loads."""
-        return float(self.numbers[a.GIVEN_ENERGY])
 
     def statistics(self, segments: int, events: int, possible: int) -> Statistics:
         """What the run has taken; possible: levels."""

@@ -101,6 +101,7 @@ from multiphi_exudyn.events.waiting import arm, flag_again, watch, who_asks
 from multiphi_exudyn.mathematics.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.zero_crossing import INSTANT, NONE, first_descent
+from multiphi_exudyn.time.looking import begin_look, keep_look, look
 from multiphi_exudyn.time.loop_record import is_chatter, keep_events, keep_segment
 from multiphi_exudyn.time.work_sums import work_of_segment
 
@@ -116,9 +117,11 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     END_REACHED, EVENT, NEED, FULL or FAILED.
     """
     if ints[STARTING] > 0:
-        status = set_out(ints, numbers, waves) if ints[STARTING] == FRESH else go_on(ints, numbers, waves)
+        fresh = ints[STARTING] == FRESH
+        status = set_out(ints, numbers, waves) if fresh else go_on(ints, numbers, waves)
         if status < 0:
             return status
+        begin_look(ints, numbers, GIVEN if fresh else -1, end)
     while numbers[TIME] < end:
         if ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
             return FULL
@@ -285,6 +288,7 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     ints[SUMMED] = work_of_segment(ints, numbers, waves, reached) if ints[WORKING] == 1 else 0
     fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
     at_once = reached <= (INSTANT / fastest if fastest > 0.0 else 0.0)
+    look(ints, numbers, waves)
     status = OK
     if asking > 0:
         flag_again(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
@@ -298,6 +302,7 @@ def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         numbers[ints[FOUND] + 1] = samples
         return NEED if status == NEED else FULL
     keep_segment(ints, numbers, armed_at, unit)
+    keep_look(numbers)
     if ints[PRESCRIBED] > 0:
         keep_drive(ints, waves)
         numbers[AGE] += reached

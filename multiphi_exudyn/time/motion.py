@@ -100,6 +100,7 @@ class Motion:
         self.record = Record(self.model.contacts, self.arrays)
         numbers, piece = self._ending.numbers.copy(), self._ending.piece
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
+        numbers[a.LOOK_END] = numbers[a.LOOK_FIRST]
         numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES] = 0.0
         numbers[a.WORKS : a.WORKS + 3] = numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES] = 0.0
         self._ending = Ending(numbers, self.record, piece=piece).at(state)

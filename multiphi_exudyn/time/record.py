@@ -184,16 +184,14 @@ class Record:
                 pass
         return result
 
-    def sizes(self, end: float, count: int) -> tuple[float, float]:
+    def sizes(self, end: float) -> tuple[float, float]:
         """Mean of |y|^2 and largest energy up to ``end`` [s], see ``Segments``."""
         square, largest = 0.0, 0.0
         for offsets in self._packed(list(range(len(self.levels)))):
-            for level in offsets[offsets > 0].tolist():
-                self.arrays.add_sizes(level)
-            while self._supply(sizes_of(*self._given(offsets), 0, len(self.rows), end, count)):
+            while self._supply(sizes_of(*self._given(offsets), 0, len(self.rows), end)):
                 pass
-            square += float(self.arrays.numbers[a.MEAN_SQUARE])
-            largest = max(largest, float(self.arrays.numbers[a.LARGEST_ENERGY]))
+            square += float(self.arrays.numbers[a.SEEN + 1])
+            largest = max(largest, float(self.arrays.numbers[a.SEEN + 2]))
         return square, largest
 
     def works(self, places: np.ndarray) -> tuple[float, float, float]:

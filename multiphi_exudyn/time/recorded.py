@@ -90,9 +90,9 @@ class Recorded(Made[Segment], Segments):
         """See ``Segments``."""
         return self._record.values(times, side, row)
 
-    def sizes(self, end: float, count: int) -> tuple[float, float]:
+    def sizes(self, end: float) -> tuple[float, float]:
         """See ``Segments``."""
-        return self._record.sizes(end, count)
+        return self._record.sizes(end)
 
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray

@@ -27,17 +27,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import Samples, total_defect
+from multiphi_exudyn.time.defects import total_defect
 from multiphi_exudyn.time.known_warnings import (
     cluster_warnings,
     damping_warnings,
@@ -45,6 +45,7 @@ from multiphi_exudyn.time.known_warnings import (
     static_warnings,
 )
 from multiphi_exudyn.time.left_out import LeftOut, energy_warning, left_out_warnings
+from multiphi_exudyn.time.looking import looked
 from multiphi_exudyn.time.rough_impacts import impact_warnings
 from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments, listed
@@ -67,19 +68,19 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     segments = listed(trajectory.segments)
     known = Known.of(trajectory.model, segments)
     before, after = known.around(trajectory, segments)
-    taken = () if known.whole else _left_out(trajectory, segments, tolerance)
-    return (*before, *taken, *after)
+    return (*before, *_left_out(trajectory, known, segments, tolerance), *after)
 
 
 @dataclass(frozen=True)
 class Known:
     """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    whole: no level leaves out a mode. before, clusters: warnings. fastest: the highest frequency of the open level
-    [Hz]. slowest: the lowest of the levels that is not zero [rad/s].
+    whole: no level leaves out a mode. rigid: there is a rigid contact. before, clusters: warnings. fastest: the highest
+    frequency of the open level [Hz]. slowest: the lowest of the levels that is not zero [rad/s].
     """
 
     whole: bool
+    rigid: bool
     before: tuple[str, ...]
     clusters: tuple[str, ...]
     fastest: float
@@ -88,9 +89,9 @@ class Known:
     @classmethod
     def of(cls, model: MultiPhiModel, segments: Segments) -> Known:
         """Kept by the model."""
-        visited = tuple([level.level.indices for level in segments.levels])
-        found: Known = model.entries.get_or_build(("warnings", visited), lambda: cls._of(model, segments))
-        return found
+        key = ("warnings", *[level.level.indices for level in segments.levels])
+        found: Known | None = model.entries.find(key)
+        return found or model.entries.keep(key, cls._of(model, segments))
 
     @classmethod
     def _of(cls, model: MultiPhiModel, segments: Segments) -> Known:
@@ -99,30 +100,30 @@ class Known:
         omega = np.concatenate([level.omega for level in levels])
         return cls(
             model.whole,
+            any(contact.rigid for contact in model.contacts),
             (*damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             model.level_at(()).highest_frequency,
             float(np.min(omega[omega > 0], initial=math.inf)),
         )
 
-    def around(self, trajectory: Trajectory, segments: Segments) -> tuple[list[str], list[str]]:
+    def around(self, trajectory: Trajectory, segments: Segments) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """What is told of a run before and after what truncation took of it.
 
         The same for all runs in the same levels, but where friction, or a model's own check, looks into the run.
         """
         model, span = trajectory.model, trajectory.t_end - trajectory.start.time
-        before, after, excitation = list(self.before), list(self.clusters), segments.levels[0].excitation
+        before, after, excitation = self.before, self.clusters, segments.levels[0].excitation
         if 0 < self.fastest * trajectory.t_end < HARDLY:
-            before[:0] = _slow(trajectory, self.fastest)
+            before = (*_slow(trajectory, self.fastest), *before)
         if model.validity is not None:
-            after += model.validity(trajectory)
+            after += tuple(model.validity(trajectory))
         if 0 < self.slowest * span < SLOW:
-            after += _slow_mode(segments, self.slowest, span)
+            after += tuple(_slow_mode(segments, self.slowest, span))
         if model.general:
-            after += rubbing_warnings(segments, model)
-            after += impact_warnings(trajectory)
+            after += (*rubbing_warnings(segments, model), *impact_warnings(trajectory))
         if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
-            after.append(_load_pieces(excitation, trajectory.t_end))
+            after += (_load_pieces(excitation, trajectory.t_end),)
         return before, after
 
 
@@ -157,20 +158,24 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
         )
 
 
-def _left_out(trajectory: Trajectory, segments: Segments, tolerance: Tolerance | None) -> list[str]:
+def _left_out(trajectory: Trajectory, known: Known, segments: Segments, tolerance: Tolerance | None) -> tuple[str, ...]:
     """Of what truncation took of a run, whatever its sign at an instant."""
+    if known.whole:
+        return ()
+    numbers, excitation = trajectory.ending.numbers.tolist(), segments.levels[0].excitation
     lost, y = segments.truncated, trajectory.start.displacement
     if math.isnan(lost):
         lost = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost += abs(trajectory.ending.truncated_at_start)
-    given = abs(trajectory.ending.given_energy + float(trajectory.load.dot(y))) if lost > 0 else 0.0
-    taken = LeftOut(lost, total_defect(trajectory, segments), given, y)
-    looked = taken.looked_into(tolerance)
-    if not any(looked):
-        return []
-    model, excitation = trajectory.model, segments.levels[0].excitation
-    samples, struck = Samples.of(segments, trajectory.t_end), partial(_struck, trajectory)
-    return left_out_warnings(model, excitation, taken, looked, tolerance, samples, struck)
+    lost += abs(numbers[a.LOST_AT_START + a.KINETIC] + numbers[a.LOST_AT_START + a.STRAIN])
+    given = numbers[a.GIVEN_ENERGY] + (0.0 if excitation.nothing else float(trajectory.load.dot(y)))
+    square = numbers[a.GIVEN_SQUARE] or float(y.dot(y))
+    taken = LeftOut(lost, total_defect(trajectory, segments), abs(given), square)
+    told = taken.looked_into(tolerance)
+    if told == (False, False):
+        return ()
+    sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
+    struck = known.rigid and _struck(trajectory)
+    return left_out_warnings(trajectory.model, excitation, taken, told, tolerance, sizes, struck)
 
 
 def _struck(trajectory: Trajectory) -> bool:

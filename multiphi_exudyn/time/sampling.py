@@ -19,14 +19,17 @@ from multiphi_exudyn.events.arrays import (
     FLOW_FORCED,
     FLOW_FREE,
     FLOW_WAVES,
-    LARGEST_ENERGY,
-    MEAN_SQUARE,
+    LOOK_WIDTH,
     MODES,
     NEED,
+    NEED_SIZES,
+    NEEDED,
+    NEEDED_FROM,
     OK,
     PLACE,
     PRESCRIBED,
     RESPONSE,
+    SEEN,
     SEGMENT_WIDTH,
     SEGMENT_WIDTH_NUMBERS,
     SIGNALS,
@@ -34,11 +37,11 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     WORK_WAVES,
 )
-from multiphi_exudyn.events.energies import energy
 from multiphi_exudyn.events.flow import state_at
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import SHAPES
+from multiphi_exudyn.time.looking import SAMPLES, see
 from multiphi_exudyn.time.resuming import resume
 
 __all__ = ["sample_rows", "sample_sizes", "sample_states"]
@@ -142,37 +145,27 @@ def sample_sizes(
     begin: int,
     segments: int,
     end: float,
-    count: int,
 ) -> int:
-    """MEAN_SQUARE of |y| from the first start to ``end`` [s], of a polygon through ``count`` even instants.
+    """SEEN: how many of SAMPLES even instants from the first start to ``end`` [s], mean of |y|^2, largest energy.
 
-    LARGEST_ENERGY: the largest kinetic and strain energy at these, without its sign. Of the segments from ``begin``
-    before ``segments``. OK or NEED.
+    Of the segments from ``begin`` before ``segments``. OK or NEED.
     """
     i, flowing, first = -1, -1, spans[begin * SEGMENT_WIDTH_NUMBERS]
-    numbers[MEAN_SQUARE] = numbers[LARGEST_ENERGY] = 0.0
-    for k in range(count):
-        t = first + (end - first) * k / (count - 1)
+    for part in range(LOOK_WIDTH):
+        numbers[SEEN + part] = 0.0
+    for k in range(SAMPLES):
+        t = end if k == SAMPLES - 1 else first + (end - first) * k / (SAMPLES - 1)
         i = owner_of(spans, begin, segments, t, 0, i)
-        level, x = offsets[rows[i * SEGMENT_WIDTH]], ints[AFTER + PLACE]
+        level = offsets[rows[i * SEGMENT_WIDTH]]
         if level == 0:
             continue
+        if ints[level + SIZES] == 0:
+            ints[NEEDED], ints[NEEDED_FROM] = NEED_SIZES, level
+            return NEED
         if flowing != i and resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
             return NEED
-        flowing, n, row = i, ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
-        state_at(ints, numbers, waves, level, t - spans[i * SEGMENT_WIDTH_NUMBERS], x, ints[AFTER + SPEED])
-        square = 0.0
-        for line in range(n + 1):
-            size = numbers[row + n]
-            for c in range(line, n):
-                size += numbers[row + c] * numbers[x + c]
-            square += size * size
-            row += n + 1
-        numbers[MEAN_SQUARE] += square / (count - 1) * (0.5 if k == 0 or k == count - 1 else 1.0)
-        strained = energy(ints, numbers, AFTER) + numbers[row + n]
-        for c in range(n):
-            strained += numbers[row + c] * numbers[x + c]
-        numbers[LARGEST_ENERGY] = max(numbers[LARGEST_ENERGY], abs(strained))
+        flowing, weight = i, 0.5 if k == 0 or k == SAMPLES - 1 else 1.0
+        see(ints, numbers, waves, level, t - spans[i * SEGMENT_WIDTH_NUMBERS], weight)
     return OK
 
 

@@ -21,6 +21,7 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.time.flow import Flow
+from multiphi_exudyn.time.looking import SAMPLES
 from multiphi_exudyn.time.quadrature import panels, works
 
 __all__ = ["Listed", "Segment", "Segments", "listed", "owners"]
@@ -154,8 +155,8 @@ class Segments(Sequence[Segment], ABC):
         """
 
     @abstractmethod
-    def sizes(self, end: float, count: int) -> tuple[float, float]:
-        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], of ``count`` even instants.
+    def sizes(self, end: float) -> tuple[float, float]:
+        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], of SAMPLES even instants.
 
         The mean is that of a polygon through them; energy: kinetic and strain, without its sign.
         """
@@ -241,17 +242,17 @@ class Listed(Segments):
             found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
         return found
 
-    def sizes(self, end: float, count: int) -> tuple[float, float]:
+    def sizes(self, end: float) -> tuple[float, float]:
         """See ``Segments``."""
-        times = np.linspace(self.starts[0], end, count)
-        places, squares, energies = self.owners(times), np.empty(count), np.empty(count)
+        times = np.linspace(self.starts[0], end, SAMPLES)
+        places, squares, energies = self.owners(times), np.empty(SAMPLES), np.empty(SAMPLES)
         states = self.states(places, times - self.starts[places])
         for k, number in enumerate(self.numbers[places].tolist()):
             level = self.levels[number]
             x, v = states[:, k, : level.width]
             squares[k] = np.sum(level.configuration(x) ** 2)
             energies[k] = level.kinetic(v) + level.strain(x)
-        square = (np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (count - 1)
+        square = (np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (SAMPLES - 1)
         return float(square), float(np.max(np.abs(energies)))
 
     @property

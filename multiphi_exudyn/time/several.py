@@ -21,8 +21,8 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.time.carrying import ENDS, TOLD_WIDTH, carry_starts, measure_starts, sample_starts
-from multiphi_exudyn.time.defects import SAMPLES
 from multiphi_exudyn.time.left_out import LeftOut
+from multiphi_exudyn.time.looking import looked
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.taken import EMPTY, PARTS, taken
 
@@ -117,26 +117,24 @@ class Several:
             self._asked(sampled_several, self.count, *asked, found.ravel())
         return found
 
-    def sizes(self, asked: Sequence[int]) -> list[tuple[float, float]]:
+    def sizes(self, asked: Sequence[int]) -> dict[int, tuple[float, float]]:
         """Mean of |y|^2 [m2 kg] and largest energy [J] of some runs, see ``Segments``."""
-        found = np.empty((len(asked), 2))
-        if len(asked):
-            for number in self._visited:
-                self.arrays.add_sizes(int(self._record[3][number]))
-            numbers = np.array(asked, np.int64)
-            self._asked(measured_several, numbers, len(asked), self.end, SAMPLES, found.ravel())
-        return [(square, energy) for square, energy in found.tolist()]
+        known = {k: looked(self.told[k].tolist(), self.end) for k in asked}
+        found = {k: sizes for k, sizes in known.items() if sizes is not None}
+        if further := [k for k in asked if k not in found]:
+            sizes = np.empty((len(further), 2))
+            self._asked(measured_several, np.array(further, np.int64), len(further), self.end, sizes.ravel())
+            found |= {k: (square, energy) for k, (square, energy) in zip(further, sizes.tolist(), strict=True)}
+        return found
 
     def left_out(self) -> list[LeftOut]:
         """What truncation took of each run."""
-        told, y = self.told[: self.count], [start.displacement for start in self.starts]
+        told, load = self.told[: self.count], self.arrays.levels.excitation.static
         at_start = told[:, a.LOST_AT_START + a.KINETIC] + told[:, a.LOST_AT_START + a.STRAIN]
-        numbers = np.abs(at_start) + told[:, a.TRUNCATED], told[:, a.DEFECTS], told[:, a.GIVEN_ENERGY]
-        load, found = self.arrays.levels.excitation.static, list[LeftOut]()
-        for k, (lost, defects, energy) in enumerate(zip(*(column.tolist() for column in numbers), strict=True)):
-            given = abs(energy + float(load.dot(y[k]))) if lost > 0 else 0.0
-            found.append(LeftOut(lost, defects, given, y[k]))
-        return found
+        potentials = np.array([load.dot(start.displacement) for start in self.starts[: self.count]])
+        given = np.abs(told[:, a.GIVEN_ENERGY] + potentials)
+        numbers = np.abs(at_start) + told[:, a.TRUNCATED], told[:, a.DEFECTS], given, told[:, a.GIVEN_SQUARE]
+        return [LeftOut(*own) for own in zip(*(column.tolist() for column in numbers), strict=True)]
 
     def struck(self, k: int) -> bool:
         """Whether a rigid contact was struck in a run."""

@@ -20,7 +20,6 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.time.defects import Samples
 from multiphi_exudyn.time.left_out import LeftOut, left_out_warnings
 from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
@@ -40,6 +39,7 @@ SEVERAL = 64  # runs that are carried together: threads then hardly wait for eac
 ROOM = 8192  # segments, and events, of a record of several runs: they take half of it, as they differ
 
 StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
+Around: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]  # warnings before and after what truncation took
 
 
 class Task:
@@ -60,7 +60,7 @@ class Task:
         self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self.events, self.told = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
         self._begun, self._together = 0, not refined(given.loads)
-        self._around = dict[tuple[tuple[int, ...], ...], tuple[list[str], list[str]]]()  # warnings by levels
+        self._around = dict[tuple[tuple[int, ...], ...], Around]()  # by levels
 
     def carry_out(self, threads: int, bar: Any) -> None:
         """All runs; a Tolerance is decided by the first ones, one after the other."""
@@ -144,7 +144,7 @@ class Task:
         model, tolerance = levels.model, modes if isinstance(modes, Tolerance) else None
         looked = {} if model.whole else {k: taken.looked_into(tolerance) for k, taken in left_out.items()}
         asked = [k for k, which in looked.items() if any(which)]
-        sizes = dict(zip(asked, several.sizes(asked), strict=True))
+        sizes, rigid = several.sizes(asked), any(contact.rigid for contact in model.contacts)
         for k, taken in left_out.items():
             visited = several.visited(k)
             if visited not in self._around:
@@ -153,8 +153,8 @@ class Task:
                 self._around[visited] = Known.of(model, segments).around(trajectory, segments)
             before, after = self._around[visited]
             if k in sizes:
-                samples, struck = Samples(partial(sizes.__getitem__, k)), partial(several.struck, k)
-                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, samples, struck)
+                struck = rigid and several.struck(k)
+                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, sizes[k], struck)
                 found[k] = (*before, *told, *after)
             else:
                 found[k] = (*before, *after)
