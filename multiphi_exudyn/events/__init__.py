@@ -23,7 +23,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     11      beside friction               rebounds.collide_and_rebound
     11      the last bounce               bounces.last_bounce, bounces.keep_landing
     12      friction at rest              sticking.stick_together, sticking.decide_at_rest, sticking.choose
-    12      beside rigid contacts         sticking.let_go, independence.follows
+    12      beside rigid contacts         sticking.let_go, sticking.hold_without, independence.follows
     12      redundant friction            at_rest.sort_by_reserve, sticking.thin_out_idle, independence.thin_out
     12      which of it is idle           changes.without_stick
     12      its impacts                   changes.bears_nothing, striking.slide_on

@@ -35,6 +35,7 @@ from multiphi_exudyn.events.arrays import (
     RIGID,
     ROWS,
     SIGNAL,
+    SINGLES,
     SLIP_BACKWARD,
     SLIP_FORWARD,
     SMALL_PROBLEM,
@@ -72,7 +73,8 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
     """12. Which rigid friction elements stick, and where the others slip; OK, NEED or FAILED.
 
     Where any changes they ask no more. Once at an instant, where there are several. A closed rigid contact that would
-    pull beside them opens, and they are decided once more without it.
+    pull beside them opens, and they are decided once more without it: also one beside which some fall from their
+    static limits, which without it hold.
     """
     count, wishes = list_at_rest(ints, numbers, asking), ints[WISHES]
     if count < 2 or ints[TOGETHER] == 1:
@@ -83,7 +85,8 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
         ints[wishes + i] = ints[states + i]
     pulling = 1
     while pulling > 0:
-        status = decide_at_rest(ints, numbers, count, asking)
+        falling = decide_at_rest(ints, numbers, count, asking)
+        status = hold_without(ints, numbers, count, asking) if falling > 0 else falling
         if status < 0:
             return status
         pulling = let_go(ints, numbers)
@@ -107,7 +110,10 @@ def stick_together(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> i
 
 @compiled
 def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
-    """12. WISHES and ENTERED_STATE: what those at rest do beside all that WISHES holds; OK, NEED or FAILED."""
+    """12. WISHES and ENTERED_STATE: what those at rest do beside all that WISHES holds; how many fall, NEED or FAILED.
+
+    They fall from their static limits.
+    """
     states, wishes, key = ints[ints[WORKED + LEVEL] + STATES], ints[WISHES], ints[KEY]
     for i in range(ints[ELEMENTS]):
         ints[key + i] = ints[wishes + i]
@@ -119,16 +125,51 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, asking: int) -> int
         return status
     sort_by_reserve(ints, numbers, count)
     pull(ints, numbers, count, asking)
-    falling = 1
+    falling, fallen = 1, 0
     while falling > 0:
         if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
         falling = choose(ints, numbers, count, asking)
+        fallen += falling
     thin_out_idle(ints, numbers, count)
     for i in range(ints[ELEMENTS]):
         ints[key + i] = ints[wishes + i]
-    return transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+    status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
+    return status if status < 0 else fallen
+
+
+@compiled
+def hold_without(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
+    """12. After some fell: WISHES and ENTERED_STATE without the closed contacts that would be pulled if those stuck.
+
+    Where without these contacts none falls; else as they were. OK, NEED or FAILED.
+    """
+    c, wishes, before, union, closed = ints[ELEMENTS], ints[WISHES], ints[SINGLES], ints[UNION], 0
+    for i in range(c):
+        ints[before + i] = ints[wishes + i]
+        closed += is_held(ints, ENTERED_STATE, i)
+    if closed == 0:
+        return OK
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        if numbers[ints[STATIC_LIMITS] + i] > numbers[ints[LIMITS] + i]:
+            ints[wishes + i] = ints[ints[STICKS] + i]
+    for i in range(c):
+        ints[union + i] = held_links(ints, numbers, i, ints[wishes + i])
+        ints[ints[KEY] + i] = ints[wishes + i]
+    if independent(ints, numbers, union) == 1:
+        status = transfer(ints, numbers, WORKED, ints[KEY], ENTERED_STATE)
+        if status < 0:
+            return status
+        if let_go(ints, numbers) > 0:
+            falling = decide_at_rest(ints, numbers, count, asking)
+            if falling <= 0:
+                return falling
+    for i in range(c):
+        ints[wishes + i] = ints[before + i]
+        ints[ints[KEY] + i] = ints[before + i]
+    return transfer(ints, numbers, WORKED, ints[KEY], ENTERED_STATE)
 
 
 @compiled

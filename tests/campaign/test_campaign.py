@@ -139,6 +139,11 @@ def test_a_slip_between_bounces_may_be_shorter_than_they_are():
     assert judged("rigid friction", 190263)[0] == [("ok", "")]
 
 
+def test_bounces_end_wherever_they_are_looked_at():
+    """After a bounce too short for the first look brute force saw its contact at zero again and again, and gave up."""
+    assert judged("rigid friction", 430066)[0] == [("ok", "")]
+
+
 @pytest.mark.parametrize(
     ("kind", "number", "verdict"),
     [
@@ -223,6 +228,34 @@ class TestBruteForce:
         assert answer.displacement[0] == pytest.approx([height, 0.0, 0.0], abs=1e-10)
         assert answer.impact == pytest.approx(9.81, rel=1e-10)
 
+    @pytest.mark.parametrize("seed", range(8))
+    def test_ends_bounces_of_any_height_and_restitution(self, seed):
+        """Rows and gaps that are no round numbers: a bounce shorter than the first look after it was begun for ever."""
+        random = np.random.default_rng(seed)
+        restitution, gap, row = random.uniform(0.1, 0.5), random.uniform(0.01, 0.3), random.uniform(0.5, 2)
+        floor = bf.Stop(np.array([row]), gap, restitution=restitution)
+        system = bf.System(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), [floor], constant=np.array([-9.81]))
+        answer = bf.solved(system, np.ones(1), np.zeros(1), np.array([5.0]))
+        assert answer.displacement[0] == pytest.approx([-gap / row], rel=1e-12)
+        assert answer.impact == pytest.approx(9.81 * (1 + gap / row), rel=1e-10)
+
+    @pytest.mark.parametrize("restitution", [0.15, 0.5, 0.8])
+    def test_rubs_as_long_as_it_bounces(self, restitution):
+        """Slid along the floor from 1 m: in the end at rest across it, which has pushed with m g t, and mu m g t along.
+
+        The last impacts were taken away without their friction, 1e-7 of the speeds.
+        """
+        floor = bf.Stop(np.array([0.0, 1.0]), 0.0, restitution=restitution)
+        rough = bf.Slider(np.array([1.0, 0.0]), 0.3, 0.3, contact=0)
+        system = bf.System(
+            np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [floor], sliders=[rough], constant=np.array([0.0, -9.81])
+        )
+        end = math.sqrt(2 / 9.81) * (1 + restitution) / (1 - restitution)
+        times = np.array([end + 0.1, end + 0.4])
+        answer = bf.solved(system, np.array([0.0, 1.0]), np.array([40.0, 0.0]), times)
+        assert answer.velocity[0] == pytest.approx(40.0 - 0.3 * 9.81 * times, rel=1e-12)
+        assert np.max(np.abs(answer.velocity[1])) < 1e-12
+
     def test_three_balls_that_touch_share_an_impact(self):
         """e 1, v- = (1, 0, 0): v+ = (-1, 2, 2) / 3."""
         stops = [bf.Stop(np.array(row), 0.0, restitution=1.0) for row in ([-1.0, 1.0, 0.0], [0.0, -1.0, 1.0])]
@@ -302,6 +335,35 @@ class TestBruteForceOfFriction:
         sliders = bf.Slider(self.ONE, 0.06, 0.06), bf.Slider(-self.ONE, 0.04, 0.04)
         answer = bf.solved(self.block(4.0, *sliders), 0.33 * self.ONE, 0 * self.ONE, np.array([20.0]))
         assert answer.displacement[0] == pytest.approx([0.02], abs=1e-13)
+
+    @pytest.mark.parametrize("held", [1e-6, 1e-4])
+    def test_a_block_sticks_for_a_moment_below_its_static_limit(self, held):
+        """Limits .5 and 1, a load that grows by .5 N/s and brings it to rest at 1 s, ``held`` s before it is 1 N.
+
+        It stepped over the moment, and slid back at once.
+        """
+
+        def load(t):
+            return 1.0 + 0.5 * (t - 1.0 - held)
+
+        system = self.block(0.0, bf.Slider(self.ONE, 0.5, 1.0), loads=[(-self.ONE, bf.Course(load, step=0.1))])
+        speed = 0.5 + (load(0.0) + load(1.0)) / 2
+        turns = 0.5 * (0.5 + load(0.0)) + 0.5 / 3  # x of x'' = -.5 - load at 1 s
+        after = 1.0 - held
+        times = np.array([1.0 + held, 2.0])
+        answer = bf.solved(system, 0 * self.ONE, speed * self.ONE, times)
+        assert answer.displacement[0] == pytest.approx([turns, turns - after**2 / 4 - after**3 / 12], rel=1e-13)
+        assert [state for _, _, state in answer.events] == ["stick", "-"]
+
+    def test_a_block_at_rest_slides_from_the_instant_at_which_its_load_jumps(self):
+        """Before its time the load was looked at as it had been: nothing moved, for ever at the same instant."""
+        for at in np.linspace(0.2, 1.8, 97):
+            for load in (lambda t, at=at: np.where(t < at, 0.0, 2.0), lambda t, at=at: np.where(t <= at, 0.0, 2.0)):
+                given = [(self.ONE, bf.Course(load, breaks=(at,)))]
+                system = self.block(0.0, bf.Slider(self.ONE, 1.0, 1.0), loads=given)
+                answer = bf.solved(system, 0 * self.ONE, 0 * self.ONE, np.array([2.0]))
+                assert answer.displacement[0, 0] == pytest.approx((2.0 - at) ** 2 / 2, rel=1e-12)
+                assert len(answer.events) == 1
 
     def test_friction_of_a_contact_follows_its_force(self):
         """A block pressed on the ground by its weight and thrown along it: it rests after v^2 / (2 mu g)."""

@@ -173,6 +173,35 @@ def test_one_that_turns_does_not_tear_another_one_loose(sign):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("beside", [(), ("other",)])
+@pytest.mark.parametrize("force", [2.2, 3.2])
+def test_what_holds_once_a_stop_lets_go_does_not_fall_beside_it(force, beside, sign):
+    """A load comes to rest on a carrier that 1.1 N press on its stop, with limits 1 and, at rest, 2.
+
+    2.2 N pull the load: on the stop the carrier would bear them, 1.1 N from it, and so they leave it as one body, the
+    load held with (1.1 + 2.2) / 2 < 2. With 3.2 N it falls, as (1.1 + 3.2) / 2 > 2, and the carrier stays. What rests
+    elsewhere changes nothing.
+    """
+    names = ("carrier", "load", *beside)
+    structure = mp.LinearStructure(
+        np.eye(len(names)), np.zeros((len(names),) * 2), points={name: k for k, name in enumerate(names)}
+    )
+    elements = [
+        mp.UnilateralContact("stop", {"carrier": -sign}, 0.0),
+        mp.Friction("held", {"carrier": 1.0, "load": -1.0}, 1.0, static_limit=2.0),
+        *(mp.Friction(f"under {name}", name, 1.0) for name in beside),
+    ]
+    model, speed = mp.MultiPhiModel(structure, elements, modes="all"), np.zeros(len(names))
+    speed[1] = sign * (force + 1.0)
+    loads = [mp.ConstantLoad("carrier", 1.1 * sign), mp.ConstantLoad("load", -force * sign)]
+    run = mp.simulate(model, 2.0, velocity=speed, loads=loads)
+    together, alone = (0.5 * (force - 1.1), 0.0) if force < 3.0 else (0.0, force - 1.0)
+    assert_allclose(run.at("carrier", 2.0), -sign * 0.5 * together, rtol=1e-12, atol=1e-14)
+    assert_allclose(run.at("load", 2.0), sign * (0.5 * (force + 1.0) - 0.5 * (together + alone)), rtol=1e-12)
+    assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("given", [[(1.0, 2.0), (1.0, 2.0)], [(1.0, 3.0), (1.0, 1.0)], [(1.0, 1.0), (1.0, 3.0)]])
 def test_redundant_ones_let_go_where_none_can_take_over(given, sign):
     """Under a load that rises: one bears its static limit, the other its limit; both slip with their limits.

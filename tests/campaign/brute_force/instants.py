@@ -13,6 +13,7 @@ MOMENT = 1e-3  # of a step: after which a set of closed contacts is looked at
 SOONER = (1e-5, 1e-7, 1e-9)  # the same where no set is admissible: a slip may be over before
 ROUND_OFF = 1e-15  # of the terms of a gap: it is zero
 BACKWARDS = 1e-9  # of the speed of the scene: a slip against its direction is no round-off
+CLEAR = 1e-10  # of the terms of a limit and a force: the force is within it
 DEPENDENT = 1e-10  # of the largest: an eigenvalue of the contacts' flexibility that is none
 
 
@@ -29,7 +30,7 @@ class Instants:
         again: it has come back at once: what round-off has allowed, by little, is not allowed any more.
         """
         allowed = 0.0 if again else ZERO
-        w = self.levels.inputs(np.array([t]))[0]
+        w = self.levels.behind(t)
         touching = self._touching(y, w)
         y = self._without_drift(y, w, touching)
         y = self._struck(y, w, touching, answer)
@@ -54,7 +55,7 @@ class Instants:
 
         Of several, as where friction wedges a contact that may open as well, the one in which fewest contacts change.
         """
-        w, best, worst = self.levels.inputs(np.array([t]))[0], None, np.inf
+        w, best, worst = self.levels.behind(t), None, np.inf
         every = [held for count in range(len(resting) + 1) for held in itertools.combinations(resting, count)]
         for slides in self.levels.sliding.choices(before, y, w, self.speed, resting):
             for held in sorted(every, key=lambda held: sum((before[i] == "closed") != (i in held) for i in resting)):
@@ -71,9 +72,10 @@ class Instants:
         """y behind ever faster impacts of several contacts in turn, which end at rest at all of them.
 
         slow: of the scene's speeds, at which they do. So does what rubs without a spring, there or elsewhere, that
-        every impact has moved, and that is as slow.
+        every impact has moved, and that is as slow. What slides on is pushed with mu times the impulse of its contact:
+        that of all impacts left, which is a pull where the contact has just been left and forces lead back to it.
         """
-        w = self.levels.inputs(np.array([t]))[0]
+        w = self.levels.behind(t)
         struck = [i for i in self._touching(y, w) if abs(self._rate(i, y, w)) <= slow * self.speed]
         if not struck:
             return y
@@ -82,10 +84,15 @@ class Instants:
         rubs = [e for e in rubs if self.levels.sliding.rigid(e)]
         rubs = [e for e in rubs if abs(self._passing(e, y, w)) <= slow * self.speed * np.sum(np.abs(sliders[e].row))]
         rows = np.array([self.rows[i] for i in struck] + [sliders[e].row for e in rubs])
+        pushes = rows.copy()
+        for e, slider in enumerate(sliders):
+            if e not in rubs and self._rubs(e, struck):
+                sign = np.sign(self._passing(e, y, w))
+                pushes[struck.index(slider.contact)] -= sign * slider.limit * slider.row
         u = np.array([self._rate(i, y, w) for i in struck] + [self._passing(e, y, w) for e in rubs])
-        impulses = -np.linalg.pinv(rows @ self.inverse @ rows.T, rcond=DEPENDENT) @ u
+        impulses = -np.linalg.pinv(rows @ self.inverse @ pushes.T, rcond=DEPENDENT) @ u
         y = y.copy()
-        y[self.n : 2 * self.n] += self.inverse @ rows.T @ impulses
+        y[self.n : 2 * self.n] += self.inverse @ pushes.T @ impulses
         return y
 
     def _without_drift(self, y, w, touching):
@@ -222,7 +229,7 @@ class Instants:
 
         slides: states of the sliders, of those whose contacts are closed.
         """
-        state, sliding, w = list(before), self.levels.sliding, self.levels.inputs(np.array([t]))[0]
+        state, sliding, w = list(before), self.levels.sliding, self.levels.behind(t)
         state[sliding.first :] = slides
         for i in self.levels.rigid:
             state[i] = "closed" if i in held else "open"
@@ -232,7 +239,7 @@ class Instants:
                 state[sliding.first + e] = slides[e] if shut else "off"
             level, tau, known = self.levels.level(tuple(state)), self.moment(t), tuple(state)
             later = self.levels.inside(level, sliding.entered(before, known, y, w), t)(tau)
-            now, then = self.levels.inputs(np.array([t, t + tau]))
+            now, then = self.levels.behind(np.array([t, t + tau]))
             for i, stop in enumerate(self.levels.system.stops):
                 if i not in self.levels.rigid:
                     state[i] = self._by_place(i, stop, (y, now), (later, then))
@@ -266,20 +273,26 @@ class Instants:
     def _violation(self, state, resting, y, t, moment):
         """By how much the motion of a state leaves what is admissible a moment later, of what it could.
 
-        Of what sticks, or slips, at once, too: it may be within its limit, or slip its way, again a moment later.
+        Of what sticks, or slips, at once, too: it may be within its limit, or slip its way, again a moment later. What
+        is clearly within its limit at once sticks, however soon it is beyond it.
         """
         first = self.levels.sliding.first
         if not resting and len(state) == first:
             return 0.0
         level, tau = self.levels.level(state), self.moment(t, moment)
         at = self.levels.inside(level, y, t)
-        worst = 0.0
+        worst, held = 0.0, set()
         for share in (0.0, 0.5, 1.0):
             later = at(share * tau)
-            w = self.levels.inputs(np.array([t + share * tau]))[0]
+            w = self.levels.behind(t + share * tau)
             s = level.signals @ later + level.signal_inputs @ w
             sizes = level.sizes[0] @ np.abs(later) + level.sizes[1] @ np.abs(w)
+            if share == 0:
+                tight = {i for value, i, size in zip(s, level.turns, sizes, strict=True) if value <= CLEAR * size}
+                held = {i for i in level.turns if i >= first and state[i] == "stick" and i not in tight}
             for value, i, size in zip(s, level.turns, sizes, strict=True):
+                if i in held:
+                    continue
                 at_once = i >= first and state[i] == "stick" and self._pressed(i - first, level, y, t)
                 if share == 0 and state[i] in SIGNS and value < -BACKWARDS * self.speed:
                     worst = max(worst, -value / self.speed)
@@ -299,5 +312,5 @@ class Instants:
         stop = None if slider.contact is None else self.levels.system.stops[slider.contact]
         if stop is None or np.isinf(stop.stiffness) or stop.damping:
             return True
-        most = level.limits[0][e] @ y + level.limits[1][e] @ self.levels.inputs(np.array([t]))[0]
+        most = level.limits[0][e] @ y + level.limits[1][e] @ self.levels.behind(t)
         return most > slider.static_limit * stop.stiffness * 10 * self.touch * self.length * np.sum(np.abs(stop.row))

@@ -7,18 +7,20 @@ from scipy.optimize import brentq
 
 from brute_force.instants import ZERO, Instants
 from brute_force.levels import STEP, Levels
+from brute_force.sliding import TIMED
 from brute_force.system import Answer, NoAnswer
 
 TOUCH = (
     1e-11  # of the scene's lengths and speeds: a signal has fallen below zero, above what constraints drift by in a run
 )
-SOON = 1e-7  # of a step: after which a signal that an instant has left at zero has a sign
+SOON = 1e-8  # of a step: after which a signal that an instant has left at zero has a sign
 LEAST, BLOCK = 8, 64  # steps between two looks at the signs
 MOST_EVENTS = 2000  # more are given up
 MOST_ROCKING = 6  # instants close together: an end of endless impacts
 MOST_AGAIN = 2  # of the same, from which on what was decided by round-off is decided by less
 SLOW = 1e-7  # of the scene's speeds: what they end with
 FINE = 17  # places in two steps at which a dip is looked for
+GROWTH = 4.0  # from a place to the next one behind an instant
 
 
 def solved(system, displacement, velocity, times, touch=TOUCH, finer=1, rocking=MOST_ROCKING, slow=SLOW):
@@ -108,7 +110,7 @@ class _Integration:
         y_event = self.levels.inside(level, states[j], times[j])(tau)
         t_event = times[j] + tau
         k_event = k0 + j
-        if t_event >= nodes[k_event + 1]:
+        if t_event >= nodes[k_event + 1] - 2 * TIMED * nodes[-1]:  # what jumps there has jumped
             t_event, k_event = nodes[k_event + 1], k_event + 1
         return _Piece(times[: j + 1], states[: j + 1], y_event, t_event, k_event, True)
 
@@ -116,7 +118,7 @@ class _Integration:
         """(step, time inside it) of the first signal that falls below zero."""
         if not len(level.signals) or len(times) < 2:
             return None
-        inputs = self.levels.inputs(times)
+        inputs = self.levels.behind(times)
         s = states @ level.signals.T + inputs @ level.signal_inputs.T
         allowed = ZERO * (np.abs(states) @ level.sizes[0].T + np.abs(inputs) @ level.sizes[1].T)
         largest = np.concatenate(
@@ -152,16 +154,18 @@ class _Integration:
 
         def s(tau):
             taus = np.atleast_1d(tau)
-            values = level.signals[i] @ at(taus) + self.levels.inputs(times[j] + taus) @ level.signal_inputs[i]
+            values = level.signals[i] @ at(taus) + self.levels.behind(times[j] + taus) @ level.signal_inputs[i]
             return values if np.ndim(tau) else float(values[0])
 
         moment = SOON * min(width, STEP / self.levels.rate_of_all)
         at_zero = j == 0 and abs(s(0.0)) <= 5 * allowed  # where an instant has left it: a moment later it has a sign
         first = min(moment, width) if at_zero else 0.0
         places = first + (width - first) * (np.linspace(0, 1, FINE) ** 2)
+        if 0 < first < width:  # what leaves its zero may be back long before the second of these
+            places = np.union1d(places, first * GROWTH ** np.arange(np.log(width / first) / np.log(GROWTH)))
         values = s(places)
         lowest = int(np.argmin(values))
-        around = np.linspace(places[max(lowest - 1, 0)], places[min(lowest + 1, FINE - 1)], FINE)
+        around = np.linspace(places[max(lowest - 1, 0)], places[min(lowest + 1, len(places) - 1)], FINE)
         places = np.union1d(places, around)
         values = s(places)
         below = np.flatnonzero(values < -allowed)
@@ -169,12 +173,13 @@ class _Integration:
             return None
         if below[0] == 0:
             return first
-        above = int(np.flatnonzero(values[: below[0]] > 0)[-1]) if np.any(values[: below[0]] > 0) else -1
-        if above < below[0] - 1:  # round-off of zero before it falls
-            return places[max(above + 1, 0)]
-        ends = places[above], places[above + 1]
-        if s(ends[0]) <= 0:  # round-off of zero, by another order of sums
-            return ends[0]
+        positive = np.flatnonzero(values[: below[0]] > 0)
+        if not len(positive):  # round-off of zero before it falls
+            return places[0]
+        ends = places[positive[-1]], places[positive[-1] + 1]
+        for end, sign in zip(ends, (1, -1), strict=True):
+            if sign * s(end) <= 0:  # round-off of zero, by another order of sums
+                return end
         return brentq(s, *ends, xtol=1e-15 * times[-1], rtol=1e-14)
 
     def _show(self, answer, level, piece, shown):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm
 
-from brute_force.sliding import SIGNS, Sliding
+from brute_force.sliding import SIGNS, TIMED, Sliding
 
 STEP = 0.35  # times the fastest rate of any level: a step
 NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
@@ -83,6 +83,11 @@ class Levels:
 
     def inputs(self, t):
         return np.column_stack([function(t) for function in self.functions])
+
+    def behind(self, t):
+        """Inputs (w,) right after an instant, (k, w) after (k,) of them: what jumps at it has jumped."""
+        found = self.inputs(np.minimum(np.atleast_1d(t) + TIMED * self.end, self.end))
+        return found if np.ndim(t) else found[0]
 
     def _courses(self):
         moving = (*self.system.stops, *self.system.sliders)
