@@ -27,12 +27,15 @@ map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 
                                   modes out, what a defect is read from (defect_sums.py), else -1
 state     ints[state ...]         level, where xi, xi' and their scales stand, the phase of every exit
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
-segment   SEGMENT_INTS            number of the level, piece, first event, where xi, xi' and phases of its start stand
-          SEGMENT_NUMBERS         start, end, armed at, horizon, work at its start, since when its piece lasts
+segment   SEGMENT_INTS            number of the level, piece, where coordinates and phases of its start stand
+          INSTANTS                start, before the end of the last one
+          COORDINATE_NUMBERS      of its start, see record.py
 start     STARTS                  y, y' (m,), the places that links hold, the energy of springs among them
           START_STATES            a state for every element
 event     EVENT_INTS              element, state entered (SHARED: an impulse on one that stays, before its event), left
-          EVENT_NUMBERS           time, six losses, impulse
+          EVENT_NUMBERS           time, two losses to truncation
+impact    IMPACT_INTS             which event it belongs to: those alone that have any of these are listed
+          IMPACT_NUMBERS          impulse, losses by impact, stop work, damping, friction
 
 A level is found by its key in a table, and so is a map by its two levels. Whatever is missing is asked for (NEED); what
 an element is, and what friction will make of one (more states, more exits, channels that maps set), is data alone.
@@ -47,7 +50,7 @@ __all__ = ["Batch", "Buffers"]
 # ---------------------------------------------------------------------- run record, ints
 
 ELEMENTS, CHANNELS, COORDINATES, WHOLE = 0, 1, 2, 3
-PRESCRIBED = 46  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
+PRESCRIBED = 117  # channels that are functions of time, the first ones; transitions alone set the others, the held ones
 KINDS, STIFFNESSES, DIRECTIONS = 4, 7, 8
 SEGMENTS = 5  # of a force law the link of its first knot, and how many knots are above and below; zero of others
 KNOTS = 6  # of all force laws
@@ -62,8 +65,8 @@ PIECES, PIECE_COUNT, PIECE, PIECE_NOW, TERMS_NOW, DRIVE_NEXT = (
     13,
     14,
     15,
-    47,
-    48,
+    118,
+    119,
     49,
 )  # records of pieces, how many, the present one, its record; terms
 NEEDED, NEEDED_FROM, NEEDED_KEY, GIVEN_UP = 16, 17, 18, 19  # what; of which level or exit; key; it cannot be had
@@ -73,10 +76,11 @@ CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the d
 FIRST_CHANGE = 72  # of the decision: those before it are impacts of the start
 WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, where their ring begins
 STOP_AT_EVENT, STARTING = 31, 71  # whether the run has still to begin: FRESH, from GIVEN, or GOING_ON, from CURRENT
-SEGMENT_INTS, SEGMENT_NUMBERS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
+SEGMENT_INTS, INSTANTS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
 COORDINATE_NUMBERS, COORDINATE_COUNT = 36, 37
 PHASE_INTS, PHASE_COUNT = 39, 40
 EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM = 42, 43, 44, 45
+IMPACT_INTS, IMPACT_NUMBERS, IMPACT_COUNT = 46, 47, 48
 LEFT_OUT, LEFT_OUT_COUNT = 38, 41  # segments of the record whose works are not summed
 
 # scratch memory: where it begins
@@ -180,8 +184,9 @@ CARRIERS, CARRIER_WIDTH = 10, 3  # of each its powers of time, where its rate st
 PIECE_TIMES, PIECE_TERMS, TERM_INTS = 0, 1, 2  # start and until in the numbers; of each term D + 1, where in waves
 CHANGE_WIDTH = 3  # ints: element, state entered or SHARED, state left
 SHARED = -1
-SEGMENT_WIDTH, SEGMENT_WIDTH_NUMBERS = 5, 6
-EVENT_WIDTH, EVENT_WIDTH_NUMBERS = 3, 8
+SEGMENT_WIDTH = 4
+DRIVEN_WIDTH = 3  # numbers of a start, after xi, xi', where channels are functions of time
+EVENT_WIDTH, EVENT_WIDTH_NUMBERS, IMPACT_WIDTH = 3, 3, 5
 
 # ---------------------------------------------------------------------- answers
 

@@ -159,21 +159,30 @@ class LevelArrays:
             n, exits = self._recorded = self.scratch.coordinates, self.scratch.exits
             room, events = self.room, max(self.room, self.scratch.changes)
             wanted = {
-                a.SEGMENT_INTS: ("ints", a.SEGMENT_WIDTH * room),
-                a.SEGMENT_NUMBERS: ("numbers", a.SEGMENT_WIDTH_NUMBERS * room),
-                a.COORDINATE_NUMBERS: ("numbers", 2 * n * room),
-                a.PHASE_INTS: ("ints", exits * room),
-                a.LEFT_OUT: ("ints", room),
-                a.EVENT_INTS: ("ints", a.EVENT_WIDTH * events),
-                a.EVENT_NUMBERS: ("numbers", a.EVENT_WIDTH_NUMBERS * events),
+                "ints": {
+                    a.SEGMENT_INTS: a.SEGMENT_WIDTH * room,
+                    a.PHASE_INTS: exits * room,
+                    a.LEFT_OUT: room,
+                    a.EVENT_INTS: a.EVENT_WIDTH * events,
+                    a.IMPACT_INTS: events,
+                },
+                "numbers": {
+                    a.INSTANTS: room + 1,
+                    a.COORDINATE_NUMBERS: (2 * n + a.DRIVEN_WIDTH + 1) * room,
+                    a.EVENT_NUMBERS: a.EVENT_WIDTH_NUMBERS * events,
+                    a.IMPACT_NUMBERS: a.IMPACT_WIDTH * events,
+                },
             }
-            for slot, (name, count) in wanted.items():
-                self.ints[slot] = self.buffers.take(name, count)
+            for name, sizes in wanted.items():
+                place = self.buffers.take(name, sum(sizes.values()))  # at once: a buffer that grows is copied
+                for slot, count in sizes.items():
+                    self.ints[slot] = place
+                    place += count
             self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
             self._let_others_go()
         ints = self.buffers.ints
         ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
-        ints[a.LEFT_OUT_COUNT] = 0
+        ints[a.LEFT_OUT_COUNT] = ints[a.IMPACT_COUNT] = 0
 
     def level(self, states: Sequence[int]) -> int:
         """Where the level of elements in these states stands in the ints, packed if it was not."""

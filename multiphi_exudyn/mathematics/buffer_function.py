@@ -6,6 +6,7 @@ It takes buffers and scalars, returns one scalar or nothing, and writes everythi
     def kinetic(numbers: Numbers, velocity: int, r: int) -> float: ...
 
     Ints: int64 buffer   Numbers: float64 buffer   Waves: complex128 buffer   int: integer or offset   float: number
+    Shorts: int32 buffer, of what is kept long
 
 Of its module it uses numbers and functions marked ``compiled``; beside these ``math``, ``cmath`` and what Python has
 built in.
@@ -29,15 +30,16 @@ from numpy.typing import NDArray
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Ints", "Numbers", "Signature", "Waves", "callees", "check", "compiled", "digest", "lines", "reached"]
-__all__ += ["signature", "symbol"]
+__all__ = ["Ints", "Numbers", "Shorts", "Signature", "Waves", "callees", "check", "compiled", "digest", "lines"]
+__all__ += ["reached", "signature", "symbol"]
 
 Ints = NDArray[np.int64]
+Shorts = NDArray[np.int32]
 Numbers = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-ARGUMENTS = (Ints, Numbers, Waves, int, float)
+ARGUMENTS = (Ints, Shorts, Numbers, Waves, int, float)
 RESULTS = (int, float, NoneType)
 
 _marked: set[FunctionType] = set()
@@ -64,8 +66,8 @@ def signature(function: FunctionType) -> Signature:
     found = Signature(tuple(map(hints.get, inspect.signature(function).parameters)), hints.get("return"))
     if found.result not in RESULTS or not set(found.arguments) <= set(ARGUMENTS):
         raise MultiPhiTypeError(
-            f"annotations: got {function.__qualname__}{inspect.signature(function)}, need Ints, Numbers, Waves, int or "
-            "float for every argument, and int, float or None for the result"
+            f"annotations: got {function.__qualname__}{inspect.signature(function)}, need Ints, Shorts, Numbers, "
+            "Waves, int or float for every argument, and int, float or None for the result"
         )
     return found
 

@@ -25,6 +25,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
 from multiphi_exudyn.mathematics.buffer_function import (
     Ints,
     Numbers,
+    Shorts,
     Waves,
     compiled,
     digest,
@@ -34,9 +35,14 @@ from multiphi_exudyn.mathematics.buffer_function import (
 )
 from multiphi_exudyn.mathematics.compiled_cache import cache_file, keep, kept, writable_folder
 
-__all__ = ["Entry", "Ints", "Numbers", "Waves", "available", "compile_entries", "compiled", "entry"]
+__all__ = ["Entry", "Ints", "Numbers", "Shorts", "Waves", "available", "compile_entries", "compiled", "entry"]
 
-TYPES: dict[Any, np.dtype] = {Ints: np.dtype(np.int64), Numbers: np.dtype(float), Waves: np.dtype(complex)}
+TYPES: dict[Any, np.dtype] = {
+    Ints: np.dtype(np.int64),
+    Shorts: np.dtype(np.int32),
+    Numbers: np.dtype(float),
+    Waves: np.dtype(complex),
+}
 SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
 
 _one_at_a_time = threading.RLock()  # neither numba nor LLVM is meant for two threads

@@ -28,13 +28,14 @@ from numba.core.typed_passes import NativeLowering, NoPythonBackend, NopythonTyp
 from numba.core.typing import Context
 from numba.core.untyped_passes import FixupArgs, TranslateByteCode
 
-from multiphi_exudyn.mathematics.buffer_function import Ints, Numbers, Waves, callees, signature, symbol
+from multiphi_exudyn.mathematics.buffer_function import Ints, Numbers, Shorts, Waves, callees, signature, symbol
 from multiphi_exudyn.mathematics.machine_code import RAISED, object_code, refusal
 
 __all__ = ["translated"]
 
 KINDS = {
     Ints: numba.types.CPointer(numba.types.int64),
+    Shorts: numba.types.CPointer(numba.types.int32),
     Numbers: numba.types.CPointer(numba.types.float64),
     Waves: numba.types.CPointer(numba.types.complex128),
     int: numba.types.int64,

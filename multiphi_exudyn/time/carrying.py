@@ -15,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     FRESH,
     GIVEN_UP,
     HORIZON,
+    IMPACT_COUNT,
     LEFT_OUT_COUNT,
     NEED,
     OF_A_RUN,
@@ -33,14 +34,14 @@ from multiphi_exudyn.events.arrays import (
     TRANSITIONS,
 )
 from multiphi_exudyn.events.drive import keep_drive, load_piece, set_drive
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Shorts, Waves, compiled
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.loop_record import keep_segment
 from multiphi_exudyn.time.sampling import sample_rows, sample_sizes
 
 __all__ = ["ENDS", "TOLD_WIDTH", "carry_starts", "measure_starts", "sample_starts"]
 
-ENDS = 5  # ints: segments, coordinates, phases, events and segments left out up to the end of a run
+ENDS = 6  # ints: segments, coordinates, phases, events, segments left out and impacts up to the end of a run
 TOLD_WIDTH = OF_A_RUN + 2
 
 
@@ -77,7 +78,7 @@ def carry_starts(
             before = ENDS * k
             ints[SEGMENT_COUNT], ints[COORDINATE_COUNT] = ends[before], ends[before + 1]
             ints[PHASE_COUNT], ints[EVENT_COUNT] = ends[before + 2], ends[before + 3]
-            ints[LEFT_OUT_COUNT] = ends[before + 4]
+            ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT] = ends[before + 4], ends[before + 5]
             return k
         for i in range(OF_A_RUN):
             told[k * TOLD_WIDTH + i] = numbers[i]
@@ -87,7 +88,7 @@ def carry_starts(
         keep_segment(ints, numbers, 0.0, numbers[HORIZON])
         after = ENDS * (k + 1)
         ends[after], ends[after + 1], ends[after + 2] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT], ints[PHASE_COUNT]
-        ends[after + 3], ends[after + 4] = ints[EVENT_COUNT], ints[LEFT_OUT_COUNT]
+        ends[after + 3], ends[after + 4], ends[after + 5] = ints[EVENT_COUNT], ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT]
     return count
 
 
@@ -96,10 +97,10 @@ def sample_starts(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
+    instants: Numbers,
     ends: Ints,
     runs: int,
     functions: Numbers,
@@ -118,7 +119,7 @@ def sample_starts(
         for p in range(points):
             place, function = (k * points + p) * count, p * levels * (2 * width + 1)
             status = sample_rows(
-                ints, numbers, waves, rows, spans, coordinates, offsets, ends[ENDS * k], ends[ENDS * (k + 1)] - 1,
+                ints, numbers, waves, rows, coordinates, offsets, instants, ends[ENDS * k], ends[ENDS * (k + 1)] - 1,
                 functions, function, width, times, count, 0, values, place,
             )  # fmt: skip
             if status == NEED:
@@ -131,10 +132,10 @@ def measure_starts(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
+    instants: Numbers,
     ends: Ints,
     asked: Ints,
     runs: int,
@@ -144,7 +145,7 @@ def measure_starts(
     """Mean of |y|^2 and largest energy (runs, 2) of those ``asked`` for, by ``sample_sizes``; OK or NEED."""
     for i in range(runs):
         first, last = ends[ENDS * asked[i]], ends[ENDS * (asked[i] + 1)] - 1
-        status = sample_sizes(ints, numbers, waves, rows, spans, coordinates, offsets, first, last, end)
+        status = sample_sizes(ints, numbers, waves, rows, coordinates, offsets, instants, first, last, end)
         if status == NEED:
             return NEED
         sizes[2 * i], sizes[2 * i + 1] = numbers[SEEN + 1], numbers[SEEN + 2]

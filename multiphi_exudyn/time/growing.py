@@ -6,13 +6,14 @@ import numpy as np
 
 __all__ = ["Growing"]
 
-BLOCK = 2**15  # rows of a block at most: some megabytes, that go back to the system when blocks are joined
+BLOCK = 2**15  # rows of a block at most: a megabyte, that goes back to the system when blocks are joined
+FILLED = 8  # of so many rows one is empty at most
 
 
 class Growing:
     """An array to which parts are added, in blocks that are joined when somebody looks at it.
 
-    A block has room for as many rows as there are already, up to ``BLOCK``.
+    A block is filled before the next; that has room for a ``FILLED``-th of the rows so far, up to ``BLOCK``.
 
     count: rows so far. bytes: what the blocks take.
     """
@@ -29,14 +30,15 @@ class Growing:
             self._blocks, self._used, self.count, self.bytes = [part], len(part), len(part), part.nbytes
             return
         last = self._blocks[-1]
-        if self._used + len(part) > len(last):
-            self._blocks[-1] = last[: self._used]
-            last = np.empty((max(min(BLOCK, self.count), len(part)), *part.shape[1:]), part.dtype)
+        fitting = min(len(last) - self._used, len(part))
+        last[self._used : self._used + fitting] = part[:fitting]
+        self._used += fitting
+        if rest := len(part) - fitting:
+            last = np.empty((max(min(BLOCK, self.count // FILLED), rest), *part.shape[1:]), part.dtype)
+            last[:rest] = part[fitting:]
             self._blocks.append(last)
-            self._used = 0
+            self._used = rest
             self.bytes += last.nbytes
-        last[self._used : self._used + len(part)] = part
-        self._used += len(part)
         self.count += len(part)
 
     @property

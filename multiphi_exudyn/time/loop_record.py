@@ -5,6 +5,7 @@ from __future__ import annotations
 from multiphi_exudyn.events.arrays import (
     AGE,
     ALLOWED,
+    BY_IMPACT,
     CHANGE_COUNT,
     CHANGE_IMPULSES,
     CHANGE_WIDTH,
@@ -13,14 +14,22 @@ from multiphi_exudyn.events.arrays import (
     COORDINATE_COUNT,
     COORDINATE_NUMBERS,
     CURRENT,
+    DAMPING,
     DECISIONS,
+    DRIVEN_WIDTH,
     EVENT_COUNT,
     EVENT_INTS,
     EVENT_NUMBERS,
     EVENT_WIDTH,
     EVENT_WIDTH_NUMBERS,
     EXIT_COUNT,
+    FRICTION,
+    IMPACT_COUNT,
+    IMPACT_INTS,
+    IMPACT_NUMBERS,
+    IMPACT_WIDTH,
     INSTANT_TIME,
+    INSTANTS,
     KINETIC,
     LEFT_OUT,
     LEFT_OUT_COUNT,
@@ -35,15 +44,15 @@ from multiphi_exudyn.events.arrays import (
     PHASES,
     PIECE,
     PLACE,
+    PRESCRIBED,
     RING,
     SEGMENT_COUNT,
     SEGMENT_INTS,
-    SEGMENT_NUMBERS,
     SEGMENT_WIDTH,
-    SEGMENT_WIDTH_NUMBERS,
     SETTLED,
     SHARED,
     SPEED,
+    STOP_WORK,
     STRAIN,
     SUMMED,
     TIME,
@@ -68,25 +77,28 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) 
     n, row = ints[level + MODES] + ints[CHANNELS], ints[SEGMENT_INTS] + k * SEGMENT_WIDTH
     ints[row] = ints[level + NUMBER]
     ints[row + 1] = ints[PIECE]
-    ints[row + 2] = ints[EVENT_COUNT]
-    ints[row + 3] = ints[COORDINATE_COUNT]
-    ints[row + 4] = ints[PHASE_COUNT] if ints[CURRENT + SETTLED] == 0 else -1
-    if ints[CURRENT + SETTLED] == 0:
-        for e in range(ints[level + EXIT_COUNT]):
-            ints[ints[PHASE_INTS] + ints[PHASE_COUNT] + e] = ints[ints[CURRENT + PHASES] + e]
-        ints[PHASE_COUNT] += ints[level + EXIT_COUNT]
-    given = ints[SEGMENT_NUMBERS] + k * SEGMENT_WIDTH_NUMBERS
-    numbers[given] = numbers[TIME]
-    numbers[given + 1] = numbers[INSTANT_TIME]
-    numbers[given + 2] = armed_at
-    numbers[given + 3] = horizon
-    numbers[given + 4] = numbers[WORK]
-    numbers[given + 5] = numbers[AGE]
+    ints[row + 2] = ints[COORDINATE_COUNT]
+    ints[row + 3] = -1
+    numbers[ints[INSTANTS] + k] = numbers[TIME]
+    numbers[ints[INSTANTS] + k + 1] = numbers[INSTANT_TIME]
     kept = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
     for i in range(n):
         numbers[kept + i] = numbers[ints[CURRENT + PLACE] + i]
         numbers[kept + n + i] = numbers[ints[CURRENT + SPEED] + i]
-    ints[COORDINATE_COUNT] += 2 * n
+    kept += 2 * n
+    if ints[PRESCRIBED] > 0:
+        numbers[kept] = horizon
+        numbers[kept + 1] = numbers[WORK]
+        numbers[kept + 2] = numbers[AGE]
+        kept += DRIVEN_WIDTH
+    if ints[CURRENT + SETTLED] == 0:
+        ints[row + 3] = ints[PHASE_COUNT]
+        for e in range(ints[level + EXIT_COUNT]):
+            ints[ints[PHASE_INTS] + ints[PHASE_COUNT] + e] = ints[ints[CURRENT + PHASES] + e]
+        ints[PHASE_COUNT] += ints[level + EXIT_COUNT]
+        numbers[kept] = armed_at
+        kept += 1
+    ints[COORDINATE_COUNT] = kept - ints[COORDINATE_NUMBERS]
     ints[SEGMENT_COUNT] = k + 1
     if ints[SUMMED] == 1:
         numbers[WORKS + 1] += numbers[WORK]
@@ -106,20 +118,37 @@ def keep_events(ints: Ints, numbers: Numbers) -> None:
     for k in range(ints[CHANGE_COUNT]):
         row = ints[EVENT_INTS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH
         given = ints[EVENT_NUMBERS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH_NUMBERS
-        entered = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1]
+        entered, impulse, carries = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1], numbers[ints[CHANGE_IMPULSES] + k], 0
         ints[row] = ints[ints[CHANGES] + k * CHANGE_WIDTH]
-        ints[row + 2] = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
         ints[row + 1] = entered
+        ints[row + 2] = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
+        struck = 1 if impulse != 0.0 else 0
+        if first == 1 and entered != SHARED:
+            first, carries = 0, 1
+            for part in range(LOSSES):
+                numbers[LOST_SO_FAR + part] += numbers[LOST + part]
+                if part != KINETIC and part != STRAIN and numbers[LOST + part] != 0.0:
+                    struck = 1
+            numbers[TRUNCATED] += abs(numbers[LOST + KINETIC] + numbers[LOST + STRAIN])
         numbers[given] = numbers[TIME]
-        for part in range(LOSSES):
-            lost = numbers[LOST + part] if first == 1 and entered != SHARED else 0.0
-            numbers[given + 1 + part] = lost
-            numbers[LOST_SO_FAR + part] += lost
-        numbers[given + 1 + LOSSES] = numbers[ints[CHANGE_IMPULSES] + k]
-        if entered != SHARED:
-            numbers[TRUNCATED] += abs(numbers[LOST + KINETIC] + numbers[LOST + STRAIN]) if first == 1 else 0.0
-            first = 0
+        numbers[given + 1] = numbers[LOST + KINETIC] if carries == 1 else 0.0
+        numbers[given + 2] = numbers[LOST + STRAIN] if carries == 1 else 0.0
+        if struck == 1:
+            keep_impact(ints, numbers, ints[EVENT_COUNT] + k, impulse, carries)
     ints[EVENT_COUNT] += ints[CHANGE_COUNT]
+
+
+@compiled
+def keep_impact(ints: Ints, numbers: Numbers, event: int, impulse: float, carries: int) -> None:
+    """Record the impulse of an event, and the losses of its instant but those to truncation if it ``carries`` them."""
+    given = ints[IMPACT_NUMBERS] + ints[IMPACT_COUNT] * IMPACT_WIDTH
+    ints[ints[IMPACT_INTS] + ints[IMPACT_COUNT]] = event
+    numbers[given] = impulse
+    numbers[given + 1] = numbers[LOST + BY_IMPACT] if carries == 1 else 0.0
+    numbers[given + 2] = numbers[LOST + STOP_WORK] if carries == 1 else 0.0
+    numbers[given + 3] = numbers[LOST + DAMPING] if carries == 1 else 0.0
+    numbers[given + 4] = numbers[LOST + FRICTION] if carries == 1 else 0.0
+    ints[IMPACT_COUNT] += 1
 
 
 @compiled

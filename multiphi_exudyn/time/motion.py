@@ -249,13 +249,13 @@ class Motion:
 
         told: numbers of a run at its end, evaluations, transitions. It goes no further: its chatter check begins anew.
         """
-        rows, spans = part["rows"], part["spans"]
-        number, piece, _, start, waits = rows[-1].tolist()
+        rows = part["rows"]
+        number, piece, start, waits = rows[-1].tolist()
         level = self.arrays.loaded[number]
         n, exits = level.level.modes, len(exits_of(level))
         phases = part["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
         x = part["coordinates"][start : start + 2 * n]
-        self.record.keep(part | {"rows": rows[:-1], "spans": spans[:-1]})
+        self.record.keep(part | {"rows": rows[:-1]})
         ended = Ending(
             told[: a.OF_A_RUN],
             self.record,

@@ -13,9 +13,9 @@ from multiphi_exudyn.events.excitation import Drive
 from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Event, Loss, Phase
+from multiphi_exudyn.events.state import Phase
 from multiphi_exudyn.mathematics.compiled import entry
-from multiphi_exudyn.mechanics.element import Element, ElementState, event_kind
+from multiphi_exudyn.mechanics.element import Element, ElementState
 from multiphi_exudyn.time.flow import Flow
 from multiphi_exudyn.time.growing import Growing
 from multiphi_exudyn.time.sampling import sample_rows, sample_sizes, sample_states
@@ -33,6 +33,7 @@ works_of = entry(integrate_works)
 FEW = 2  # levels: of more it is looked for those that hold at the times asked for
 
 STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
+UNDRIVEN = 1.0, 0.0, 0.0  # horizon, work and age then
 
 
 def _joined(name: str) -> property:
@@ -43,13 +44,14 @@ def _joined(name: str) -> property:
 class Record:
     """Segments and events of a run, in arrays that grow by parts.
 
-    levels: each once. rows (n, 5): number of the level in them, piece, events before, where coordinates and phases
-    stand (-1: all armed).
-    spans (n, 6): start, end, armed at, horizon [s], work [J] at the start, since when [s] its piece lasts.
-    coordinates: xi, xi' of every start.
+    levels: each once. rows (n, 4): number of the level in them, piece, where coordinates and phases stand (-1: all
+    armed). instants (n + 1,): starts, and the end of the last [s].
+    coordinates: of every start xi, xi'; where channels are functions of time horizon [s], work [J] at the start, since
+    when [s] its piece lasts; where some phases are not armed, when after it [s] the last of them was.
     phases: of the starts at which some are not armed. left_out: places of segments whose works the loop has not summed.
-    kinds (m, 3): contact, state entered, or SHARED, state left.
-    amounts (m, 8): time [s], six losses [J], impulse [N s]. arrays: those of the loop.
+    kinds (m, 3): contact, state entered, or SHARED, state left. amounts (m, 3): time [s], two losses to truncation [J].
+    struck (p,): which of these have any of impacts (p, 5): impulse [N s], losses [J] by impact, as stop work, to
+    damping, to friction. arrays: those of the loop.
     """
 
     def __init__(self, contacts: Sequence[Element], arrays: LevelArrays) -> None:
@@ -60,9 +62,9 @@ class Record:
         self._parts: dict[str, Growing] = {}
         self._last: dict[str, np.ndarray] = {}  # taken, and not among the parts yet
 
-    rows, spans, coordinates = _joined("rows"), _joined("spans"), _joined("coordinates")
-    phases, kinds, amounts = _joined("phases"), _joined("kinds"), _joined("amounts")
-    left_out = _joined("left_out")
+    rows, instants, coordinates = _joined("rows"), _joined("instants"), _joined("coordinates")
+    phases, left_out = _joined("phases"), _joined("left_out")
+    kinds, amounts, struck, impacts = _joined("kinds"), _joined("amounts"), _joined("struck"), _joined("impacts")
 
     def take(self) -> None:
         """Take over what the loop has written."""
@@ -111,11 +113,14 @@ class Record:
     def _add(self, part: dict[str, np.ndarray]) -> None:
         parts, rows = self._parts, part.get("rows", EMPTY["rows"])
         if parts:
-            rows[:, 2] += parts["kinds"].count
-            rows[:, 3] += parts["coordinates"].count
-            rows[rows[:, 4] >= 0, 4] += parts["phases"].count
+            rows[:, 2] += parts["coordinates"].count
+            rows[rows[:, 3] >= 0, 3] += parts["phases"].count
             if "left_out" in part:
                 part["left_out"] += parts["rows"].count
+            if "struck" in part:
+                part["struck"] += parts["kinds"].count
+            if parts["instants"].count and "instants" in part:
+                part["instants"] = part["instants"][1:]  # the first one is the end of what was there
         else:
             self._parts = parts = {name: Growing(empty) for name, empty in EMPTY.items()}
         for name, given in part.items():
@@ -136,7 +141,7 @@ class Record:
     @functools.cached_property
     def places(self) -> np.ndarray:
         """Which rows of kinds and amounts are events."""
-        return np.flatnonzero(self.kinds[:, 1] != a.SHARED)
+        return np.flatnonzero(self.kinds[:, 1] != a.SHARED).astype(np.int32)
 
     @functools.cached_property
     def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
@@ -149,7 +154,7 @@ class Record:
 
     def state(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """xi, xi' (n,) at the start of the i-th segment."""
-        n, start = self.level(i).level.modes, self.rows[i, 3]
+        n, start = self.level(i).level.modes, self.rows[i, 2]
         return self.coordinates[start : start + n], self.coordinates[start + n : start + 2 * n]
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -170,7 +175,7 @@ class Record:
         """row.(xi, xi', 1) (k,) at times (k,) [s]; row: (2 n + 1,) of a level with n coordinates."""
         visited = list(range(len(self.levels)))
         if len(visited) > FEW:
-            first, last = owners(self.spans[:, 0], np.array([times.min(), times.max()]), side).tolist()
+            first, last = owners(self.instants[:-1], np.array([times.min(), times.max()]), side).tolist()
             visited = sorted(set(self.rows[first : last + 1, 0].tolist()))
         width = max(self.levels[number].level.modes for number in visited)
         functions, result = np.zeros((len(self.levels), 2 * width + 1)), np.empty(len(times))
@@ -180,7 +185,7 @@ class Record:
             functions[number, -1] = function[-1]
         asked = functions.ravel(), 0, width, np.ascontiguousarray(times), len(times), int(side == "left"), result, 0
         for offsets in self._packed(visited):
-            while self._supply(values_of(*self._given(offsets), 0, len(self.rows), *asked)):
+            while self._supply(values_of(*self._given(offsets), self.instants, 0, len(self.rows), *asked)):
                 pass
         return result
 
@@ -188,7 +193,7 @@ class Record:
         """Mean of |y|^2 and largest energy up to ``end`` [s], see ``Segments``."""
         square, largest = 0.0, 0.0
         for offsets in self._packed(list(range(len(self.levels)))):
-            while self._supply(sizes_of(*self._given(offsets), 0, len(self.rows), end)):
+            while self._supply(sizes_of(*self._given(offsets), self.instants, 0, len(self.rows), end)):
                 pass
             square += float(self.arrays.numbers[a.SEEN + 1])
             largest = max(largest, float(self.arrays.numbers[a.SEEN + 2]))
@@ -201,7 +206,8 @@ class Record:
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_powers(level)
             works = np.zeros(3)
-            while self._supply(works_of(*self._given(offsets), places, len(places), self._work_memory(), works)):
+            asked = self.instants, places, len(places), self._work_memory(), works
+            while self._supply(works_of(*self._given(offsets), *asked)):
                 works[:] = 0.0
             total += works
         damping, varying, friction = total.tolist()
@@ -212,7 +218,7 @@ class Record:
         given, total = [level.potential_form.follows for level in self.levels], 0.0
         for number in (k for k, rows in enumerate(given) if len(rows)):
             own, n = places[self.rows[places, 0] == number], given[number].shape[1] - 1
-            for sign, after in ((-1, np.zeros(len(own))), (1, self.spans[own, 1] - self.spans[own, 0])):
+            for sign, after in ((-1, np.zeros(len(own))), (1, self.instants[own + 1] - self.instants[own])):
                 x = self.states(own, after)[0][:, :n]
                 total += sign * 0.5 * float(np.sum((x @ given[number][:, :-1].T + given[number][:, -1]) ** 2))
         return total
@@ -236,13 +242,7 @@ class Record:
 
     def _given(self, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
         """What every entry of sampling.py and work.py is given first."""
-        return (
-            *self.arrays.lent(int(self.rows[-1, 1])),
-            self.rows.ravel(),
-            self.spans.ravel(),
-            self.coordinates,
-            offsets,
-        )
+        return *self.arrays.lent(int(self.rows[-1, 1])), self.rows.ravel(), self.coordinates, offsets
 
     def _supply(self, answer: int) -> bool:
         """Whether an entry needs something, which it then has when it is called again."""
@@ -252,14 +252,14 @@ class Record:
 
     def standing(self, i: int) -> tuple[Phase, ...]:
         """The phases at the start of the i-th segment."""
-        level, start = self.level(i), self.rows[i, 4]
+        level, start = self.level(i), self.rows[i, 3]
         armed = (Phase.ARMED,) * len(exits_of(level))
         return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:
         """The phases (n, e), in numbers, at the start of every segment; e: the most exits of a level."""
         counts = np.array([len(exits_of(level)) for level in self.levels], np.int64)[self.rows[:, 0]]
-        numbers, starts = np.zeros((len(self.rows), int(np.max(counts, initial=0))), np.int64), self.rows[:, 4]
+        numbers, starts = np.zeros((len(self.rows), int(np.max(counts, initial=0))), np.int64), self.rows[:, 3]
         for count in np.unique(counts[starts >= 0]).tolist():
             unsettled = (starts >= 0) & (counts == count)
             numbers[unsettled, :count] = self.phases[starts[unsettled][:, None] + np.arange(count)]
@@ -267,20 +267,27 @@ class Record:
 
     def segment(self, i: int) -> Segment:
         """The i-th segment."""
-        level, (start, end, armed_at, horizon, work, age) = self.level(i), self.spans[i].tolist()
+        level, (start, end) = self.level(i), self.instants[i : i + 2].tolist()
         xi, xi_t = self.state(i)
+        horizon, work, age, armed_at = self._beside(i)
         held = xi[level.modal.modes + level.excitation.prescribed :]
         drive = self.arrays.channels.drive(self.rows[i, 1]).after(age) if level.excitation.prescribed else STILL
         flow = Flow.of(level, xi, xi_t, drive.beside(held), horizon)
         return Segment(start, end, level, flow, self.standing(i), armed_at, work)
 
-    def event(self, i: int) -> Event:
-        """The i-th event."""
-        place = int(self.places[i])
-        before = int(self.places[i - 1]) + 1 if i else 0
-        time, *lost, impulse = self.amounts[place].tolist()
-        contact, entered, left = self.kinds[place].tolist()
-        shared = tuple((self.told[self.kinds[k, 0]][0], float(self.amounts[k, -1])) for k in range(before, place))
-        name, states = self.told[contact]
-        kind = event_kind(states, left, entered)
-        return Event(time, name, kind, Loss(*lost), impulse, shared, states[entered].name)
+    def _beside(self, i: int) -> tuple[float, float, float, float]:
+        """Of the i-th start: horizon, work, since when its piece lasts, when the last phase was armed after it."""
+        level, (*_, start, phases) = self.level(i), self.rows[i].tolist()
+        place, driven = start + 2 * level.level.modes, UNDRIVEN
+        if level.excitation.prescribed:
+            driven = self.coordinates[place : place + a.DRIVEN_WIDTH].tolist()
+            place += a.DRIVEN_WIDTH
+        return *driven, float(self.coordinates[place]) if phases >= 0 else 0.0
+
+    @property
+    def losses(self) -> np.ndarray:
+        """Energies [J] lost at every row of kinds, (m, 6)."""
+        losses = np.zeros((len(self.kinds), a.LOSSES))
+        losses[:, [a.KINETIC, a.STRAIN]] = self.amounts[:, 1:]
+        losses[self.struck[:, None], [a.BY_IMPACT, a.STOP_WORK, a.DAMPING, a.FRICTION]] = self.impacts[:, 1:]
+        return losses

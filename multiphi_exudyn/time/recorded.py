@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import bisect
 import functools
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar, overload
 
 import numpy as np
 
+from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Event, Loss
+from multiphi_exudyn.mechanics.element import event_kind
 from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.segment import Segment, Segments
 
@@ -65,12 +68,12 @@ class Recorded(Made[Segment], Segments):
     @functools.cached_property
     def starts(self) -> np.ndarray:
         """See ``Segments``."""
-        return self._record.spans[: self._count, 0]
+        return self._record.instants[: self._count]
 
     @functools.cached_property
     def ends(self) -> np.ndarray:
         """See ``Segments``."""
-        return self._record.spans[: self._count, 1]
+        return self._record.instants[1 : self._count + 1]
 
     @functools.cached_property
     def numbers(self) -> np.ndarray:
@@ -123,7 +126,7 @@ class Events(Made[Event]):
     """The events of a record so far; lost (6,): the energies [J] that left at all of them."""
 
     def __init__(self, record: Record, lost: np.ndarray) -> None:
-        self._make, self._count, self._known = record.event, 0 if record.eventless else len(record.places), {}
+        self._count, self._known = 0 if record.eventless else len(record.places), {}
         self._record, self._lost = record, lost
 
     @property
@@ -133,12 +136,41 @@ class Events(Made[Event]):
 
     def impulse(self, contact: str, first: float, last: float) -> float:
         """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
-        names, (kinds, amounts) = [name for name, _ in self._record.told], (self._record.kinds, self._record.amounts)
-        own = (kinds[:, 0] == names.index(contact)) & (amounts[:, 0] >= first) & (amounts[:, 0] <= last)
-        return float(amounts[own, -1].sum())
+        names, times = [name for name, _ in self._record.told], self._record.amounts[:, 0]
+        own = (self._record.kinds[:, 0] == names.index(contact)) & (times >= first) & (times <= last)
+        return float(self._impulses[own].sum())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
         places, amounts = self._record.places, self._record.amounts
-        time, truncation = amounts[places, 0], amounts[places, 2] + amounts[places, 3]
-        return np.column_stack([time, self._record.kinds[places, 0], amounts[places, -1], truncation])
+        time, truncation = amounts[places, 0], amounts[places, 1] + amounts[places, 2]
+        return np.column_stack([time, self._record.kinds[places, 0], self._impulses[places], truncation])
+
+    @property
+    def _impulses(self) -> np.ndarray:
+        """Of every row of kinds (m,) [N s]."""
+        impulses = np.zeros(len(self._record.kinds))
+        impulses[self._record.struck] = self._record.impacts[:, 0]
+        return impulses
+
+    def _impact(self, place: int) -> list[float]:
+        """The row of impacts that belongs to a row of kinds, zeros where there is none."""
+        struck = self._record.struck
+        k = bisect.bisect_left(struck, place)
+        if k == len(struck) or struck[k] != place:
+            return [0.0] * a.IMPACT_WIDTH
+        found: list[float] = self._record.impacts[k].tolist()
+        return found
+
+    def _make(self, i: int) -> Event:
+        """The i-th event."""
+        record, told = self._record, self._record.told
+        place = int(record.places[i])
+        before = int(record.places[i - 1]) + 1 if i else 0
+        time, kinetic, strain = record.amounts[place].tolist()
+        impulse, impact, stop_work, damping, friction = self._impact(place)
+        contact, entered, left = record.kinds[place].tolist()
+        shared = tuple((told[record.kinds[k, 0]][0], self._impact(k)[0]) for k in range(before, place))
+        name, states = told[contact]
+        kind, loss = event_kind(states, left, entered), Loss(impact, kinetic, strain, stop_work, damping, friction)
+        return Event(time, name, kind, loss, impulse, shared, states[entered].name)

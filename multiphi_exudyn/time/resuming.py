@@ -27,14 +27,13 @@ from multiphi_exudyn.events.arrays import (
     PRESCRIBED,
     RESPONSE,
     SEGMENT_WIDTH,
-    SEGMENT_WIDTH_NUMBERS,
     SPEED,
     TERM_INTS,
 )
 from multiphi_exudyn.events.drive import load_piece, set_drive
 from multiphi_exudyn.events.flow import expand
 from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Shorts, Waves, compiled
 from multiphi_exudyn.mathematics.forced_response import NEAREST_FAR, PER_DEGREE
 from multiphi_exudyn.mathematics.response_arrays import FREE
 
@@ -46,8 +45,7 @@ def resume(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
     i: int,
@@ -57,8 +55,8 @@ def resume(
 
     widest: by how much its horizon may be longer than it was, for a response of fewer terms.
     """
-    segment, given, level = i * SEGMENT_WIDTH, i * SEGMENT_WIDTH_NUMBERS, offsets[rows[i * SEGMENT_WIDTH]]
-    n, start = ints[level + MODES] + ints[CHANNELS], rows[segment + 3]
+    segment, level = i * SEGMENT_WIDTH, offsets[rows[i * SEGMENT_WIDTH]]
+    n, start = ints[level + MODES] + ints[CHANNELS], rows[segment + 2]
     for k in range(n):
         numbers[ints[AFTER + PLACE] + k] = coordinates[start + k]
         numbers[ints[AFTER + SPEED] + k] = coordinates[start + n + k]
@@ -66,8 +64,8 @@ def resume(
     ints[PIECE] = rows[segment + 1]
     if ints[PRESCRIBED] > 0:
         load_piece(ints, waves)
-        set_drive(ints, numbers, waves, ints[DRIVE_NEXT], spans[given + 5], 0.0, 1.0)
-        numbers[HORIZON] = spans[given + 3]
+        set_drive(ints, numbers, waves, ints[DRIVE_NEXT], coordinates[start + 2 * n + 2], 0.0, 1.0)
+        numbers[HORIZON] = coordinates[start + 2 * n]
         numbers[HORIZON] *= widened(ints, numbers, waves, ints[level + RESPONSE], widest)
     expand(ints, numbers, waves, AFTER)
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:

@@ -31,7 +31,6 @@ from multiphi_exudyn.events.arrays import (
     RESPONSE,
     SEEN,
     SEGMENT_WIDTH,
-    SEGMENT_WIDTH_NUMBERS,
     SIGNALS,
     SIZES,
     SPEED,
@@ -39,7 +38,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.flow import state_at
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, differentiate, exponentials
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Shorts, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import SHAPES
 from multiphi_exudyn.time.looking import SAMPLES, see
 from multiphi_exudyn.time.resuming import resume
@@ -55,8 +54,7 @@ def sample_states(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
     places: Ints,
@@ -72,12 +70,12 @@ def sample_states(
     flowing = -1
     for k in range(count):
         i, t = places[k], after[k]
-        level, start = offsets[rows[i * SEGMENT_WIDTH]], rows[i * SEGMENT_WIDTH + 3]
+        level, start = offsets[rows[i * SEGMENT_WIDTH]], rows[i * SEGMENT_WIDTH + 2]
         if level == 0:
             continue
         n, x, v = ints[level + MODES] + ints[CHANNELS], ints[AFTER + PLACE], ints[AFTER + SPEED]
         if t != 0.0 and flowing != i:
-            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
+            if resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
             flowing = i
         if t != 0.0:
@@ -93,10 +91,10 @@ def sample_rows(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
+    instants: Numbers,
     first: int,
     segments: int,
     functions: Numbers,
@@ -115,15 +113,15 @@ def sample_rows(
     """
     i, k, step = -1, 0, even_step(times, count)
     while k < count:
-        i = owner_of(spans, first, segments, times[k], left, i)
+        i = owner_of(instants, first, segments, times[k], left, i)
         level, last = offsets[rows[i * SEGMENT_WIDTH]], k + 1
-        until = spans[(i + 1) * SEGMENT_WIDTH_NUMBERS] if i + 1 < segments else math.inf
+        until = instants[i + 1] if i + 1 < segments else math.inf
         while last < count and times[k] < times[last] < until:
             last += 1
         if level > 0:
-            if resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
+            if resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
-            began, row = spans[i * SEGMENT_WIDTH_NUMBERS], function + rows[i * SEGMENT_WIDTH] * (2 * width + 1)
+            began, row = instants[i], function + rows[i * SEGMENT_WIDTH] * (2 * width + 1)
             weigh(ints, numbers, waves, level, functions, row, width)
             constant, n = functions[row + 2 * width], ints[level + MODES] + ints[CHANNELS]
             for held in range(n - ints[CHANNELS] + ints[PRESCRIBED], n):
@@ -138,10 +136,10 @@ def sample_sizes(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
+    instants: Numbers,
     begin: int,
     segments: int,
     end: float,
@@ -150,22 +148,22 @@ def sample_sizes(
 
     Of the segments from ``begin`` before ``segments``. OK or NEED.
     """
-    i, flowing, first = -1, -1, spans[begin * SEGMENT_WIDTH_NUMBERS]
+    i, flowing, first = -1, -1, instants[begin]
     for part in range(LOOK_WIDTH):
         numbers[SEEN + part] = 0.0
     for k in range(SAMPLES):
         t = end if k == SAMPLES - 1 else first + (end - first) * k / (SAMPLES - 1)
-        i = owner_of(spans, begin, segments, t, 0, i)
+        i = owner_of(instants, begin, segments, t, 0, i)
         level = offsets[rows[i * SEGMENT_WIDTH]]
         if level == 0:
             continue
         if ints[level + SIZES] == 0:
             ints[NEEDED], ints[NEEDED_FROM] = NEED_SIZES, level
             return NEED
-        if flowing != i and resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0) == NEED:
+        if flowing != i and resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
             return NEED
         flowing, weight = i, 0.5 if k == 0 or k == SAMPLES - 1 else 1.0
-        see(ints, numbers, waves, level, t - spans[i * SEGMENT_WIDTH_NUMBERS], weight)
+        see(ints, numbers, waves, level, t - instants[i], weight)
     return OK
 
 
@@ -236,16 +234,16 @@ def even_step(times: Numbers, count: int) -> float:
 
 
 @compiled
-def owner_of(spans: Numbers, first: int, segments: int, t: float, left: int, near: int) -> int:
+def owner_of(instants: Numbers, first: int, segments: int, t: float, left: int, near: int) -> int:
     """The last segment that begins at a time [s] or before, from the left the last before it; at least the first."""
     low, high = first, segments
-    if near >= 0 and spans[near * SEGMENT_WIDTH_NUMBERS] < t:
+    if near >= 0 and instants[near] < t:
         low, high = near, min(near + 2, segments)
-        if high < segments and spans[high * SEGMENT_WIDTH_NUMBERS] <= t:
+        if high < segments and instants[high] <= t:
             high = segments
     while high - low > 1:
         middle = (low + high) // 2
-        begins = spans[middle * SEGMENT_WIDTH_NUMBERS]
+        begins = instants[middle]
         if begins < t or (begins == t and left == 0):
             low = middle
         else:

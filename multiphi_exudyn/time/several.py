@@ -94,8 +94,8 @@ class Several:
         offsets = np.zeros(self._visited[-1] + 1, np.int64)
         for number in self._visited:
             offsets[number] = self.arrays.level(self.arrays.loaded[number].states)
-        rows, spans = self.parts["rows"].ravel(), self.parts["spans"].ravel()
-        return rows, spans, self.parts["coordinates"], offsets, self.ends.ravel()
+        parts = self.parts
+        return parts["rows"].ravel(), parts["coordinates"], offsets, parts["instants"], self.ends.ravel()
 
     def _asked(self, function: Callable[..., Any], *given: Any) -> None:
         """Call a compiled function about the record until it has all that it needs."""
@@ -138,19 +138,20 @@ class Several:
 
     def struck(self, k: int) -> bool:
         """Whether a rigid contact was struck in a run."""
-        (*_, first, _), (*_, last, _) = self.ends[k], self.ends[k + 1]
-        amounts, kinds = (self.parts[name][first:last] for name in ("amounts", "kinds"))
-        return bool(np.any(amounts[kinds[:, 1] != a.SHARED, -1] > 0))
+        own = slice(self.ends[k, 5], self.ends[k + 1, 5])
+        events, impulses = self.parts["struck"][own], self.parts["impacts"][own, 0]
+        return bool(np.any(impulses[self.parts["kinds"][events, 1] != a.SHARED] > 0))
 
     def land(self, k: int) -> Motion:
         """The run as a motion that has come to the end."""
-        (s, _, _, e, left), (s_end, _, _, e_end, left_end) = self.ends[k].tolist(), self.ends[k + 1].tolist()
+        (s, _, _, e, left, i), (s_end, _, _, e_end, left_end, i_end) = self.ends[k : k + 2].tolist()
         part = {name: given for name, given in self.parts.items() if name in ("coordinates", "phases")}
-        part |= {"rows": self.parts["rows"][s:s_end].copy(), "spans": self.parts["spans"][s:s_end]}
+        part |= {"rows": self.parts["rows"][s:s_end].copy(), "instants": self.parts["instants"][s:s_end]}
         part |= {name: self.parts[name][e:e_end] for name in ("kinds", "amounts") if e_end > e}
+        if i_end > i:
+            part |= {"struck": self.parts["struck"][i:i_end] - e, "impacts": self.parts["impacts"][i:i_end]}
         if left_end > left:
             part["left_out"] = self.parts["left_out"][left:left_end] - s
-        part["rows"][:, 2] -= e
         motion = Motion(self.arrays, self.starts[k])
         motion.land(part, self.told[k])
         return motion

@@ -35,12 +35,11 @@ from multiphi_exudyn.events.arrays import (
     RUBBING,
     RUBBINGS,
     SEGMENT_WIDTH,
-    SEGMENT_WIDTH_NUMBERS,
     SWINGS,
     WORK_WAVES,
 )
 from multiphi_exudyn.mathematics.basis_arrays import POWERS, RATES, SCALES, exponentials
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Shorts, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import REACHED
 from multiphi_exudyn.time.resuming import resume
 from multiphi_exudyn.time.work_sums import INFLATED
@@ -71,10 +70,10 @@ def integrate_works(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    rows: Ints,
-    spans: Numbers,
+    rows: Shorts,
     coordinates: Numbers,
     offsets: Ints,
+    instants: Numbers,
     places: Ints,
     count: int,
     scratch: Waves,
@@ -88,21 +87,24 @@ def integrate_works(
     largest = 0.0
     for which in range(count):
         i = places[which]
-        level, given = offsets[rows[i * SEGMENT_WIDTH]], i * SEGMENT_WIDTH_NUMBERS
+        level = offsets[rows[i * SEGMENT_WIDTH]]
         if level == 0:
             continue
-        status = resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, WIDEST)
-        if status != NEED and ints[PRESCRIBED] > 0 and numbers[HORIZON] > spans[given + 3]:
+        q = ints[CHANNELS]
+        n, duration = ints[level + MODES] + q, instants[i + 1] - instants[i]
+        driven = rows[i * SEGMENT_WIDTH + 2] + 2 * n  # where its horizon and the work at its start stand
+        status = resume(ints, numbers, waves, rows, coordinates, offsets, i, WIDEST)
+        if status != NEED and ints[PRESCRIBED] > 0 and numbers[HORIZON] > coordinates[driven]:
             largest = max(largest, swinging(ints, numbers))
             if swinging_alone(ints, waves) > INFLATED * largest:
-                status = resume(ints, numbers, waves, rows, spans, coordinates, offsets, i, 1.0)
+                status = resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0)
         if status == NEED:
             return NEED
-        q, duration = ints[CHANNELS], spans[given + 1] - spans[given]
-        n, p = ints[level + MODES] + q, ints[FLOW_COUNT]
+        p = ints[FLOW_COUNT]
         place, sums = 0, 4 * n * p + 2 * q * p + 2 * ints[level + RUBBINGS] * p
         exponentials(ints, numbers, waves, ints[FLOW_BASIS], duration, duration, ints[WORK_WAVES])
-        works[1] += spans[given + 4]
+        if ints[PRESCRIBED] > 0:
+            works[1] += coordinates[driven + 1]
         apart = 0  # terms whose products need no integral
         if ints[level + DISSIPATED] >= 0:
             apart = ints[FLOW_FREE]

@@ -24,3 +24,13 @@ def test_is_its_parts(looks, monkeypatch):
 
 def test_is_empty_at_first():
     assert Growing(np.empty((0, 3))).whole.shape == (0, 3)
+
+
+@pytest.mark.parametrize("size", [1, 7, 40])
+def test_little_of_it_is_empty(size):
+    """A block is full before the next one, which takes an eighth of what there is."""
+    found, part = Growing(np.empty((0, 2))), np.ones((size, 2))
+    for _ in range(100):
+        found.add(part.copy())
+        assert part.nbytes // size * found.count <= found.bytes <= 9 / 8 * part.nbytes // size * found.count
+    assert found.whole.nbytes == found.bytes == 100 * part.nbytes

@@ -13,7 +13,7 @@ from small_structures import chain, oscillator, random_model, stop
 from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
 from multiphi_exudyn.events.state import total_impulse
 from multiphi_exudyn.time.record import Record
-from multiphi_exudyn.time.recorded import Recorded
+from multiphi_exudyn.time.recorded import Events, Recorded
 from multiphi_exudyn.time.segment import Listed
 
 SOFT = 40.0
@@ -184,7 +184,7 @@ class TestContacts:
         row, segments = run._row("contact_impulse", contact), tuple(run.segments)
         expected = Listed(segments).integral(row, 1.3, 14.4) + total_impulse(tuple(run.events), contact, 1.3, 14.4)
         monkeypatch.setattr(Record, "segment", None)
-        monkeypatch.setattr(Record, "event", None)
+        monkeypatch.setattr(Events, "_make", None)
         again = dataclasses.replace(run, segments=Recorded(run.segments._record, math.nan, math.nan, (math.nan,) * 3))
         assert_allclose(again.contact_impulse(contact, 1.3, 14.4), expected, rtol=1e-13)
 

@@ -59,7 +59,7 @@ class ExactMotion:
     @property
     def events(self) -> Sequence[Event]:
         """What has happened in the run but for trials."""
-        return Events(self._record, self._record.amounts[:, 1 : 1 + a.LOSSES].sum(axis=0))
+        return Events(self._record, self._record.losses.sum(axis=0))
 
     def hold(self, acting: Callable[[tuple[int, ...]], Acting], inertia: Inertia | None) -> None:
         """From now on these forces act, by the states of a level, and this hangs on the structure."""
