@@ -453,12 +453,18 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert names == [
         "advance",
+        "improve",
+        "integrate",
         "integrate_works",
         "measure",
+        "roots",
         "sample_rows",
         "sample_sizes",
         "sample_states",
+        "start",
         "step_is_clear",
+        "unfold",
+        "write",
     ]
 
 
