@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
 
 __all__ = ["rank_one_modes"]
 
-EQUAL = 4 * np.finfo(float).eps  # of d: nearer ones are equal
+EQUAL = 4 * float(np.finfo(float).eps)  # of d: nearer ones are equal
 ABSENT = 1e-16  # of |p| with weights 1 / d: smaller components have no part in it
 NOISE = 2e-14  # of |p|: round-off of modes that do not move in this direction
 
@@ -41,6 +41,8 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
 
     d: (m,), ascending, none negative. stiffness: k > 0, inf for the motions with p.v = 0 alone.
     """
+    if count < len(d) and all_take_part(np.concatenate([d, p]), len(d), count):
+        return _roots(d, p, stiffness, count)
     turns, own = _turns(d, p), p
     if turns:
         own = p.copy()
@@ -48,8 +50,6 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
             own[first:last] = np.eye(1, last - first)[0] * float(turn[:, 0] @ p[first:last])
     sizes = own * own / (d + d[min(count, len(d) - 1)])
     present = (sizes > ABSENT**2 * sizes.sum()) & (np.abs(own) > NOISE * math.sqrt(p @ p))
-    if count < len(d) and not turns and present.all():
-        return _roots(d, p, stiffness, count)
     poles, left = np.flatnonzero(present), np.flatnonzero(~present)[:count]
     roots = min(count, len(poles) - 1)
     if roots < 1 or (roots < count and np.isfinite(stiffness)) or roots + len(left) < count:
@@ -90,6 +90,23 @@ def _roots(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[
         return None
     found = numbers[2 * m + SUMS :]
     return found[:count], found[count:].reshape(count, m).T
+
+
+@compiled
+def is_whole(numbers: Numbers, m: int, count: int) -> int:
+    """Whether no two d are equal, and all take part in p, so that nothing is left as it is; numbers: d, p (m,)."""
+    square, weighted, reference = 0.0, 0.0, numbers[count]
+    for j in range(m):
+        if j + 1 < m and numbers[j + 1] - numbers[j] <= EQUAL * numbers[j + 1]:
+            return 0
+        own = numbers[m + j] * numbers[m + j]
+        square += own
+        weighted += own / (numbers[j] + reference)
+    for j in range(m):
+        own = numbers[m + j] * numbers[m + j]
+        if own <= NOISE * NOISE * square or own / (numbers[j] + reference) <= ABSENT * ABSENT * weighted:
+            return 0
+    return 1
 
 
 @compiled
@@ -180,4 +197,4 @@ def add_up(numbers: Numbers, m: int, i: int, nearer: int, distance: float, yield
     return yielding + below + above
 
 
-find_roots = entry(roots)
+all_take_part, find_roots = entry(is_whole), entry(roots)
