@@ -41,8 +41,9 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
 
     d: (m,), ascending, none negative. stiffness: k > 0, inf for the motions with p.v = 0 alone.
     """
-    if count < len(d) and all_take_part(np.concatenate([d, p]), len(d), count):
-        return _roots(d, p, stiffness, count)
+    numbers = _arranged(d, p, count)
+    if count < len(d) and all_take_part(numbers, len(d), count):
+        return _roots(numbers, len(d), stiffness, count)
     turns, own = _turns(d, p), p
     if turns:
         own = p.copy()
@@ -54,7 +55,7 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
     roots = min(count, len(poles) - 1)
     if roots < 1 or (roots < count and np.isfinite(stiffness)) or roots + len(left) < count:
         return None
-    found = _roots(d[poles], own[poles], stiffness, roots)
+    found = _roots(_arranged(d[poles], own[poles], roots), len(poles), stiffness, roots)
     if found is None:
         return None
     values = np.concatenate([found[0], d[left]])
@@ -82,10 +83,13 @@ def _turns(d: np.ndarray, p: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
     return turns
 
 
-def _roots(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
+def _arranged(d: np.ndarray, p: np.ndarray, count: int) -> np.ndarray:
+    """d and p (m,), and room for so many roots, as ``roots`` has them."""
+    return np.concatenate([d, p, np.empty(SUMS + count * (1 + len(d)))])
+
+
+def _roots(numbers: np.ndarray, m: int, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
     """The ``count`` lowest roots, and their vectors of unit length; None where the iteration fails."""
-    m = len(d)
-    numbers = np.concatenate([d, p, np.empty(SUMS + count * (1 + m))])
     if not find_roots(numbers, m, count, 1 / stiffness):
         return None
     found = numbers[2 * m + SUMS :]
