@@ -32,8 +32,15 @@ EPSILON = float(np.finfo(float).eps)
 ROUNDED = 8.0  # of the round-off of one term: what their sum may have
 SLOW = 0.1  # of the value before: a step that leaves more is followed by one of the other kind
 MOST_STEPS = 100  # of a root; three to eight are typical
-SIZE, SLOPE_BELOW, SLOPE_ABOVE = 0, 1, 2  # of sums: their round-off over epsilon; slopes of those up to d_l and beyond
-SUMS = 3
+FAR = 16.0  # times the d beside the highest root: sums over larger d are power series of x
+ORDERS = 14  # of such a series, the next one is round-off
+SIZE, SLOPE_BELOW, SLOPE_ABOVE, SERIES = (
+    0,
+    1,
+    2,
+    3,
+)  # of sums: their round-off over epsilon; slopes up to d_l and beyond
+SUMS = SERIES + ORDERS
 
 
 def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -116,29 +123,49 @@ def is_whole(numbers: Numbers, m: int, count: int) -> int:
 @compiled
 def roots(numbers: Numbers, m: int, count: int, yielding: float) -> int:
     """Whether all are found. numbers: d, p (m,), sums, then roots (count,) and vectors (count, m); yielding: 1 / k."""
-    sums, found = 2 * m, 2 * m + SUMS
+    sums, found, near = 2 * m, 2 * m + SUMS, count + 1
+    while near < m and numbers[near] <= FAR * numbers[count]:
+        near += 1
+    expand(numbers, m, near)
     for i in range(count):
         vector = found + count + i * m
         lower, upper = numbers[m + i] * numbers[m + i], numbers[m + i + 1] * numbers[m + i + 1]
         gap = numbers[i + 1] - numbers[i]
-        value = add_up(numbers, m, i, i, 0.5 * gap, yielding, vector)
+        value = add_up(numbers, m, near, i, i, 0.5 * gap, yielding, vector)
         rest = value - 2.0 * (upper - lower) / gap
         if value >= 0.0:
             nearer, start = i, smaller_zero(rest, rest * gap + lower + upper, lower * gap)
         else:
             nearer, start = i + 1, -smaller_zero(-rest, lower + upper - rest * gap, upper * gap)
-        distance = refined(numbers, m, i, nearer, start, yielding, vector)
+        distance = refined(numbers, m, near, i, nearer, start, yielding, vector)
         if distance == 0.0:
             return 0
         numbers[found + i] = numbers[nearer] + distance
         scale = 1.0 / math.sqrt(numbers[sums + SLOPE_BELOW] + numbers[sums + SLOPE_ABOVE])
-        for j in range(m):
+        for j in range(near):
             numbers[vector + j] *= scale
+        for j in range(near, m):
+            numbers[vector + j] = scale * numbers[m + j] / (numbers[j] - numbers[nearer] - distance)
     return 1
 
 
 @compiled
-def refined(numbers: Numbers, m: int, i: int, nearer: int, start: float, yielding: float, vector: int) -> float:
+def expand(numbers: Numbers, m: int, near: int) -> None:
+    """Sums over the d from ``near`` on of p^2 / d (d_near / d)^k, with which the powers of x / d_near are taken."""
+    series = 2 * m + SERIES
+    for k in range(ORDERS):
+        numbers[series + k] = 0.0
+    for j in range(near, m):
+        part, ratio = numbers[m + j] * numbers[m + j] / numbers[j], numbers[near] / numbers[j]
+        for k in range(ORDERS):
+            numbers[series + k] += part
+            part *= ratio
+
+
+@compiled
+def refined(
+    numbers: Numbers, m: int, near: int, i: int, nearer: int, start: float, yielding: float, vector: int
+) -> float:
     """The distance of root i from the nearer of its neighbours, iterated from ``start``; 0 where that fails."""
     sums, gap = 2 * m, numbers[i + 1] - numbers[i]
     lowest, highest = (0.0, 0.5 * gap) if nearer == i else (-0.5 * gap, 0.0)
@@ -146,7 +173,7 @@ def refined(numbers: Numbers, m: int, i: int, nearer: int, start: float, yieldin
     for _ in range(MOST_STEPS):
         if not lowest < distance < highest:
             distance = 0.5 * (lowest + highest)
-        value = add_up(numbers, m, i, nearer, distance, yielding, vector)
+        value = add_up(numbers, m, near, i, nearer, distance, yielding, vector)
         below, above = numbers[sums + SLOPE_BELOW], numbers[sums + SLOPE_ABOVE]
         slope = below + above
         if abs(value) <= EPSILON * (numbers[sums + SIZE] + abs(distance) * slope):
@@ -182,8 +209,10 @@ def smaller_zero(c: float, a: float, b: float) -> float:
 
 
 @compiled
-def add_up(numbers: Numbers, m: int, i: int, nearer: int, distance: float, yielding: float, vector: int) -> float:
-    """The secular equation's left side at d_nearer + distance, with p / (d - x); sums up to d_i and beyond."""
+def add_up(
+    numbers: Numbers, m: int, near: int, i: int, nearer: int, distance: float, yielding: float, vector: int
+) -> float:
+    """The secular equation's left side at d_nearer + distance; slopes up to d_i and beyond; p / (d - x) to ``near``."""
     sums, origin = 2 * m, numbers[nearer]
     below, slope_below, above, slope_above = 0.0, 0.0, 0.0, 0.0
     for j in range(i + 1):
@@ -191,11 +220,18 @@ def add_up(numbers: Numbers, m: int, i: int, nearer: int, distance: float, yield
         numbers[vector + j] = ratio
         below += numbers[m + j] * ratio
         slope_below += ratio * ratio
-    for j in range(i + 1, m):
+    for j in range(i + 1, near):
         ratio = numbers[m + j] / (numbers[j] - origin - distance)
         numbers[vector + j] = ratio
         above += numbers[m + j] * ratio
         slope_above += ratio * ratio
+    if near < m:
+        share, far, slope = (origin + distance) / numbers[near], 0.0, 0.0
+        for k in range(ORDERS):
+            slope = slope * share + far
+            far = far * share + numbers[sums + SUMS - 1 - k]
+        above += far
+        slope_above += slope / numbers[near]
     numbers[sums + SIZE] = ROUNDED * (above - below) + yielding
     numbers[sums + SLOPE_BELOW], numbers[sums + SLOPE_ABOVE] = slope_below, slope_above
     return yielding + below + above
