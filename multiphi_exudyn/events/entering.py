@@ -18,7 +18,7 @@ __all__ = ["Measure", "Start", "set_starts", "set_state"]
 Measure = Callable[[np.ndarray, np.ndarray, int], None]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(repr=False)  # not frozen: every run makes one, which would take three times as long
 class Start(Shown):
     """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 

@@ -25,6 +25,7 @@ __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
 FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
+UNTOUCHED = np.zeros(0)  # a ring to which nothing has been written
 ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
 
 
@@ -142,6 +143,8 @@ class LevelArrays:
     def chatter(self) -> tuple[int, np.ndarray]:
         """The decisions so far, and what stands in the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
+        if not decisions:
+            return 0, UNTOUCHED
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 

@@ -104,16 +104,18 @@ def move_part(
 
     A map that sets places knows the terms of which its own numbers are sums.
     """
-    matrix, offset = ints[way + MATRIX], ints[way + OFFSET]
+    matrix, offset, moving = ints[way + MATRIX], ints[way + OFFSET], n
     if rates == 1:
         matrix, offset = ints[way + RATE_MATRIX], ints[way + RATE_OFFSET]
+    while moving > 0 and numbers[given + moving - 1] == 0.0:  # a start at rest has no speed at all
+        moving -= 1
     for i in range(ints[target + MODES] + ints[CHANNELS]):
         total, row = numbers[offset + i] if offset >= 0 else 0.0, matrix + i * n
         size, terms = abs(total), row
         if ints[way + MAP_TERMS] >= 0:
             terms = ints[way + MAP_TERMS] + i * (n + 1)
             size = size if rates == 1 else numbers[terms + n]  # that one is of places
-        for j in range(n):
+        for j in range(moving):
             total += numbers[row + j] * numbers[given + j]
             size += abs(numbers[terms + j] * numbers[given + j])
         numbers[result + i] = total

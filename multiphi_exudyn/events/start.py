@@ -34,7 +34,6 @@ from multiphi_exudyn.events.arrays import (
     LOST,
     LOST_AT_START,
     MAP_SIZES,
-    MATRIX,
     MODES,
     OK,
     OPEN,
@@ -43,6 +42,7 @@ from multiphi_exudyn.events.arrays import (
     PRESCRIBED,
     REACHED,
     RIGID,
+    SET_SIZES,
     SETTLED,
     SLOWED,
     SPEED,
@@ -166,15 +166,13 @@ def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: i
     status = move(ints, numbers, GIVEN, speeds, level, result)
     if status < 0:
         return status
-    x, y, q, m = ints[result + PLACE], ints[GIVEN + PLACE], ints[CHANNELS], ints[COORDINATES]
+    x, w, q = ints[result + PLACE], ints[GIVEN + PLACE] + ints[COORDINATES], ints[CHANNELS]
     way = find_map(ints, ints[GIVEN + LEVEL], level)
     for i in range(ints[level + MODES]):
-        row, sizes = ints[way + MATRIX] + i * (m + q), ints[way + MAP_SIZES] + i * (q + 1)
-        size = numbers[sizes + q]
-        for j in range(m):
-            size += abs(numbers[row + j] * numbers[y + j])
+        sizes = ints[way + MAP_SIZES] + i * (q + 1)
+        size = numbers[ints[SET_SIZES] + i] + numbers[sizes + q]
         for k in range(q):
-            size += numbers[sizes + k] * abs(numbers[y + m + k])
+            size += numbers[sizes + k] * abs(numbers[w + k])
         if abs(numbers[x + i]) <= ZERO * size:
             numbers[x + i] = 0.0
     for i in range(ints[level + EXIT_COUNT]):

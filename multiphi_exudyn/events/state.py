@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,8 +68,7 @@ class State(Shown):
         return np.divide(np.abs(self.velocity), omega, out=np.zeros(len(omega)), where=omega > 0)
 
 
-@dataclass(frozen=True)
-class Loss:
+class Loss(NamedTuple):
     """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
 
     stop_work: what moving stops, or what hangs on its points in Exudyn, put into it by impulses, no loss. damping: the
@@ -82,15 +83,8 @@ class Loss:
     damping: float = 0.0
     friction: float = 0.0
 
-    def __add__(self, other: Loss) -> Loss:
-        return Loss(
-            self.impact + other.impact,
-            self.truncation_kinetic + other.truncation_kinetic,
-            self.truncation_strain + other.truncation_strain,
-            self.stop_work + other.stop_work,
-            self.damping + other.damping,
-            self.friction + other.friction,
-        )
+    def __add__(self, other: Loss) -> Loss:  # type: ignore[override]
+        return Loss(*map(operator.add, self, other))
 
     @property
     def total(self) -> float:

@@ -23,7 +23,7 @@ from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.modes import Modes
-from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.element_table import ElementTable
@@ -71,19 +71,17 @@ class ModalBase(ElementTable, Shown):
         Of a mode that alone moves a contact it would give one at rest a speed.
         """
         if self.complete:
-            onto, round_off = self._projection
-            y = onto.dot(x)
-            np.putmask(y, np.abs(y) <= round_off.dot(np.abs(x)), 0.0)
-            return y
+            onto, sizes = self.projection
+            return drop_round_off(onto @ x, sizes @ np.abs(x))
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
     @functools.cached_property
-    def _projection(self) -> tuple[np.ndarray, np.ndarray]:
-        """Phi^T M, and of |Phi|^T |M| what is round-off, (m, n), of a complete base: no larger than its modes."""
+    def projection(self) -> tuple[np.ndarray, np.ndarray]:
+        """Phi^T M and |Phi|^T |M| (m, n), of a complete base: no larger than its modes."""
         shapes = self.modes.shapes
         onto, sizes = (self.mass @ shapes).T, (abs(self.mass) @ np.abs(shapes)).T
-        return np.ascontiguousarray(onto), np.ascontiguousarray(ZERO * sizes)
+        return np.ascontiguousarray(onto), np.ascontiguousarray(sizes)
 
     def modal_load(self, load: np.ndarray) -> np.ndarray:
         """Phi^T f (m,) of a load (n,), zero where it is round-off: a weight bends no body that falls freely."""

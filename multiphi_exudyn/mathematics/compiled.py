@@ -63,10 +63,11 @@ def compile_entries() -> Path | None:
 
 
 class Entry:
-    """A function that Python calls compiled; ``function`` is the plain one."""
+    """A function that Python calls compiled. ``plain``: as Python, to which overflow is no warning either."""
 
     def __init__(self, function: FunctionType) -> None:
         self.function = function
+        self.plain: Callable[..., Any] = np.errstate(all="ignore")(function)
         self._native: Callable[..., Any] | None = None
         self._code: Any = None  # keeps the machine code where it is
 
@@ -80,7 +81,7 @@ class Entry:
     def bound(self, *buffers: np.ndarray) -> Callable[..., Any]:
         """The function with its first arguments fixed, at half the cost of a call; the caller keeps the buffers."""
         native: Any = self.native()
-        if native is self.function:
+        if native is self.plain:
             return functools.partial(native, *buffers)
         arguments, result = signature(self.function)
         kinds = [ctypes.c_void_p if kind in TYPES else SCALARS[kind] for kind in arguments]
@@ -91,10 +92,10 @@ class Entry:
         return functools.partial(function, *given)
 
     def native(self) -> Callable[..., Any]:
-        """The function as ctypes calls it, made at the first call; the plain one without numba."""
+        """The function as ctypes calls it, made at the first call; ``plain`` without numba."""
         with _one_at_a_time:
             if self._native is None:
-                self._native = self._loaded() if available() else self.function
+                self._native = self._loaded() if available() else self.plain
         return self._native
 
     def _loaded(self) -> Callable[..., Any]:
@@ -108,7 +109,7 @@ class Entry:
                 MultiPhiWarning,
                 stacklevel=4,
             )
-            return self.function
+            return self.plain
         arguments, result = signature(self.function)
         native: Any = ctypes.CFUNCTYPE(SCALARS[result])(address)
         native.argtypes = [_Buffer(TYPES[kind]) if kind in TYPES else SCALARS[kind] for kind in arguments]

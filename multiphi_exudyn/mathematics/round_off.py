@@ -11,7 +11,10 @@ import math
 
 import numpy as np
 
-__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
+from multiphi_exudyn.mathematics.compiled import Numbers, compiled
+
+__all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "WORST_CONDITION", "ZERO", "all_finite", "clear_products"]
+__all__ += ["drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors from which on those near each other are one cluster; at a double root 1e8
@@ -33,6 +36,25 @@ def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndar
     kept = sums.copy()
     np.putmask(kept, np.abs(sums) <= ZERO * sizes, 0.0)
     return kept
+
+
+@compiled
+def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers, row_sums: int, count: int) -> None:
+    """Products A x (count,) of given x become zero where they are round-off of their terms, which add up to |A| |x|.
+
+    matrix: |A|, row by row. They are no more than ``row_sums``, those of |A|, times the largest |x|: only where that
+    does not tell are they added up.
+    """
+    largest = 0.0
+    for j in range(count):
+        largest = max(largest, abs(numbers[given + j]))
+    for i in range(count if largest > 0.0 else 0):
+        if abs(numbers[products + i]) <= CLEAR * (numbers[row_sums + i] * largest):
+            size = 0.0
+            for j in range(count):
+                size += matrix[i * count + j] * abs(numbers[given + j])
+            if abs(numbers[products + i]) <= ZERO * size:
+                numbers[products + i] = 0.0
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:

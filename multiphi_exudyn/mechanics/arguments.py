@@ -12,7 +12,7 @@ import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Matrix", "did_you_mean", "is_real", "no_text", "one_of", "real_array"]
+__all__ = ["FLOAT", "Matrix", "did_you_mean", "is_real", "no_text", "one_of", "real_array"]
 
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 

@@ -10,7 +10,7 @@ import numpy as np
 from multiphi_exudyn.display import names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.round_off import all_finite
-from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.arguments import FLOAT, real_array
 from multiphi_exudyn.mechanics.dofs import DofTable, known
 
 __all__ = ["PointRows", "checked_vector", "point_rows"]
@@ -80,8 +80,9 @@ def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tupl
 
 
 def checked_vector(name: str, given: Any, n: int) -> np.ndarray:
-    """(n,) finite numbers; an error calls them by the name."""
-    vector = real_array(name, given, f"an ({n},) array of real numbers")
+    """(n,) finite numbers, what is given itself where it is an array of them; an error calls them by the name."""
+    is_float = type(given) is np.ndarray and given.dtype == FLOAT
+    vector: np.ndarray = given if is_float else real_array(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},)")
     if not all_finite(vector):

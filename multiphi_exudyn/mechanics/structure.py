@@ -139,7 +139,7 @@ class LinearStructure(Shown):
             return np.sum([_coefficient(name, c) * self.row(name) for name, c in at.items()], axis=0)
         if is_real(at) or (isinstance(at, tuple) and any(isinstance(part, str) for part in at)):
             raise MultiPhiTypeError(f"point: got {at!r}, need the name of a point: points={{'name': {at!r}}}")
-        return checked_vector("row", at, self.n)
+        return checked_vector("row", at, self.n).copy()
 
     @property
     def point_rows(self) -> np.ndarray:
@@ -147,7 +147,7 @@ class LinearStructure(Shown):
         return np.array(list(self.points.values())).reshape(-1, self.n)
 
     def vector(self, name: str, given: Any) -> np.ndarray:
-        """A copy of ``given`` as finite (n,) numbers; ``name`` is what an error calls it."""
+        """``given`` as finite (n,) numbers, itself where it is an array of them; ``name`` is what an error calls it."""
         return checked_vector(name, given, self.n)
 
 

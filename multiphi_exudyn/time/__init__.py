@@ -6,7 +6,7 @@ the loop has not, by the loop's own flow. What its truncated modes could not hol
 off it.
 
 Order: warning_groups, base_share, flow, quadrature, segment, level_rows, balance, history_figure, histories, resuming,
-sampling, work_sums, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, start, model_histories,
-ending, trajectory, defects, truncation, chatter, loop_record, loop, going_on, failures, motion, refinement, rubbing,
-rough_impacts, known_warnings, left_out, reliability, carrying, several, simulate, workers, many.
+sampling, work_sums, work_terms, work, growing, taken, record, recorded, saved_arrays, saved, setting_out, start,
+model_histories, ending, trajectory, defects, truncation, chatter, loop_record, loop, going_on, failures, motion,
+refinement, rubbing, rough_impacts, known_warnings, left_out, reliability, carrying, several, simulate, workers, many.
 """

@@ -53,8 +53,8 @@ class Motion:
         loop: Callable[..., Any] | None = None,
     ) -> None:
         self.arrays, self.start = arrays, start
-        self._loop: Callable[..., Any] = loop or (quiet(advance) if compiled is False else carry)
-        self._measured: Measure = measure if compiled is False else measured
+        self._loop: Callable[..., Any] = loop or (carry.plain if compiled is False else carry)
+        self._measured: Measure = measured.plain if compiled is False else measured
         self.levels = arrays.levels
         self.model = self.levels.model
         self.time, self.message = start.time, ""

@@ -34,7 +34,7 @@ __all__ = [
 CONTACT, FRICTION = ("gap", "contact_force"), ("friction_force", "slip")
 
 KINDS = ("close", "open", "stick", "slip", "segment")
-LOSSES = len(dataclasses.fields(Loss))
+LOSSES = len(Loss._fields)
 STRAIN = tuple(field.name for field in dataclasses.fields(StrainForm))
 
 
@@ -166,7 +166,7 @@ def event_arrays(events: Sequence[Event], elements: Sequence[str], entered: Sequ
         "event_kind": np.array([KINDS.index(event.kind) for event in events], np.int64),
         "event_element": np.array([place[event.contact] for event in events], np.int64),
         "event_state": np.array([entered.index(event.state) for event in events], np.int64),
-        "event_loss": np.array([dataclasses.astuple(event.loss) for event in events]).reshape(-1, LOSSES),
+        "event_loss": np.array([event.loss for event in events]).reshape(-1, LOSSES),
         "event_impulse": np.array([event.impulse for event in events]),
         "shared": np.array(shared).reshape(-1, 3),
     }

@@ -221,7 +221,9 @@ class Run:
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before, levels = self._before, self.levels(finer)
         if before is None:
-            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.stretches or {})
+            start = first_start(
+                levels, self.t_end, self.displacement, self.velocity, self.stretches or {}, self.compiled
+            )
         else:
             start = going_on(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)

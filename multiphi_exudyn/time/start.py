@@ -7,7 +7,6 @@ too, as it may not lie inside. A compliant one that lies inside by so little has
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.element import friction_spring
+from multiphi_exudyn.time.setting_out import SettingOut
 
 __all__ = ["first_start"]
 
@@ -37,7 +37,7 @@ class _Scales:
     stops, speeds: where stops are.
     touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
     moves a mode at most, (m,) [s]. apart: the start of elements of which none touches, None where some have states of
-    their own even then.
+    their own even then. setting_out: what sees at once that none does, None where the base is not complete.
     """
 
     directions: np.ndarray
@@ -47,22 +47,7 @@ class _Scales:
     sizes: np.ndarray
     times: np.ndarray
     apart: tuple[int, ...] | None
-
-    @functools.cached_property
-    def nowhere(self) -> np.ndarray:
-        """No displacement, or no velocity (m,); not to be written to."""
-        zeros = np.zeros(len(self.times))
-        zeros.setflags(write=False)
-        return zeros
-
-    @functools.cached_property
-    def clear(self) -> tuple[np.ndarray, np.ndarray]:
-        """u (m, l), b (l,): none touches where u.y - b > a |y|, a twice ``TOUCHING``.
-
-        u = h / |h|, as the terms of h.y are no more than |h| |y|; zero where |h| is.
-        """
-        sizes = np.where(self.sizes > 0, self.sizes, 1.0)
-        return self.directions / sizes, (self.touching - self.stops) / sizes
+    setting_out: SettingOut | None
 
     @classmethod
     def of(cls, levels: LoadedLevels, end: float) -> _Scales:
@@ -77,7 +62,11 @@ class _Scales:
         moved, speeds = map(excitation.moved, levels.drive.values[:2])
         apart = None if model.general or model.force_laws else (OPEN,) * len(model.contacts)
         near = TOUCHING * ways + UNSEEN * lengths * sizes
-        return cls(base.directions, base.gaps - moved, speeds, near, sizes, times, apart)
+        stops, out = base.gaps - moved, None
+        if base.complete:  # the terms of h.y are no more than |h| |y|
+            lengths = np.where(sizes > 0, sizes, 1.0)
+            out = SettingOut(base, times, base.directions / lengths, (near - stops) / lengths, 2 * TOUCHING)
+        return cls(base.directions, stops, speeds, near, sizes, times, apart, out)
 
     def near(self, terms: np.ndarray, length: float) -> np.ndarray:
         """Gaps (l,) [m] below which a contact is in touch: by the terms (l,) of h.y, by where the motion goes."""
@@ -90,25 +79,24 @@ def first_start(
     displacement: np.ndarray | None,
     velocity: np.ndarray | None,
     stretches: Mapping[str, float],
+    compiled: bool | None = None,
 ) -> Start:
     """The start from x, x' (n,), None for zero, of a run to ``end`` [s] as the contacts see it.
 
-    stretches: of the springs of friction, by the names of their links.
+    stretches: of the springs of friction, by the names of their links. compiled: False for plain Python alone.
     """
     base, vector = levels.model.base, levels.model.structure.vector
-    y = None if displacement is None else base.coordinates(vector("displacement", displacement))
-    v = None if velocity is None else base.coordinates(vector("velocity", velocity))
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
-    y = scales.nowhere if y is None else y
-    length = math.sqrt(y.dot(y))
-    if v is None:
-        v = scales.nowhere
+    x = None if displacement is None else vector("displacement", displacement)
+    x_t = None if velocity is None else vector("velocity", velocity)
+    if scales.setting_out is None:
+        y, v = [np.zeros(len(scales.times)) if given is None else base.coordinates(given) for given in (x, x_t)]
     else:
-        moving = v * scales.times
-        length += math.sqrt(moving.dot(moving))
-    units, bounds = scales.clear
-    if scales.apart is not None and min((y.dot(units) - bounds).tolist(), default=math.inf) > 2 * TOUCHING * length:
-        return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
+        y, v, far = scales.setting_out.coordinates(x, x_t, compiled)
+        if far and scales.apart is not None:
+            return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
+    moving = v * scales.times
+    length = math.sqrt(y.dot(y)) + math.sqrt(moving.dot(moving))
     gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
     return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), stretches)
 

@@ -198,8 +198,9 @@ class Trajectory(ModelHistories):
         start = self.start
         if start.state is not None:
             return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
-        base = self.model.base
-        gaps = base.gaps_at(start.displacement, start.gaps)
+        base, gaps = self.model.base, start.gaps
+        if start.penetrating:
+            gaps = base.gaps_at(start.displacement, gaps)
         strain = base.strain(start.displacement, start.penetrating, gaps)
         return 0.5 * float(start.velocity.dot(start.velocity)) + strain
 
