@@ -176,7 +176,7 @@ def refined(
         value = add_up(numbers, m, near, i, nearer, distance, yielding, vector)
         below, above = numbers[sums + SLOPE_BELOW], numbers[sums + SLOPE_ABOVE]
         slope = below + above
-        if abs(value) <= EPSILON * (numbers[sums + SIZE] + abs(distance) * slope):
+        if abs(value) < EPSILON * (numbers[sums + SIZE] + abs(distance) * slope):
             return distance
         if value < 0.0:
             lowest = distance
