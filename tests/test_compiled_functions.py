@@ -453,13 +453,21 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert names == [
         "advance",
+        "describe_basis",
+        "improve",
+        "integrate",
         "integrate_works",
         "is_far",
+        "is_whole",
         "measure",
+        "roots",
         "sample_rows",
         "sample_sizes",
         "sample_states",
+        "start",
         "step_is_clear",
+        "unfold",
+        "write",
     ]
 
 

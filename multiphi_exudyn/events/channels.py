@@ -14,6 +14,7 @@ In xi every gap and contact force is again linear. Without channels xi = eta, an
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,9 +47,7 @@ class Channels:
     @classmethod
     def none(cls, level: Level) -> Channels:
         """Of a level under static loads alone."""
-        r, m, k = level.modes, level.base.modes.count, len(level.indices)
-        of_modes, of_base, of_forces = (np.zeros((rows, 0)) for rows in (r, m, k))
-        return cls(of_modes, of_modes, of_base, of_base, of_base, of_forces, of_forces)
+        return _none(level.modes, level.base.modes.count, len(level.indices))
 
     @classmethod
     def of(cls, level: Level, excitation: Excitation) -> Channels:
@@ -132,6 +131,13 @@ class Channels:
             computed=np.concatenate([level.computed, np.zeros(q)]),
             kept_beyond=level.kept_beyond,
         )
+
+
+@functools.lru_cache(maxsize=64)
+def _none(r: int, m: int, k: int) -> Channels:
+    """No channels, of a level with r modes, m coordinates and k closed contacts."""
+    of_modes, of_base, of_forces = (np.zeros((rows, 0)) for rows in (r, m, k))
+    return Channels(of_modes, of_modes, of_base, of_base, of_base, of_forces, of_forces)
 
 
 def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:

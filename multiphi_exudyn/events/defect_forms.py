@@ -12,7 +12,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg.lapack import dgeqrf
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.modal_base import ModalBase
@@ -49,12 +49,14 @@ def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...
         base, source, target = after.level.base, before.level.vectors, after.level.vectors
         held, modes = held_rigidly(after), (source.shape[1], target.shape[1])
         motion = np.empty((len(source), sum(modes) + 1), order="F")
-        motion[:, : modes[0]], motion[:, modes[0] : -1] = source, -target
+        motion[:, : modes[0]] = source
+        np.negative(target, out=motion[:, modes[0] : -1])
         motion[:, -1] = before.asymptotic.configuration - after.asymptotic.configuration
         displaced = allowed(base, held, motion)
         moved = displaced if held.issuperset(stopped) else allowed(base, held | set(stopped), motion)
         moving = over_omega(base, moved[:, :-1])
-        after.entries[key] = DefectForm(factor(displaced), factor(moving), modes)
+        rates = factor(moving)
+        after.entries[key] = DefectForm(factor(displaced), rates, modes)
     way: DefectForm = after.entries[key]
     return way
 
@@ -79,10 +81,10 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
 
 
 def factor(rows: np.ndarray) -> np.ndarray:
-    """R with |R z| = |rows z|, upper triangular."""
+    """R with |R z| = |rows z|, upper triangular; the rows are lost."""
     if not rows.size:
         return np.zeros((0, rows.shape[1]))
-    found = scipy.linalg.lapack.dgeqrf(rows)[0][: rows.shape[1]]
+    found = dgeqrf(rows, overwrite_a=True)[0][: rows.shape[1]]
     return np.asarray(found * _upper(*found.shape))
 
 

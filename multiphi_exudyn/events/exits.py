@@ -126,35 +126,40 @@ def signals_of(level: LoadedLevel, exits: ExitShares) -> np.ndarray:
 
     A load that is a limit leaves no round-off of both.
     """
-    table, terms = _linked(level, exits.links, exits.shares)
-    constant, size = exits.constants + terms.sum(axis=1), np.abs(exits.constants) + np.abs(terms).sum(axis=1)
+    table, sizes = _linked(level, exits.links, exits.shares)
     numbers, links, shares = exits.further
     if len(numbers):
-        added, terms = _linked(level, links, shares)
+        added, further = _linked(level, links, shares)
         np.add.at(table, numbers, added)
-        constant += np.bincount(numbers, terms.sum(axis=1), len(constant))
-        size += np.bincount(numbers, np.abs(terms).sum(axis=1), len(constant))
-    table[:, -1] = drop_round_off(constant, size)
+        np.add.at(sizes, numbers, further)
+    table[:, -1] += exits.constants
+    sizes += np.abs(exits.constants)
+    table[:, -1] = drop_round_off(table[:, -1], sizes)
     return table
 
 
 def _linked(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What links (s,) have in signals by their shares (s, 3): rows (s, 2 n + 1) of (xi, xi'), and constants (s, 2)."""
+    """What links (s,) have in signals by their shares (s, 3): rows (s, 2 n + 1) of (xi, xi', 1), and their sizes (s,).
+
+    These are of the terms of which the last column is the sum.
+    """
     own, n = level.level, level.width
-    rows, table, constants = own.gap_rows[links], np.zeros((len(links), 2 * n + 1)), np.zeros((len(links), 2))
+    rows, table = own.gap_rows[links], np.zeros((len(links), 2 * n + 1))
     np.multiply(rows, shares[:, :1], out=table[:, :n])
-    if shares[:, 1].any():
+    if np.count_nonzero(shares[:, 1]):
         np.multiply(rows, shares[:, 1:2], out=table[:, n:-1])
-    np.multiply(level.gap_constants[links], shares[:, 0], out=constants[:, 0])
-    pressing = shares[:, 2].nonzero()[0]
+    np.multiply(level.gap_constants[links], shares[:, 0], out=table[:, -1])
+    sizes, pressing = np.abs(table[:, -1]), shares[:, 2].nonzero()[0]
     if len(pressing):
         place = np.zeros(len(level.gap_constants), int)
         place[list(own.indices)] = range(len(own.indices))
         held, share = place[links[pressing]], shares[pressing, 2]
         table[pressing, :n] += share[:, None] * own.force_rows[held]
         table[pressing, n:-1] += share[:, None] * own.force_rate_rows[held]
-        constants[pressing, 1] = share * level.asymptotic.forces[held]
-    return table, constants
+        forces = share * level.asymptotic.forces[held]
+        table[pressing, -1] += forces
+        sizes[pressing] += np.abs(forces)
+    return table, sizes
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:

@@ -66,7 +66,8 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     and this. Without channels only the first and the third are not empty.
     """
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
-    modal, patterns, friction = level.modal, level.excitation.patterns, -(level.pushes @ own.gap_rows)
+    modal, patterns = level.modal, level.excitation.patterns
+    friction = -(level.pushes @ own.gap_rows) if base.general else np.zeros(own.modes)
     if not level.excitation.channels:
         empty = np.zeros((0, 4 * own.modes + 1))
         return modal.damping, empty, friction, empty

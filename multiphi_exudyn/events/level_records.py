@@ -18,13 +18,17 @@ from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import Row
 from multiphi_exudyn.events.work_forms import DrivenForms, driven_forms, primitive, swings
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.mathematics import basis_arrays, response_arrays
+from multiphi_exudyn.mathematics import response_arrays
+from multiphi_exudyn.mathematics.basis_arrays import describe_basis
+from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.element import Exit, Share
 
 __all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes"]
 
 Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
+
+describe = entry(describe_basis)
 
 
 def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
@@ -66,7 +70,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     }
     record = _record(batch, given)
     batch.write()
-    basis_arrays.describe_basis(*buffers.all, basis)
+    describe(*buffers.all, basis)
     return record
 
 
@@ -112,9 +116,11 @@ def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
 def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     """Give the record of a level what |y| and the work of static loads on y are read from."""
     motion = np.column_stack([level.level.vectors, level.asymptotic.configuration])
-    rows, n = factor(motion), motion.shape[1]
+    n = motion.shape[1]
     given = np.zeros((n + 1, n))
-    given[: len(rows)], given[-1] = rows, level.excitation.static @ motion
+    given[-1] = level.excitation.static @ motion
+    rows = factor(motion)
+    given[: len(rows)] = rows
     buffers.ints[record + a.SIZES] = buffers.put("numbers", given)
 
 

@@ -241,7 +241,8 @@ class LoadedLevel(Shown):
         """The same as a form in xi."""
         own, base, rest, patterns = self.level, self.level.base, self.asymptotic, self.excitation.patterns
         y, r, q, static = rest.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
-        modal = rest.load - self.modal.vectors.T @ static - self.alone.asymptotic.drive
+        pushed = rest.load - self.modal.vectors.T @ static if base.general else 0.0  # by elements
+        modal = pushed - self.alone.asymptotic.drive
         constant = rest.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.mathematics.compiled import Numbers, Waves, compiled, entry
 
 __all__ = ["MOST_COEFFICIENTS", "DrivenForms", "driven_forms", "primitive", "swings"]
 
@@ -55,18 +56,64 @@ def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
 
     and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
     """
-    response, r = level.response, level.modal.modes
+    response, r, p = level.response, level.modal.modes, len(level.response.basis.rates)
     if not response.basis.pure:
         return None
-    rates, speeds = response.basis.rates, response.shapes * response.basis.rates
-    lengths, damped = np.linalg.norm(speeds, axis=0), damping[:r, :r] @ speeds
-    powers = np.matmul(speeds.T, [damped, damped.conj()])
-    sums = rates[:, None] + np.array([rates, rates.conj()])[:, None]
-    if (np.abs(powers) > LARGEST_PRIMITIVE * lengths[:, None] * lengths * np.abs(sums)).any():
+    given = [response.basis.rates, response.shapes.T, response.from_displacement, response.from_velocity]
+    waves, numbers = np.concatenate(given, axis=None), np.empty((6 * r + 4 * p + 1) * p)
+    rows, power = numbers[: 6 * r * p].reshape(2 * p, 3 * r), numbers[6 * r * p : -p].reshape(2 * p, 2 * p)
+    unfold_response(numbers, waves, r, p)
+    speeds, starts = rows[:, :r], rows[:, r:]
+    speeds.dot(damping[:r, :r]).dot(speeds.T, out=power)
+    if not integrate_power(numbers, waves, r, p):
         return None
-    a, b = np.divide(powers, sums, out=powers, where=powers != 0)
-    z = np.hstack([response.from_displacement, response.from_velocity])
-    return np.asarray(0.5 * (z.T @ (a @ z + b @ z.conj())).real)
+    return np.asarray(starts.T.dot(power.dot(starts)))
+
+
+@compiled
+def unfold(numbers: Numbers, waves: Waves, r: int, p: int) -> None:
+    """S^T, A, B (p, 3 r), real parts, then imaginary ones; |S_j|^2 (p,) last. waves: lambda (p,), V^T, A, B (p, r)."""
+    for j in range(p):
+        real, imaginary, size = 3 * r * j, 3 * r * (p + j), 0.0
+        for i in range(r):
+            speed = waves[p + j * r + i] * waves[j]
+            size += speed.real * speed.real + speed.imag * speed.imag
+            numbers[real + i], numbers[imaginary + i] = speed.real, speed.imag
+        numbers[(6 * r + 4 * p) * p + j] = size
+        for part in range(1, 3):
+            for i in range(r):
+                value = waves[p + (part * p + j) * r + i]
+                numbers[real + part * r + i], numbers[imaginary + part * r + i] = value.real, value.imag
+
+
+@compiled
+def integrate(numbers: Numbers, waves: Waves, r: int, p: int) -> int:
+    """Of the power of speeds, [Re S, Im S]^T D [Re S, Im S], makes its primitive in (Re z, Im z), (2 p, 2 p).
+
+    0 where that is much larger than the speeds.
+    """
+    sizes = (6 * r + 4 * p) * p
+    for j in range(p):
+        for k in range(p):
+            upper, lower = 6 * r * p + 2 * p * j + k, 6 * r * p + 2 * p * (p + j) + k
+            one, crossed, back, other = numbers[upper], numbers[upper + p], numbers[lower], numbers[lower + p]
+            a, b = complex(one - other, crossed + back), complex(one + other, back - crossed)
+            sums, differences = waves[j] + waves[k], waves[j] + waves[k].conjugate()
+            largest = LARGEST_PRIMITIVE * LARGEST_PRIMITIVE * numbers[sizes + j] * numbers[sizes + k]
+            first = sums.real * sums.real + sums.imag * sums.imag
+            second = differences.real * differences.real + differences.imag * differences.imag
+            if a.real * a.real + a.imag * a.imag > largest * first:
+                return 0
+            if b.real * b.real + b.imag * b.imag > largest * second:
+                return 0
+            a *= sums.conjugate() * (0.5 / first) if first > 0.0 else 0j
+            b *= differences.conjugate() * (0.5 / second) if second > 0.0 else 0j
+            numbers[upper], numbers[upper + p] = b.real + a.real, b.imag - a.imag
+            numbers[lower], numbers[lower + p] = -b.imag - a.imag, b.real - a.real
+    return 1
+
+
+unfold_response, integrate_power = entry(unfold), entry(integrate)
 
 
 def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:

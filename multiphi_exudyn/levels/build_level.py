@@ -14,7 +14,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_modes import level_modes
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.modes import turned
 from multiphi_exudyn.mathematics.orthonormal import least_squares, orthonormal
@@ -22,17 +22,15 @@ from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 __all__ = ["build_level", "independent"]
 
-INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
 ALMOST = 0.99  # of a direction's square: one of which others have less does not follow from them
-EPSILON = float(np.finfo(float).eps)
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
     """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
     closed = list(indices)
-    closed_directions = base.closed_directions(closed, base.gaps[closed])
+    closed_directions = base.closed_at(indices)
     following = _following(base, [i for i in closed if base.links[i].rigid])
     turned, _ = closed_directions.orthogonal
     squares, vectors, accuracy = level_modes(base, turned, modes)
@@ -98,7 +96,7 @@ def _force_rows(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
     rigid = np.isinf(base.stiffnesses[closed])
-    forces, rates = -base.springs[closed][:, None] * gap_rows, -base.dampings[closed][:, None] * gap_rows
+    forces, rates = base.restoring[:, closed, None] * gap_rows
     if rigid.any():
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]
@@ -185,12 +183,10 @@ def _check_interlacing(
     base: ModalBase, squares: np.ndarray, closed_directions: ClosedDirections, accuracy: float
 ) -> None:
     """Refuse omega^2 (r,) that the theorem in the module's docstring forbids."""
-    stiffness = closed_directions.stiffness
-    stiffening, softening = np.count_nonzero(stiffness > 0), np.count_nonzero(stiffness < 0)
-    largest = float(base.squares[-1]) if base.modes.count else 0.0
-    given = base.squares[: len(squares) + stiffening]
-    slack = INTERLACING * (given + accuracy) + EPSILON * largest
-    below, above = (given - slack)[: len(squares) - softening], (given + slack)[stiffening:]
+    stiffness, slack = closed_directions.stiffness.tolist(), INTERLACING * accuracy
+    stiffening, softening = sum(k > 0 for k in stiffness), sum(k < 0 for k in stiffness)
+    below, above = base.square_bounds
+    below, above = below[: len(squares) - softening] - slack, above[stiffening : len(squares) + stiffening] + slack
     if not ((squares[softening:] >= below).all() and (squares[: len(above)] <= above).all()):
         raise NumericalFailure(
             "level: its modes are not accurate (interlacing violated); are units and magnitudes of mass and stiffness "

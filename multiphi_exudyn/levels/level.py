@@ -157,8 +157,8 @@ class Level(Shown):
         rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
         No gap moves beside a closed rigid contact of the same direction: there is none of those.
         """
-        base, index = self.base, list(self.indices)
-        closed_directions, _ = base.closed_directions(index, base.gaps[index]).orthogonal
+        base = self.base
+        closed_directions, _ = base.closed_at(self.indices).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
         names = [base.label(closed_directions.members[s][0]) for s in springs.tolist()]
         rows = closed_directions.vectors[:, springs].T
@@ -214,17 +214,21 @@ class Level(Shown):
     def truncated(self, asked: int) -> Level:
         """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
         modes = self.apart(asked) or self.modes
-        return replace(
-            self,
-            kept_beyond=modes - asked,
+        return Level(
+            closed=self.closed,
+            indices=self.indices,
+            base=self.base,
             squares=self.squares[:modes],
             vectors=self.vectors[:, :modes],
             damping=self.damping[:modes, :modes],
             gap_rows=self.gap_rows[:, :modes],
+            following=self.following,
             speed_rows=self.speed_rows[:, :modes],
             force_rows=self.force_rows[:, :modes],
             force_rate_rows=self.force_rate_rows[:, :modes],
+            neutral=self.neutral,
             computed=self.computed[:modes],
+            kept_beyond=modes - asked,
         )
 
     def overridden(self, override: LevelOverride) -> Level:
@@ -270,7 +274,7 @@ class Level(Shown):
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
         """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
         base, index = self.base, list(self.indices)
-        closed_directions = base.closed_directions(index, base.gaps[index])
+        closed_directions = base.closed_at(self.indices)
         along, configuration, pushing = self._response(closed_directions, load + base.preload)
         gaps = base.gaps_at(configuration, base.gaps)
         strain = base.strain(configuration, index, gaps)

@@ -21,6 +21,7 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
@@ -30,6 +31,9 @@ from multiphi_exudyn.mechanics.element_table import ElementTable
 __all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
+INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
+EPSILON = float(np.finfo(float).eps)
+CLOSED_SETS = 8  # of contacts, whose directions are kept: a level asks for them when it is built and when it is loaded
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
 
 
@@ -158,6 +162,12 @@ class ModalBase(ElementTable, Shown):
         return self.modes.omega**2
 
     @functools.cached_property
+    def square_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Omega^2 (m,) less and more what of the interlacing theorem round-off may violate."""
+        slack = INTERLACING * self.squares + EPSILON * self.squares.max(initial=0.0)
+        return self.squares - slack, self.squares + slack
+
+    @functools.cached_property
     def periods(self) -> np.ndarray:
         """1 / Omega (m,) [s/rad], zero of rigid-body modes."""
         omega = self.modes.omega
@@ -196,6 +206,14 @@ class ModalBase(ElementTable, Shown):
         """The structure's damping (m,) of every mode where it is modal, None where it couples them."""
         own = np.diagonal(self.damping)
         return own.copy() if np.count_nonzero(self.damping) == np.count_nonzero(own) else None
+
+    def closed_at(self, closed: tuple[int, ...]) -> ClosedDirections:
+        """``closed_directions`` with the gaps that contacts have at y = 0; of the sets asked for last they are kept."""
+        return self._kept_closed.get_or_build(closed, lambda: self.closed_directions(closed, self.gaps[list(closed)]))
+
+    @functools.cached_property
+    def _kept_closed(self) -> BoundedCache[tuple[int, ...], ClosedDirections]:
+        return BoundedCache(CLOSED_SETS)
 
     def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
         """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""

@@ -17,8 +17,11 @@ same vectors make the motion of a start (F. Tisseur, K. Meerbergen, The quadrati
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from multiphi_exudyn.mathematics.compiled import Numbers, Waves, compiled, entry
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mathematics.free_response import ModalResponse
 
@@ -32,45 +35,123 @@ MOST_STEPS = 30  # of the iteration; three to ten are typical
 
 def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | None:
     """Closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
-    omega, own = np.sqrt(np.maximum(squares, 0.0)), damping.diagonal()
-    mixed, transposed = damping.copy(), damping.T
-    if not (np.abs(own) < LIGHT * omega).all() or np.abs(damping - transposed).max() > SYMMETRIC * own.max():
+    r = len(squares)
+    numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros((4 * r + 2, r))], axis=None)
+    if not start_pairs(numbers, r):
         return None
-    each = slice(None, None, len(omega) + 1)  # the diagonal of a flat matrix
-    apart = (omega[:, None] - omega) * (omega[:, None] + omega)
-    mixed.flat[each], apart.flat[each] = 0.0, np.inf
-    if not (np.abs(mixed).sum(axis=1)[:, None] * omega <= LIGHT * np.abs(apart)).all():
-        return None
-    vectors, moved, before, falls = np.eye(len(omega), dtype=complex), mixed + 0j, 1.0, 0.0
-    coupling, diagonal, parts = moved.copy(), moved.ravel()[each], vectors.view(float)
+    rows = numbers.reshape(-1, r)
+    coupling, vectors, moved = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
+    before, falls = 1.0, 0.0
     for _ in range(MOST_STEPS):
-        half = (own + diagonal) / 2
-        rates = 1j * np.sqrt(squares - half * half) - half
-        moved *= rates / ((own[:, None] - 2 * half) * rates + apart)
-        diagonal[:] = -1.0
-        vectors += moved
-        step = float(np.abs(parts).max())
-        np.negative(moved, out=vectors)
+        step = improve_pairs(numbers, r)
         before, falls = step, max(falls, step / before)
+        vectors.dot(coupling, out=moved)
         if step * falls <= LAST:
-            return _response(squares, damping, rates, vectors)
-        np.matmul(coupling, vectors, out=moved)
+            return _response(numbers, r)
     return None
 
 
-def _response(squares: np.ndarray, damping: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> ModalResponse:
-    """Closed form for rates (r,) and vectors v (r, r)."""
-    r = len(rates)
-    theta = ((2 * rates * vectors + damping @ vectors) * vectors).sum(axis=0)
-    from_velocity = (2 / theta * vectors).T
-    from_displacement = from_velocity * (squares / -rates[:, None])
+def _response(numbers: np.ndarray, r: int) -> ModalResponse:
+    """Closed form for vectors that are found."""
+    waves = np.zeros((1 + 4 * r, r), complex)
+    write_response(numbers, waves.ravel(), r)
     return ModalResponse(
-        basis=Exponentials(rates, np.zeros(r, int)),
-        shapes=vectors,
-        from_displacement=from_displacement,
-        from_velocity=from_velocity,
-        from_force=np.zeros((r, r), complex),
+        basis=Exponentials(waves[0], np.zeros(r, int)),
+        shapes=waves[1 : 1 + r].T,
+        from_displacement=waves[1 + r : 1 + 2 * r],
+        from_velocity=waves[1 + 2 * r : 1 + 3 * r],
+        from_force=waves[1 + 3 * r :],
         diagonal=False,
         alone=np.zeros(r, bool),
         poles=np.ones(r, bool),
     )
+
+
+@compiled
+def start(numbers: Numbers, r: int) -> int:
+    """Whether damping is symmetric, and light for every mode and for every distance of two; then v = e_i.
+
+    numbers: omega^2, d (r,), D (r, r), of which G is made; v and G v of all pairs, a row each, (r, r), first real, then
+    imaginary parts; lambda (2, r).
+    """
+    coupling, vectors, moved, largest = 2 * r, (2 + r) * r, (2 + 3 * r) * r, 0.0
+    for i in range(r):
+        own = numbers[r + i]
+        largest = max(largest, own)
+        if not abs(own) < LIGHT * math.sqrt(max(numbers[i], 0.0)):
+            return 0
+        numbers[coupling + i * r + i] = 0.0
+        numbers[vectors + i * r + i] = 1.0
+    for j in range(r):
+        others = 0.0
+        for k in range(r):
+            given = numbers[coupling + j * r + k]
+            if not abs(given - numbers[coupling + k * r + j]) <= SYMMETRIC * largest:
+                return 0
+            others += abs(given)
+            numbers[moved + j * r + k] = given
+        for i in range(r):
+            if i != j and not others * math.sqrt(numbers[i]) <= LIGHT * abs(numbers[j] - numbers[i]):
+                return 0
+    return 1
+
+
+@compiled
+def set_rate(numbers: Numbers, r: int, i: int) -> int:
+    """lambda of pair i from G v, the root above the real axis; 0 where there is none."""
+    moved, rates = (2 + 3 * r + i) * r + i, (2 + 5 * r) * r + i
+    half = 0.5 * complex(numbers[r + i] + numbers[moved], numbers[moved + r * r])
+    left = numbers[i] - half * half
+    if not left.real > 0.0:
+        return 0
+    root = math.sqrt(0.5 * (abs(left) + left.real))
+    numbers[rates] = -0.5 * left.imag / root - half.real
+    numbers[rates + r] = root - half.imag
+    return 1
+
+
+@compiled
+def improve(numbers: Numbers, r: int) -> float:
+    """One step of all pairs from G v to v; by how much a part of v changes at most, infinite where one is no number."""
+    vectors, moved, rates, step = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r, 0.0
+    for i in range(r):
+        if set_rate(numbers, r, i) == 0:
+            return math.inf
+        rate, row = complex(numbers[rates + i], numbers[rates + r + i]), i * r
+        whole = complex(numbers[r + i] + numbers[moved + row + i], numbers[moved + r * r + row + i])
+        for j in range(r):
+            if j != i:
+                v, others = vectors + row + j, complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
+                apart = numbers[j] - numbers[i] + rate * (numbers[r + j] - whole)
+                size = apart.real * apart.real + apart.imag * apart.imag
+                found = -rate * others * apart.conjugate() * (1.0 / size)
+                change = max(abs(found.real - numbers[v]), abs(found.imag - numbers[v + r * r]))
+                if not change < math.inf:
+                    return math.inf
+                step = max(step, change)
+                numbers[v], numbers[v + r * r] = found.real, found.imag
+    return step
+
+
+@compiled
+def write(numbers: Numbers, waves: Waves, r: int) -> None:
+    """lambda (r,), then of all pairs v, and what a start's places and speeds give it, a row each, (r, r)."""
+    vectors, moved, rates = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r
+    for i in range(r):
+        set_rate(numbers, r, i)
+        rate, row, theta = complex(numbers[rates + i], numbers[rates + r + i]), i * r, 0j
+        for j in range(r):
+            v = complex(numbers[vectors + row + j], numbers[vectors + r * r + row + j])
+            others = complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
+            theta += v * ((2.0 * rate + numbers[r + j]) * v + others)
+            waves[r + row + j] = v
+        weight = theta.conjugate() * (2.0 / (theta.real * theta.real + theta.imag * theta.imag))
+        turned = rate.conjugate() * (-1.0 / (rate.real * rate.real + rate.imag * rate.imag))
+        waves[i] = rate
+        for j in range(r):
+            on_speed = weight * waves[r + row + j]
+            waves[(1 + r) * r + row + j] = numbers[j] * (turned * on_speed)
+            waves[(1 + 2 * r) * r + row + j] = on_speed
+
+
+start_pairs, improve_pairs, write_response = entry(start), entry(improve), entry(write)

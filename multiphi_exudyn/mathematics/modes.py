@@ -129,7 +129,7 @@ def turned(
 def _signs(seen: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Of every mode the sign (m,) with which the first row or coordinate moves that moves in it."""
     if len(seen) and (np.abs(seen[0]) > MOVES * sizes[0]).all():
-        return np.where(seen[0] >= 0, 1.0, -1.0)
+        return np.copysign(1.0, seen[0])
     seen = np.vstack([seen, shapes])
     first = _first_moved(np.abs(seen), sizes[: len(seen), None])
     return np.where(seen[first, np.arange(seen.shape[1])] >= 0, 1.0, -1.0)
@@ -137,12 +137,11 @@ def _signs(seen: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarra
 
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
     """First and one past the last mode of every cluster of two or more equal omega^2, ascending."""
-    sizes = np.abs(squares)
-    apart = squares[1:] - squares[:-1] > EQUAL * np.maximum(sizes[1:], sizes[:-1])
-    if apart.all():
+    steps = enumerate(itertools.pairwise(squares.tolist()), start=1)
+    ends = [k for k, (below, above) in steps if above - below > EQUAL * max(abs(below), abs(above))]
+    if len(ends) == len(squares) - 1:
         return []
-    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), len(squares)]
-    return [(first, last) for first, last in itertools.pairwise(edges) if last - first > 1]
+    return [(first, last) for first, last in itertools.pairwise([0, *ends, len(squares)]) if last - first > 1]
 
 
 def _turn(seen: np.ndarray, sizes: np.ndarray) -> np.ndarray:

@@ -84,6 +84,11 @@ class ElementTable:
         """Dampings (l,) [N s/m]."""
         return np.array([link.damping for link in self.links])
 
+    @functools.cached_property
+    def restoring(self) -> np.ndarray:
+        """Forces (2, l) of links along their directions at a gap and at a gap velocity of one: -springs, -dampings."""
+        return -np.stack([self.springs, self.dampings])
+
     def label(self, link: int) -> str:
         """What a link is called: its name, of a force law the law's, with friction that of its contact."""
         element = next(i for i, places in enumerate(self.link_places) if link in places)

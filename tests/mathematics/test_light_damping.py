@@ -47,6 +47,25 @@ def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
     assert np.max(np.abs(left)) < 1e-13 * np.max(squares)
 
 
+def test_the_plain_iteration_is_the_compiled_one(monkeypatch):
+    squares, damping = chain(3, 9, 1e-3)
+    compiled = lightly_damped(squares, damping)
+    for name, plain in (("start_pairs", "start"), ("improve_pairs", "improve"), ("write_response", "write")):
+        monkeypatch.setattr(light_damping, name, getattr(light_damping, plain))
+    found = lightly_damped(squares, damping)
+    for name in ("shapes", "from_displacement", "from_velocity", "from_force"):
+        own = getattr(found, name)
+        assert_allclose(getattr(compiled, name), own, rtol=0, atol=1e-15 * np.max(np.abs(own)))
+    assert_allclose(compiled.basis.rates, found.basis.rates, rtol=1e-15)
+
+
+def test_an_iteration_that_leaves_the_numbers_is_given_up(monkeypatch):
+    squares, damping = chain(1, 6, 1e-3)
+    monkeypatch.setattr(light_damping, "start_pairs", lambda numbers, r: light_damping.start(numbers, r) or 1)
+    assert lightly_damped(squares, 1e5 * damping) is None
+    assert lightly_damped(squares, np.full_like(damping, np.nan)) is None
+
+
 def test_starts_are_their_own_to_round_off():
     squares, damping = chain(2, 10, 5e-3)
     response = lightly_damped(squares, damping)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from multiphi_exudyn.mathematics import secular_equation
 from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
 
 COUNT = 12
@@ -102,6 +103,20 @@ def test_soft_modes_keep_their_digits_beside_stiff_ones():
     residual = np.sum(1 / (d - values[:, None]), axis=1)
     slope = np.sum(1 / (d - values[:, None]) ** 2, axis=1)
     assert np.max(np.abs(residual / slope) / values) < 1e-14
+
+
+@pytest.mark.parametrize("k", STIFFNESSES)
+def test_a_root_takes_eight_steps_at_most_and_is_the_plain_one(monkeypatch, k):
+    random = np.random.default_rng(4)
+    d, p = np.sort(random.uniform(1, 100, 60)), random.normal(size=60)
+    compiled = rank_one_modes(d, p, k, COUNT)
+    monkeypatch.setattr(secular_equation, "find_roots", secular_equation.roots)
+    monkeypatch.setattr(secular_equation, "MOST_STEPS", 8)
+    plain = rank_one_modes(d, p, k, COUNT)
+    assert_allclose(plain[0], compiled[0], rtol=1e-15)
+    assert_allclose(plain[1], compiled[1], atol=1e-14)
+    monkeypatch.setattr(secular_equation, "MOST_STEPS", 1)
+    assert rank_one_modes(d, p, k, COUNT) is None
 
 
 def test_more_than_there_are_between_the_poles_are_left_to_others():

