@@ -34,12 +34,7 @@ SLOW = 0.1  # of the value before: a step that leaves more is followed by one of
 MOST_STEPS = 100  # of a root; three to eight are typical
 FAR = 16.0  # times the d beside the highest root: sums over larger d are power series of x
 ORDERS = 14  # of such a series, the next one is round-off
-SIZE, SLOPE_BELOW, SLOPE_ABOVE, SERIES = (
-    0,
-    1,
-    2,
-    3,
-)  # of sums: their round-off over epsilon; slopes up to d_l and beyond
+SIZE, SLOPE_BELOW, SLOPE_ABOVE, SERIES = range(4)  # sums: their round-off over epsilon, slopes to d_l and beyond
 SUMS = SERIES + ORDERS
 
 

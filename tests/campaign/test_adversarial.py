@@ -87,6 +87,9 @@ FOUND = {
     "a free body that a dashpot hardly slows down": Recipe(
         1162984, "free chain", 7, "dashpot", 4, "mixed", "preload", "mixed", "all", "striking", "none"
     ),
+    "a free body struck to a stop by all that its modes leave of it": Recipe(
+        1336820, "free dense", 4, "rayleigh", 3, "mixed", "small", "between", "half", "random", "none"
+    ),
     "a load that a stop carries without any motion": Recipe(
         16004, "free dense", 3, "heavy", 4, "rigid", "zero", "mixed", "few", "static", "point"
     ),

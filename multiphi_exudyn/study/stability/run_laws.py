@@ -27,6 +27,7 @@ LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
 DIFFERENCE = 1e-2  # of a level's potential: energies are differences of it; of CLOSES it is round-off, of omega^2 too
 PASSED = 1e-5  # the same of what a start, an instant or a sum passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
+ROUND_OFFS = 8  # of a sum's terms: a force that is none has so many at most
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
 
@@ -173,7 +174,7 @@ def missed(
             continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
-        unresolved = np.finfo(float).eps * (segment.end * signal.steepness(at) + signal.grain * reach)
+        unresolved = ROUND_OFFS * np.finfo(float).eps * (segment.end * signal.steepness(at) + signal.grain * reach)
         if lowest < -(MISSED if heard else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
