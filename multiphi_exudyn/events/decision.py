@@ -63,11 +63,11 @@ bases of two levels need not agree, so the law says what happens then; each sent
    complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:
    others may bear less after it, and stick on. What that leaves to the next derivative, and to truncation, each decides
    alone. Of redundant ones an independent set sticks, at last who bears the most beyond its limit; the others push with
-   their limit, as if they slipped, or are idle at a contact that gives way, and take over when they are needed: the
-   motion is the same where not more than one has a static limit. So do those along a closed rigid contact. One that
-   would be pulled beside what sticks opens, and all is decided once more without it; also one beside which some fall
-   that would pull it if they stuck, where without it all hold. None bears an impulse, nor does the friction of a
-   contact that gives way.
+   their limit, as if they slipped, or are idle at a contact that gives way, and take over when they are needed, also
+   from one that only round-off keeps within its limit: the motion is the same where not more than one has a static
+   limit. So do those along a closed rigid contact. One that would be pulled beside what sticks opens, and all is
+   decided once more without it; also one beside which some fall that would pull it if they stuck, where without it all
+   hold. None bears an impulse, nor does the friction of a contact that gives way.
    -> sticking.stick_together, sticking.decide_at_rest, at_rest.sort_by_reserve, sticking.choose,
    sticking.thin_out_idle, sticking.let_go, sticking.hold_without, independence.thin_out, independence.follows,
    striking.slide_on, changes.bears_nothing, changes.without_stick

@@ -62,7 +62,7 @@ from multiphi_exudyn.events.signals import row_sign
 from multiphi_exudyn.events.switching import open_and_enter
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity import SOLVED, solve
-from multiphi_exudyn.mathematics.free_rows import ABOVE, BELOW, SIDES, WAITING, product
+from multiphi_exudyn.mathematics.free_rows import ABOVE, BELOW, BETWEEN, SIDES, WAITING, product
 from multiphi_exudyn.mathematics.least_distance import FOLLOWING
 
 __all__ = ["stick_together"]
@@ -226,7 +226,8 @@ def choose(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
     """12. WISHES: the states of the solution; how many of them begin to slip, and fall from their static limit.
 
     Those that come from slip fall first: what then does not need more than its static limit goes on sticking. Who asks
-    at its static limit, which it would exceed, falls unless others bear more now.
+    at its static limit, which it would exceed, falls unless others bear more now. Whose bound is its limit slips there,
+    whether it has come to it or only to round-off of it.
     """
     states, falling = ints[ints[WORKED + LEVEL] + STATES], 0
     for stuck in range(2):
@@ -235,12 +236,12 @@ def choose(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
             presses, sticks = pressure(ints, numbers, i), ints[ints[STICKS] + i]
             limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
             slipped = key_push(ints, i, limit)
-            side, entered = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks
+            side, entered, asked = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], sticks, ints[asking + i]
             force = numbers[ints[FURTHER] + k] - slipped
-            exceeds = most > limit and abs(force) >= (1.0 - FOLLOWING) * most
+            reached = abs(force) >= (1.0 - FOLLOWING) * most
             if numbers[low] == numbers[high]:
                 entered += SLIP_FORWARD if numbers[low] - slipped < 0.0 else SLIP_BACKWARD
-            elif side in (BELOW, ABOVE) or (exceeds and at_limit(ints, numbers, i, ints[asking + i]) == 1):
+            elif side in (BELOW, ABOVE) or (reached and (most <= limit or at_limit(ints, numbers, i, asked) == 1)):
                 entered += SLIP_BACKWARD if side == ABOVE or force > 0.0 else SLIP_FORWARD
                 now = (ints[states + i] == sticks) == (stuck == 1)
                 if now and most > limit and abs(force) > limit:
@@ -255,17 +256,23 @@ def choose(ints: Ints, numbers: Numbers, count: int, asking: int) -> int:
 
 @compiled
 def thin_out_idle(ints: Ints, numbers: Numbers, count: int) -> None:
-    """12. Of those at rest with exactly their limit, each sticks that does not follow from those that stick already."""
+    """12. Of those at rest with exactly their limit, each sticks that does not follow from those that stick already.
+
+    Who can bear more comes first. Who cannot slips where another takes over: only round-off keeps it within its limit.
+    """
     union, wishes, sides = ints[UNION], ints[WISHES], ints[ints[SMALL_PROBLEM] + SIDES]
     for i in range(ints[ELEMENTS]):
         ints[union + i] = held_links(ints, numbers, i, ints[wishes + i])
     for k in range(count):
         if ints[sides + k] == WAITING:
             ints[union + ints[ints[RESTING_LIST] + k]] = 0
-    for k in range(count):
-        i = ints[ints[RESTING_LIST] + k]
-        if ints[sides + k] == WAITING:
-            ints[union + i] = 2
-            if independent(ints, numbers, union) == 0:
-                ints[union + i] = 0
-                ints[wishes + i] = ints[ints[KEY] + i]
+    for side in (WAITING, BETWEEN):
+        for k in range(count):
+            i = ints[ints[RESTING_LIST] + k]
+            if ints[sides + k] == side and ints[union + i] == 0:
+                ints[union + i] = 2
+                if independent(ints, numbers, union) == 1:
+                    ints[wishes + i] = ints[ints[STICKS] + i]
+                else:
+                    ints[union + i] = 0
+                    ints[wishes + i] = ints[ints[KEY] + i] if side == WAITING else ints[wishes + i]

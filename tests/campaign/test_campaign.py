@@ -185,6 +185,7 @@ def test_rigid_contacts_that_rub_are_struck_together(number):
         ("friction units", 12123),  # a block sticks along a stop: only the sum of their impulses is known
         ("friction redundant", 3020),  # where all slip accelerations cancel: round-off of them decided who sticks
         ("friction redundant", 20003),  # the same, without a spring
+        ("friction redundant", 450047),  # one at its limit but for round-off stuck, not the one with a static limit
     ],
 )
 def test_blocks_are_decided_together(kind, number):

@@ -241,6 +241,32 @@ def test_what_comes_to_rest_stays_while_static_limits_hold_it(force, speed, orde
     assert run.warnings == ()
 
 
+@pytest.mark.parametrize("scale", [0.9, 1.0, 1.07])
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+@pytest.mark.parametrize(("mass", "coupling", "limit"), [(1.0, 0.3, 8.0), (1.0, -0.3, 2.0), (1.3, 0.3, 0.5)])
+def test_who_has_a_static_limit_takes_over_from_one_that_is_at_its_limit_to_round_off(
+    mass, coupling, limit, order, scale
+):
+    """Limits 0.2, 0.3 and 1 of one motion, the last one 2 at rest, are one of 1.5 and 2.5, beside friction elsewhere.
+
+    That pulls through the mass: on the way to the answer one of them comes to its limit but for round-off.
+    """
+    structure = mp.LinearStructure(
+        [[1.0, coupling], [coupling, mass]], np.diag([4.0, 3.0]), points={"m": 0, "elsewhere": 1}
+    )
+    beside, load = mp.Friction("beside", "elsewhere", limit), mp.HarmonicLoad("m", 5.0, 0.25, -np.pi / 2)
+    limits = np.array([(0.2, 0.2), (0.3, 0.3), (1.0, 2.0)])[list(order)] * scale
+    several = [mp.Friction(f"f{k}", "m", low, static_limit=high) for k, (low, high) in enumerate(limits)]
+    one = [mp.Friction("one", "m", 1.5 * scale, static_limit=2.5 * scale)]
+    runs = [
+        mp.simulate(mp.MultiPhiModel(structure, [beside, *parts], modes="all"), 1.0, loads=[load])
+        for parts in (one, several)
+    ]
+    t = np.linspace(0, 1, 101)
+    assert [run.status for run in runs] == ["ok"] * 2
+    assert_allclose(runs[1].at("m", t), runs[0].at("m", t), rtol=0, atol=1e-13)
+
+
 @pytest.mark.parametrize(
     ("stiffness", "force", "hertz", "limits", "spring", "speed"),
     [
