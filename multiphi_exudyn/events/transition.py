@@ -33,7 +33,8 @@ from multiphi_exudyn.levels.level import Level
 
 __all__ = ["Transition", "modal_projection"]
 
-UNMIXED = 1e-13  # product of two modes of unit length, below which they have no part in each other
+UNMIXED = 1e-13  # product of two modes, of unit length in either energy, below which they have no part in each other
+PRODUCT = 1e-15  # round-off of such a product alone: smaller ones are zero whatever they count in strain energy
 
 
 @dataclass(frozen=True)
@@ -131,11 +132,14 @@ class Transition:
 
 
 def modal_projection(target: Level, source: Level) -> np.ndarray:
-    """T = Phi_m^T M Phi_l (r_m, r_l), zero where the product of two modes is one round-off of their length.
+    """T = Phi_m^T M Phi_l (r_m, r_l), zero where a product is round-off of its modes' lengths in both energies.
 
-    In its place it would give a contact at rest, which no other mode moves, a speed. The modes' own round-off, larger
-    where there are many, is not seen here.
+    In its place it would give a contact at rest, which no other mode moves, a speed. Kinetic energy is a sum of eta'^2,
+    strain energy one of (omega eta)^2: there the length of T_ij is |T_ij| omega_i / omega_j, so what a stiff mode has
+    of a soft one may be small and count. The modes' own round-off, larger where there are many, is not seen here.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
-    np.putmask(products, np.abs(products) <= UNMIXED, 0.0)
+    stiff, soft = np.broadcast_arrays(target.omega[:, None], source.omega)
+    shares = np.divide(soft, stiff, out=np.ones(products.shape), where=stiff > soft)
+    np.putmask(products, np.abs(products) <= np.maximum(PRODUCT, UNMIXED * shares), 0.0)
     return products

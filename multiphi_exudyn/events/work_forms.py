@@ -48,13 +48,15 @@ class DrivenForms:
 
 
 def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
-    """F (2 r, 2 r): y.F y grows by the work of damping in a free response; None where it has powers of time.
+    """F (2 r, 2 r), symmetric: y.F y grows by the work of damping in a free response; None where it has powers of time.
 
     damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, eta' = Re S z,
 
         eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
 
-    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k).
+    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k). Of a motion
+    that nothing damps B is one round-off over another: what is not symmetric in F is that alone, and is taken out, for
+    y.F y changes by (y_1 + y_0).F (y_1 - y_0) of a symmetric F only.
     """
     response, r, p = level.response, level.modal.modes, len(level.response.basis.rates)
     if not response.basis.pure:
@@ -67,7 +69,8 @@ def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
     speeds.dot(damping[:r, :r]).dot(speeds.T, out=power)
     if not integrate_power(numbers, waves, r, p):
         return None
-    return np.asarray(starts.T.dot(power.dot(starts)))
+    form = starts.T.dot(power.dot(starts))
+    return np.asarray((form + form.T) / 2)
 
 
 @compiled

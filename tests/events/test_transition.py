@@ -47,6 +47,22 @@ class TestTransition:
         assert np.all(matrix[other] == 0)
         assert_allclose(matrix @ matrix.T, np.eye(7), atol=1e-13)
 
+    def test_a_stiff_mode_keeps_its_small_part_in_a_soft_one(self):
+        """One stop stays closed, another takes over from its twin at zero: no strain energy is lost.
+
+        The load pulls the soft modes far from where the masses are, so the little that the stiff ones share with them
+        is what the spring of the first stop is pressed by.
+        """
+        twins = [stop("m1", 0.0, 1.2e6, "below"), stop({"m1": -1.0}, 0.0, 1e6, "above")]
+        m = MultiPhiModel(chain(3), [stop("m0", 0.0, 2e6, "held"), *twins], modes="all")
+        load = m.base.modes.shapes.T @ np.full(3, -20.0)
+        below, above = loaded(m, ("held", "below"), load), loaded(m, ("held", "above"), load)
+        place = m.base.modes.shapes.T @ np.array([-1e-3, 0.0, 1.0])
+        eta = below.modal.vectors.T @ (place - below.asymptotic.configuration)
+        move = Transition(below, above)
+        assert np.min(np.abs(move.source.modal.vectors.T @ move.target.modal.vectors)) < 1e-13
+        assert_allclose(above.potential(move.displacement(eta)), below.potential(eta), rtol=3e-12)
+
     @settings(max_examples=80)
     @given(st.integers(0, 2**31), st.booleans(), st.booleans())
     def test_energies_never_rise(self, seed, rigid_body, complete_source):

@@ -103,6 +103,17 @@ def test_work_of_a_damped_mode_is_the_energy_it_loses():
     assert run.ledger.damping == pytest.approx(9.0, rel=1e-14)
 
 
+@pytest.mark.parametrize("damping", [1e-4, 1e-6, 1e-7, 1e-8])
+def test_one_damper_on_two_modes_of_one_frequency_takes_what_they_lose(damping):
+    """There is a motion that it does not damp at all, but for round-off; nine dampers, each on its own."""
+    mass = np.array([[2.2, -0.13], [-0.13, 2.3]])
+    for angle in np.linspace(0.1, 3.0, 9):
+        row = np.array([math.cos(angle), math.sin(angle)])
+        structure = mp.LinearStructure(mass, 12.2 * mass, damping * np.outer(row, row), {"m": 0})
+        run = mp.simulate(mp.MultiPhiModel(structure, [], modes="all"), 2.0, velocity=[1.0, -0.7])
+        assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial
+
+
 def test_plain_python_gives_the_same(monkeypatch):
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["two carriers"])
     expected = run.segments.works
