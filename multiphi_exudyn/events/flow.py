@@ -106,8 +106,8 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
         degree, carrier = ints[given + TERM_INTS + 2 * term] - 1, ints[given + TERM_INTS + 2 * term + 1]
         force_modes(ints, numbers, waves, level, carrier, moved, degree)
         rows = forced_response(
-            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon, most,
-            ints[FORCED_WORK], ints[FORCED],
+            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon,
+            ints[state + PLACE], ints[state + SPEED], most, ints[FORCED_WORK], ints[FORCED],
         )  # fmt: skip
         if rows > most:
             ints[FORCED_WANTED] = max(ints[FORCED_WANTED], rows)
