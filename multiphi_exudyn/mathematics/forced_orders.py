@@ -21,20 +21,20 @@ def first_order(
     waves: Waves,
     real: float,
     imag: float,
+    size: float,
     given: int,
     degree: int,
     horizon: float,
-    far: int,
     moving: float,
     most: int,
     w: int,
 ) -> int:
     """w (K + 1,) of w' = distance w + p(t), distance = s - mu: K + 1, and nothing more if that is above ``most``.
 
-    Where it is ``far``, and nearer where that is not much more than what is ``moving`` there already,
-    w_k = ((k + 1) w_k+1 / T - p_k) / distance, else w_k+1 = T (distance w_k + p_k) / (k + 1).
+    Far from the pole, and nearer where that is not much more than what is ``moving`` there already,
+    w_k = ((k + 1) w_k+1 / T - p_k) / distance, else w_k+1 = T (distance w_k + p_k) / (k + 1). size: |distance|.
     """
-    distance, size = complex(real, imag), math.hypot(real, imag)
+    distance, far = complex(real, imag), is_far(size, degree, horizon)
     if far == 1 or size * moving > 0.0:
         inverse, above, total = complex(real / size / size, -imag / size / size), 0j, 0.0
         for k in range(degree, -1, -1):

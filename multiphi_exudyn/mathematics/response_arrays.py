@@ -40,7 +40,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials, modulus
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.forced_orders import clear_rows, first_order, is_far, is_forced, second_order
 from multiphi_exudyn.mathematics.forced_response import COINCIDING
@@ -222,8 +222,8 @@ def force_mode(
         for d in range(degree + 1):
             push = waves[forces + d * r + mode]
             waves[given + d] = weight * (complex(2.0 * push.real, 0.0) if both else push)
-        far = is_far(math.hypot(pole.real, pole.imag), degree, horizon)
-        own = first_order(waves, pole.real, pole.imag, given, degree, horizon, far, moving, most, scratch)
+        size = modulus(pole.real, pole.imag)
+        own = first_order(waves, pole.real, pole.imag, size, given, degree, horizon, moving, most, scratch)
         for k in range(min(own, most) if both else 0):
             waves[scratch + k] = complex(waves[scratch + k].real, 0.0)
         rows = add_mode(waves, scratch, own, mode, r, rows, most, x)
@@ -280,10 +280,10 @@ def force_pole(
                 push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * force
         waves[given + d] = push
     distance = complex(pole.real, sign * pole.imag) - mu
-    far, moving = is_far(math.hypot(distance.real, distance.imag), degree, horizon), 0.0
-    if far == 0:
+    size, moving = modulus(distance.real, distance.imag), 0.0
+    if is_far(size, degree, horizon) == 0:
         moving = moving_at(ints, numbers, waves, response, j, eta, eta_t)
-    own = first_order(waves, distance.real, distance.imag, given, degree, horizon, far, moving, most, scratch)
+    own = first_order(waves, distance.real, distance.imag, size, given, degree, horizon, moving, most, scratch)
     if max(own, rows) > most:
         return max(own, rows)
     rows = clear_rows(waves, x, r, rows, own)
@@ -326,8 +326,8 @@ def force_chain(
             waves[given + d] = push
         pole, w = waves[mixing + i * m + i], scratch + i * most
         distance = complex(pole.real, sign * pole.imag) - mu
-        far = is_far(math.hypot(distance.real, distance.imag), highest, horizon)
-        own = first_order(waves, distance.real, distance.imag, given, highest, horizon, far, 0.0, most, w)
+        size = modulus(distance.real, distance.imag)
+        own = first_order(waves, distance.real, distance.imag, size, given, highest, horizon, 0.0, most, w)
         if max(own, rows) > most:
             return max(own, rows)
         for d in range(own, most):
