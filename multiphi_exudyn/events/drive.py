@@ -21,7 +21,7 @@ from multiphi_exudyn.events.arrays import (
     TERM_INTS,
     TERMS_NOW,
 )
-from multiphi_exudyn.mathematics.basis_arrays import exponential_size
+from multiphi_exudyn.mathematics.basis_arrays import exponential_size, magnitude, modulus
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.signal_bounds import power_of_two_above
 
@@ -54,8 +54,10 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: fl
         numbers[drive + k] = 0.0
     for term in range(ints[piece + PIECE_TERMS]):
         count, rate = ints[piece + TERM_INTS + 2 * term], waves[ints[piece + TERM_INTS + 2 * term + 1]]
-        size, angle = exponential_size(rate.real * delay), rate.imag * delay
-        factor = complex(size * math.cos(angle), size * math.sin(angle))
+        factor = 1.0 + 0j
+        if rate * delay != 0.0:
+            size, angle = exponential_size(rate.real * delay), rate.imag * delay
+            factor = complex(size * math.cos(angle), size * math.sin(angle))
         for k in range(count * q):
             waves[result + k] = waves[moved + k] * factor
         for k in range(q):
@@ -72,9 +74,9 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: fl
             numbers[drive + k] += waves[result + k].real
             numbers[drive + q + k] += first.real
             numbers[drive + 2 * q + k] += second.real
-            numbers[drive + 3 * q + k] += abs(waves[result + k])
-            numbers[drive + 4 * q + k] += abs(first)
-            numbers[drive + 5 * q + k] += abs(second)
+            numbers[drive + 3 * q + k] += magnitude(waves, result + k)
+            numbers[drive + 4 * q + k] += modulus(first.real, first.imag)
+            numbers[drive + 5 * q + k] += modulus(second.real, second.imag)
         moved += count * q
         result += count * q
 

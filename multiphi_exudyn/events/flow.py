@@ -47,6 +47,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.mathematics.basis_arrays import (
     POWERS,
+    PURE,
     RATES,
     SCALES,
     SIZE,
@@ -77,20 +78,27 @@ def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     if ints[PRESCRIBED] > 0:
         r = ints[level + MODES]
         force_flow(ints, numbers, waves, state)
-        coefficients_of(ints, numbers, waves, response, ints[FLOW_STATE], ints[FLOW_STATE] + r, force, c)
-        size_driven_terms(ints, numbers, waves, level)
-        return
+        x, v = ints[FLOW_STATE], ints[FLOW_STATE] + r
     coefficients_of(ints, numbers, waves, response, x, v, force, c)
-    for j in range(p):
-        numbers[ints[FLOW_TERMS] + j] = abs(waves[c + j])
+    for j in range(p if ints[ints[response + FREE] + PURE] == 0 else 0):
+        waves[c + j] *= unit_of_flow(ints, numbers, ints[response + FREE], j)
+
+
+@compiled
+def unit_of_flow(ints: Ints, numbers: Numbers, basis: int, j: int) -> float:
+    """By what a coefficient on the basis of the free response is multiplied for that of the flow."""
+    ratio, unit = numbers[ints[ints[FLOW_BASIS] + SCALES]] / numbers[ints[basis + SCALES]], 1.0
+    for _ in range(ints[ints[basis + POWERS] + j]):
+        unit *= ratio
+    return unit
 
 
 @compiled
 def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     """The response to the channels' terms, with these, as x_k of the flow, and its basis.
 
-    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r), and of which sizes (2, r)
-    they are the sums. Where there is no room for as many powers as a response takes, FORCED_WANTED says for how many.
+    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r). Where there is no room for
+    as many powers as a response takes, FORCED_WANTED says for how many.
     """
     level, q, horizon = ints[state + LEVEL], ints[PRESCRIBED], numbers[HORIZON]
     r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
@@ -99,15 +107,13 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     for i in range(r):
         numbers[own + i] = numbers[ints[state + PLACE] + i]
         numbers[own + r + i] = numbers[ints[state + SPEED] + i]
-        numbers[own + 2 * r + i] = 0.0
-        numbers[own + 3 * r + i] = 0.0
     count, powers = free, 0
     for term in range(ints[given + PIECE_TERMS]):
         degree, carrier = ints[given + TERM_INTS + 2 * term] - 1, ints[given + TERM_INTS + 2 * term + 1]
         force_modes(ints, numbers, waves, level, carrier, moved, degree)
         rows = forced_response(
-            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon, most,
-            ints[FORCED_WORK], ints[FORCED],
+            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon,
+            ints[state + PLACE], ints[state + SPEED], most, ints[FORCED_WORK], ints[FORCED],
         )  # fmt: skip
         if rows > most:
             ints[FORCED_WANTED] = max(ints[FORCED_WANTED], rows)
@@ -119,8 +125,6 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     for j in range(free):
         ints[ints[record + POWERS] + j] = ints[ints[basis + POWERS] + j]
         waves[ints[record + RATES] + j] = waves[ints[basis + RATES] + j]
-    for i in range(2 * r):
-        numbers[own + 2 * r + i] = abs(numbers[own + 2 * r + i]) + abs(numbers[own + i])
     ints[record + SIZE] = count
     numbers[ints[record + SCALES]] = horizon if powers > 0 else numbers[ints[basis + SCALES]]
     describe_basis(ints, numbers, waves, record)
@@ -172,7 +176,6 @@ def add_forced(
         ints[ints[record + POWERS] + j] = k
         waves[ints[record + RATES] + j] = rate
         waves[ints[FLOW_WAVES] + j] = 1.0 + 0j
-        numbers[ints[FLOW_TERMS] + j] = 1.0
     for i in range(r):
         value = waves[ints[FORCED] + i]
         slope = rate * value
@@ -180,27 +183,31 @@ def add_forced(
             slope += 1.0 / numbers[HORIZON] * waves[ints[FORCED] + r + i]
         numbers[own + i] -= value.real
         numbers[own + r + i] -= slope.real
-        numbers[own + 2 * r + i] += value.real
-        numbers[own + 3 * r + i] += slope.real
 
 
 @compiled
-def size_driven_terms(ints: Ints, numbers: Numbers, waves: Waves, level: int) -> None:
-    """Of which terms the coefficients of the free response are the sums; both in the unit of the flow's basis."""
-    response, own, force, p = ints[level + RESPONSE], ints[FLOW_STATE], ints[level + FORCE], ints[FLOW_FREE]
-    r, basis, sizes = ints[level + MODES], ints[response + FREE], ints[level + FREE_SIZES]
-    ratio = numbers[ints[ints[FLOW_RECORD] + SCALES]] / numbers[ints[basis + SCALES]]
+def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """Of which terms (p,) the coefficients of the flow from a state are the sums."""
+    for j in range(ints[FLOW_COUNT]):
+        numbers[ints[FLOW_TERMS] + j] = abs(waves[ints[FLOW_WAVES] + j])
+    if ints[PRESCRIBED] > 0:
+        size_driven_terms(ints, numbers, state)
+
+
+@compiled
+def size_driven_terms(ints: Ints, numbers: Numbers, state: int) -> None:
+    """The same of the free response beside channels: what is forced may be larger than the motion."""
+    level, own, x, v = ints[state + LEVEL], ints[FLOW_STATE], ints[state + PLACE], ints[state + SPEED]
+    response, force, p, r = ints[level + RESPONSE], ints[level + FORCE], ints[FLOW_FREE], ints[level + MODES]
     for j in range(p):
-        size, unit, row = 0.0, 1.0, sizes + j * r
+        size, row = 0.0, ints[level + FREE_SIZES] + j * r
         for i in range(ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]):
-            size += numbers[row + i] * numbers[own + 2 * r + i]
-            size += numbers[row + p * r + i] * numbers[own + 3 * r + i]
+            place, speed = numbers[own + i], numbers[own + r + i]
+            size += numbers[row + i] * (abs(place) + abs(numbers[x + i] - place))
+            size += numbers[row + p * r + i] * (abs(speed) + abs(numbers[v + i] - speed))
             if force >= 0:
                 size += numbers[row + 2 * p * r + i] * abs(numbers[force + i])
-        for _ in range(ints[ints[basis + POWERS] + j]):
-            unit *= ratio
-        numbers[ints[FLOW_TERMS] + j] = size * unit
-        waves[ints[FLOW_WAVES] + j] *= unit
+        numbers[ints[FLOW_TERMS] + j] = size * unit_of_flow(ints, numbers, ints[response + FREE], j)
 
 
 @compiled
@@ -238,6 +245,7 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
     moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
     rated = ints[signal + RATED] == 1
+    size_terms(ints, numbers, waves, state)
     for j in range(count):
         value = 0.0
         slope = 0.0

@@ -106,7 +106,7 @@ class ScratchArrays:
             "numbers": dict.fromkeys((a.ACCELERATION, a.ACCELERATION_TERMS, a.RELEASED_TERMS), n)
             | {a.ROWS: struck * wide, a.PUSHING: struck * wide if self._rough else 0, a.MOVED: wide, a.CHANGE: wide}
             | {a.WORK_NUMBERS: 8 * n + 12 * MOST_COEFFICIENTS}
-            | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 4 * n}
+            | {a.FLOW_TERMS: p, a.SET_SIZES: 2 * n, a.FLOW_STATE: 2 * n}
             | {a.CONSTANTS: signals, a.NOISES: signals}
             | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},
             "ints": {a.WAITING: 2 * signals, a.FALLEN: signals},

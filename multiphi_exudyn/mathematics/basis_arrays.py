@@ -33,6 +33,7 @@ __all__ = [
     "exponential_size",
     "exponentials",
     "magnitude",
+    "modulus",
 ]
 
 SIZE, POWERS, RATES, SCALES, PURE, ETERNAL = 0, 1, 2, 3, 4, 5
@@ -48,11 +49,16 @@ def exponential_size(exponent: float) -> float:
 
 
 @compiled
+def modulus(real: float, imag: float) -> float:
+    """|z|; the square root of its square where that is a number far from zero and infinity."""
+    square = real * real + imag * imag
+    return math.sqrt(square) if SMALL < square < LARGE else math.hypot(real, imag)
+
+
+@compiled
 def magnitude(waves: Waves, at: int) -> float:
-    """|z| of a wave; the square root of its square where that is a number far from zero and infinity."""
-    z = waves[at]
-    square = z.real * z.real + z.imag * z.imag
-    return math.sqrt(square) if SMALL < square < LARGE else abs(z)
+    """|z| of a wave."""
+    return modulus(waves[at].real, waves[at].imag)
 
 
 @compiled
@@ -63,7 +69,7 @@ def describe_basis(ints: Ints, numbers: Numbers, waves: Waves, basis: int) -> No
     fastest = 0.0
     growth = 0.0
     for j in range(ints[basis + SIZE]):
-        fastest = max(fastest, abs(waves[rates + j]))
+        fastest = max(fastest, magnitude(waves, rates + j))
         growth = max(growth, waves[rates + j].real)
         if ints[powers + j] > 0:
             pure = 0

@@ -5,26 +5,44 @@ from __future__ import annotations
 import math
 
 from multiphi_exudyn.mathematics.compiled import Waves, compiled
-from multiphi_exudyn.mathematics.forced_response import NEAREST_FAR, PER_DEGREE, TAYLOR
+from multiphi_exudyn.mathematics.forced_response import NEAREST_FAR, OUTWEIGHED, PER_DEGREE, TAYLOR
 
-__all__ = ["clear_rows", "first_order", "is_forced", "second_order", "taylor_terms"]
+__all__ = ["clear_rows", "first_order", "is_far", "is_forced", "second_order", "taylor_terms"]
+
+
+@compiled
+def is_far(size: float, degree: int, horizon: float) -> int:
+    """1 where a pole at this distance is far for a push of a degree: the finite polynomial is never large."""
+    return 1 if size * horizon >= NEAREST_FAR + PER_DEGREE * degree else 0
 
 
 @compiled
 def first_order(
-    waves: Waves, real: float, imag: float, given: int, degree: int, horizon: float, most: int, w: int
+    waves: Waves,
+    real: float,
+    imag: float,
+    size: float,
+    given: int,
+    degree: int,
+    horizon: float,
+    moving: float,
+    most: int,
+    w: int,
 ) -> int:
     """w (K + 1,) of w' = distance w + p(t), distance = s - mu: K + 1, and nothing more if that is above ``most``.
 
-    Far from the pole w_k = ((k + 1) w_k+1 / T - p_k) / distance, near to it w_k+1 = T (distance w_k + p_k) / (k + 1).
+    Far from the pole, and nearer where that is not much more than what is ``moving`` there already,
+    w_k = ((k + 1) w_k+1 / T - p_k) / distance, else w_k+1 = T (distance w_k + p_k) / (k + 1). size: |distance|.
     """
-    distance, size = complex(real, imag), math.hypot(real, imag)
-    if size * horizon >= NEAREST_FAR + PER_DEGREE * degree:
-        inverse, above = complex(real / size / size, -imag / size / size), 0j
+    distance, far = complex(real, imag), is_far(size, degree, horizon)
+    if far == 1 or size * moving > 0.0:
+        inverse, above, total = complex(real / size / size, -imag / size / size), 0j, 0.0
         for k in range(degree, -1, -1):
             above = ((k + 1) / horizon * above - waves[given + k]) * inverse
             waves[w + k] = above
-        return degree + 1
+            total += abs(above.real) + abs(above.imag)
+        if far == 1 or total <= OUTWEIGHED * moving:
+            return degree + 1
     rows = taylor_terms(degree, size * horizon, 1)
     if rows <= most:
         waves[w] = 0j

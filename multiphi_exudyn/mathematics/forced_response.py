@@ -32,6 +32,7 @@ __all__ = ["particular"]
 TAYLOR = 1e-18  # of a Taylor series: terms below it are left out
 NEAREST_FAR = 0.5  # |s - mu| T from which the finite polynomial is taken for a constant p,
 PER_DEGREE = 0.5  # and more for each degree of p: D! / (|s - mu| T)^D is what the finite polynomial loses
+OUTWEIGHED = 10.0  # times the motion: a finite polynomial up to it loses no more than one digit of that
 COINCIDING = 2e-2  # of |s|: poles closer than this are solved together; where one is zero, SLOW of 1 / T or mu
 
 

@@ -28,7 +28,8 @@ Forced response, as forced_response.py has it, to p = Re( exp(mu t) sum_d p_d u^
 
 as the sum of equations of first order, z' = s z + exp(mu t) p(t), for every pole s; two poles that (nearly) coincide
 are one equation of second order. On the carrier mu = 0 only the real parts count, and of a pole and its conjugate one
-is solved: twice the real part of its response is that to both.
+is solved: twice the real part of its response is that to both. Beside a motion the finite polynomials are taken nearer
+to the poles than there, as long as they are not much larger than it: what cancels is round-off of the motion.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.basis_arrays import RATES, SIZE, differentiate, exponentials, modulus
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.forced_orders import clear_rows, first_order, is_forced, second_order
+from multiphi_exudyn.mathematics.forced_orders import clear_rows, first_order, is_far, is_forced, second_order
 from multiphi_exudyn.mathematics.forced_response import COINCIDING
 from multiphi_exudyn.mathematics.round_off import SLOW
 
@@ -133,12 +134,15 @@ def forced_response(
     forces: int,
     degree: int,
     horizon: float,
+    eta: int,
+    eta_t: int,
     most: int,
     scratch: int,
     result: int,
 ) -> int:
     """One response x (K + 1, r) to modal forces p (degree + 1, r) on a carrier, good for [0, horizon]: K + 1.
 
+    eta, eta_t: where the motion (r,) that it becomes part of begins in the numbers, beside which it may be large.
     carrier: where its mu stands in the waves. most: rows that there is room for, more than the degree; where a larger
     number comes back, so many are needed, and x is nothing. scratch: (2 + m) ``most`` waves, m of the longest chain.
     """
@@ -147,13 +151,17 @@ def forced_response(
     for i in range(r):
         if ints[ints[response + UNCOUPLED] + i] == 1 and is_forced(waves, forces + i, r, degree) == 1:
             square, delta = numbers[ints[response + SQUARES] + i], numbers[ints[response + HALF_DAMPING] + i]
-            rows = force_mode(waves, square, delta, carrier, forces, degree, horizon, i, r, rows, most, scratch, result)
+            place, speed = numbers[eta + i], numbers[eta_t + i]
+            rows = force_mode(
+                waves, square, delta, carrier, forces, degree, horizon, place, speed, i, r, rows, most, scratch, result
+            )
     for j in range(ints[basis + SIZE]):
         if ints[ints[response + POLES] + j] == 1:
             for mirrored in range(1 if waves[carrier] == 0 else 2):
                 rows = force_pole(
-                    ints, waves, response, j, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
-                )
+                    ints, numbers, waves, response, j, mirrored, carrier, forces, degree, horizon, eta, eta_t, rows,
+                    most, scratch, result,
+                )  # fmt: skip
     for k in range(ints[ints[response + CHAINS]]):
         chain = ints[response + CHAINS] + 1 + k * CHAIN
         for mirrored in range(2):
@@ -161,6 +169,16 @@ def forced_response(
                 ints, waves, chain, r, mirrored, carrier, forces, degree, horizon, rows, most, scratch, result
             )
     return rows
+
+
+@compiled
+def moving_at(ints: Ints, numbers: Numbers, waves: Waves, response: int, j: int, eta: int, eta_t: int) -> float:
+    """|A eta + B eta'| of one exponential of coupled modes: how large it is in a motion."""
+    r, reached, total = ints[response + MODES], ints[response + REACHED] + 2 * j, 0j
+    moved, pushed = ints[response + FROM_DISPLACEMENT] + j * r, ints[response + FROM_VELOCITY] + j * r
+    for i in range(ints[reached], ints[reached + 1]):
+        total += waves[moved + i] * numbers[eta + i] + waves[pushed + i] * numbers[eta_t + i]
+    return abs(total)
 
 
 @compiled
@@ -172,6 +190,8 @@ def force_mode(
     forces: int,
     degree: int,
     horizon: float,
+    place: float,
+    speed: float,
     mode: int,
     r: int,
     rows: int,
@@ -195,13 +215,15 @@ def force_mode(
         return add_mode(waves, scratch, own, mode, r, rows, most, x)
     fast = complex(-delta - root, 0.0) if difference > 0.0 else complex(-delta, -root)
     ratio = square / (fast.real * fast.real + fast.imag * fast.imag)
+    moving = abs(place) + abs(speed) / root
     weight = complex(0.5 / root, 0.0) if difference > 0.0 else complex(0.0, -0.5 / root)
     for sign in range(1 if both else 2):
         pole = fast - mu if sign == 1 else complex(ratio * fast.real, -ratio * fast.imag) - mu
         for d in range(degree + 1):
             push = waves[forces + d * r + mode]
             waves[given + d] = weight * (complex(2.0 * push.real, 0.0) if both else push)
-        own = first_order(waves, pole.real, pole.imag, given, degree, horizon, most, scratch)
+        size = modulus(pole.real, pole.imag)
+        own = first_order(waves, pole.real, pole.imag, size, given, degree, horizon, moving, most, scratch)
         for k in range(min(own, most) if both else 0):
             waves[scratch + k] = complex(waves[scratch + k].real, 0.0)
         rows = add_mode(waves, scratch, own, mode, r, rows, most, x)
@@ -223,6 +245,7 @@ def add_mode(waves: Waves, w: int, own: int, mode: int, r: int, rows: int, most:
 @compiled
 def force_pole(
     ints: Ints,
+    numbers: Numbers,
     waves: Waves,
     response: int,
     j: int,
@@ -231,6 +254,8 @@ def force_pole(
     forces: int,
     degree: int,
     horizon: float,
+    eta: int,
+    eta_t: int,
     rows: int,
     most: int,
     scratch: int,
@@ -255,7 +280,10 @@ def force_pole(
                 push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * force
         waves[given + d] = push
     distance = complex(pole.real, sign * pole.imag) - mu
-    own = first_order(waves, distance.real, distance.imag, given, degree, horizon, most, scratch)
+    size, moving = modulus(distance.real, distance.imag), 0.0
+    if is_far(size, degree, horizon) == 0:
+        moving = moving_at(ints, numbers, waves, response, j, eta, eta_t)
+    own = first_order(waves, distance.real, distance.imag, size, given, degree, horizon, moving, most, scratch)
     if max(own, rows) > most:
         return max(own, rows)
     rows = clear_rows(waves, x, r, rows, own)
@@ -298,7 +326,8 @@ def force_chain(
             waves[given + d] = push
         pole, w = waves[mixing + i * m + i], scratch + i * most
         distance = complex(pole.real, sign * pole.imag) - mu
-        own = first_order(waves, distance.real, distance.imag, given, highest, horizon, most, w)
+        size = modulus(distance.real, distance.imag)
+        own = first_order(waves, distance.real, distance.imag, size, given, highest, horizon, 0.0, most, w)
         if max(own, rows) > most:
             return max(own, rows)
         for d in range(own, most):

@@ -181,5 +181,8 @@ def in_buffers(response, squares, damping, rate, forces, horizon):
     record = buffers.put_response(response, squares, damping)
     carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
     scratch, result = buffers.put_waves(np.zeros(8 * most)), buffers.put_waves(np.zeros(most * r))
-    rows = response_arrays.forced_response(*buffers.all, record, carrier, given, degree, horizon, most, scratch, result)
+    still = buffers.put_numbers(np.zeros(len(squares)))
+    rows = response_arrays.forced_response(
+        *buffers.all, record, carrier, given, degree, horizon, still, still, most, scratch, result
+    )
     return buffers.waves[result : result + rows * r].reshape(rows, r)

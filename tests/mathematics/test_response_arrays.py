@@ -61,14 +61,15 @@ def test_an_exponential_of_one_mode_reaches_that_mode_only():
 MOST = 80  # rows of a forced response
 
 
-def forced(squares, damping, rate, forces, horizon, most=MOST, run=lambda function: function):
-    """Rows of the response, of which as many as there is room for."""
+def forced(squares, damping, rate, forces, horizon, most=MOST, run=lambda function: function, motion=None):
+    """Rows of the response, of which as many as there is room for; motion: eta and eta' (2, r) beside it, none."""
     buffers, (count, r) = Buffers(), forces.shape
+    eta = buffers.put_numbers(np.zeros((2, r)) if motion is None else motion)
     record = buffers.put_response(modal_response(squares, damping), squares, damping)
     carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
     scratch, x = buffers.put_waves(np.full(2 * most, np.nan)), buffers.put_waves(np.full(most * r, np.nan))
     rows = run(response_arrays.forced_response)(
-        *buffers.all, record, carrier, given, count - 1, horizon, most, scratch, x
+        *buffers.all, record, carrier, given, count - 1, horizon, eta, eta + r, most, scratch, x
     )
     return rows, buffers.waves[x : x + min(rows, most) * r].reshape(-1, r)
 
@@ -103,6 +104,29 @@ def test_it_is_so_for_any_modes_and_loads(seed):
     if rate == 0.0:  # of a force that does not turn the real part is all
         x, expected = x.real, expected.real
     assert_allclose(x, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("damping", ["diagonal", "all"])
+@pytest.mark.parametrize("rate", [0.0, 0.7j])
+def test_beside_a_motion_it_has_no_more_powers_than_the_load(damping, rate):
+    """Near its poles too, as long as it is no more than ten times the motion; it is another solution, as good."""
+    squares, delta = np.array([1.0, 9.0, 100.0]), {"diagonal": 0.1 * np.eye(3), "all": 0.05 + 0.1 * np.eye(3)}[damping]
+    horizon, forces = 2.0**-6, np.random.default_rng(0).normal(size=(2, 3)) + 0j
+    series, rest = forced(squares, delta, rate, forces, horizon)
+    assert series > 6
+    basis = modal_response(squares, delta)
+    for size, rows in ((1e-9, series), (1e4, 2)):
+        motion = size * np.ones((2, 3))
+        found, x = forced(squares, delta, rate, forces, horizon, motion=motion)
+        assert found == rows
+    t = horizon * np.linspace(0.0, 1.0, 5)[1:]
+    from_rest = []
+    for given in (x, rest):
+        unit = rate * given[0] + given[1] / horizon
+        free = basis.coefficients(-given[0].real, -unit.real)
+        forced_part = [(np.exp(rate * s) * ((s / horizon) ** np.arange(len(given)) @ given)).real for s in t]
+        from_rest.append(np.array(forced_part) + [basis.state(free, s)[0] for s in t])
+    assert_allclose(from_rest[0], from_rest[1], rtol=0, atol=1e-14 * np.max(np.abs(x)))
 
 
 def test_a_mode_that_no_force_acts_on_stays_at_rest_and_adds_no_rows():
