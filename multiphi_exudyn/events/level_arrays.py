@@ -299,5 +299,5 @@ class LevelArrays:
         """What a defect is read from on the way from a level, or from the base, into a level (defect_sums.py)."""
         if source == self.base:
             return np.column_stack([level.level.vectors, level.asymptotic.configuration]).ravel()
-        form = defect_form(self.loaded[int(self.ints[source + a.NUMBER])], level, ())
+        form = defect_form(self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level), ())
         return np.concatenate([form.displaced.ravel(), form.moving.ravel()])

@@ -34,6 +34,7 @@ from multiphi_exudyn.events.arrays import (
     SLIP_FORWARD,
     SPEED,
     SPEEDS,
+    SPEEDS_CHANGED,
     STATES,
     STICKS,
     STILL,
@@ -75,6 +76,7 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     status = transfer(ints, numbers, WORKED, ints[COMPLIANT_KEY], RELEASED)
     if status < 0:
         return status
+    ints[SPEEDS_CHANGED] = 1
     clear(numbers, LOST_IN_IMPACT)
     bouncing = rebound(ints, numbers, RELEASED, count)
     if bouncing < 0:

@@ -24,6 +24,7 @@ import numpy as np
 from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigidly, over_omega
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
+from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -75,8 +76,8 @@ class DefectHistory:
         squares[0] = _at_start(trajectory, segments.levels[segments.numbers[0]], stopped.get(0, ()), first[:, 0])
         for (before, after_it, struck), places in ways.items():
             rows = np.searchsorted(entered, places)
-            way = defect_form(segments.levels[before], segments.levels[after_it], struck)
-            squares[rows] = way.squares(last[:, rows - 1], first[:, rows])
+            form = defect_form(Transition(segments.levels[before], segments.levels[after_it]), struck)
+            squares[rows] = form.squares(last[:, rows - 1], first[:, rows])
         return cls(segments, entered, squares)
 
     def indicator(self, end: float) -> float:
