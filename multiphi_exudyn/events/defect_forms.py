@@ -27,7 +27,7 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.orthonormal import least_squares
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
-__all__ += ["struck_defects"]
+__all__ += ["start_form", "struck_defects"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,11 @@ def _motion(way: Transition, matrix: np.ndarray) -> np.ndarray:
     return motion
 
 
+def start_form(level: LoadedLevel) -> np.ndarray | None:
+    """(Psi, y_inf) (m, n + 1), with which d = y - Psi xi - y_inf at the start; None where a rigid link holds."""
+    return None if held_rigidly(level) else np.column_stack([level.level.vectors, level.asymptotic.configuration])
+
+
 def struck_defects(level: LoadedLevel) -> np.ndarray:
     """|w / Omega|^2 (c,) of a rigid contact that an impulse of one strikes and that opens again; nan for others.
 
@@ -116,7 +121,7 @@ def _upper(rows: int, columns: int) -> np.ndarray:
 
 
 def held_rigidly(level: LoadedLevel) -> set[int]:
-    """The closed rigid contacts."""
+    """The rigid links that hold: closed rigid contacts, and rigid friction that sticks."""
     return {i for i in level.level.indices if level.level.base.links[i].rigid}
 
 

@@ -23,24 +23,21 @@ from multiphi_exudyn.events.arrays import (
     COORDINATES,
     CURRENT,
     DEFECTS,
-    ELEMENTS,
     GIVEN,
     JUDGED,
-    KINDS,
     LEVEL,
     MAP_DEFECT,
+    MAPPED_AGAIN,
     MODES,
     OPEN,
     PERIODS,
     PLACE,
-    RIGID,
     SET_SIZES,
     SHARED,
     SPEED,
     SPEEDS_CHANGED,
     STATES,
     STRUCK_DEFECTS,
-    TRANSITIONS_NOW,
 )
 from multiphi_exudyn.events.maps import find_map, move_part
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
@@ -65,15 +62,14 @@ def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
         numbers[DEFECTS] = math.nan
         return
     n, n_after = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
-    row, changes, further = ints[way + MAP_DEFECT], ints[SET_SIZES], 0
-    if ints[TRANSITIONS_NOW] != 1 or ints[SPEEDS_CHANGED] == 1:
-        further = n_after
+    row, changes = ints[way + MAP_DEFECT], ints[SET_SIZES]
     for part in range(2):
-        x, y, constants = ints[before + PLACE + part], ints[after + PLACE + part], 1 - part
-        if further > 0:
+        x, constants, further = ints[before + PLACE + part], 1 - part, 0
+        if ints[MAPPED_AGAIN] == 1 or (part == 1 and ints[SPEEDS_CHANGED] == 1):
             move_part(ints, numbers, way, part, x, ints[after + LEVEL], n, changes, changes + n_after)
+            further = n_after
         for i in range(further):
-            numbers[changes + i] -= numbers[y + i]
+            numbers[changes + i] -= numbers[ints[after + PLACE + part] + i]
         width = constants + n + n_after
         rows = min(ints[COORDINATES], constants + n + further)
         numbers[DEFECTS] += square(numbers, row, width, rows, constants, x, n, changes, further)
@@ -125,16 +121,12 @@ def left_by_impact(ints: Ints, numbers: Numbers, sizes: int) -> float:
 
 @compiled
 def add_start_defect(ints: Ints, numbers: Numbers) -> None:
-    """Adds |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan where rigid contacts are closed."""
+    """Adds |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan where a rigid link holds."""
     if ints[JUDGED] == 0:
         return
     level, base = ints[CURRENT + LEVEL], ints[GIVEN + LEVEL]
     way = find_map(ints, base, level)
-    known = way >= 0 and who_is_struck(ints, numbers, CURRENT) == NOBODY
-    for i in range(ints[ELEMENTS]):
-        if ints[ints[KINDS] + i] == RIGID and ints[ints[level + STATES] + i] != OPEN:
-            known = False
-    if not known:
+    if way < 0 or ints[way + MAP_DEFECT] < 0 or who_is_struck(ints, numbers, CURRENT) != NOBODY:
         numbers[DEFECTS] = math.nan
         return
     n, row = ints[level + MODES] + ints[CHANNELS], ints[way + MAP_DEFECT]

@@ -23,6 +23,7 @@ from multiphi_exudyn.events.arrays import (
     LOST_IN_IMPACT,
     LOST_NOW,
     LOST_STILLED,
+    MAPPED_AGAIN,
     MODES,
     NEED,
     OK,
@@ -147,6 +148,7 @@ def slide_on(ints: Ints, numbers: Numbers) -> int:
     status = level if level < 0 else move(ints, numbers, AFTER, AFTER, level, ENTERED_STATE)
     if status < 0:
         return status
+    ints[MAPPED_AGAIN] = 1
     lose(ints, numbers, AFTER, ENTERED_STATE, 0.0, LOST_NOW)
     copy_state(ints, numbers, ENTERED_STATE, AFTER)
     return OK
