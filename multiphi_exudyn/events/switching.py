@@ -21,7 +21,6 @@ from multiphi_exudyn.events.arrays import (
     PUSHED,
     RIGID,
     SINGLES,
-    SPEEDS_CHANGED,
     STATES,
     STRUCK,
     TOUCHING,
@@ -145,7 +144,6 @@ def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         if status < 0:
             return status
         if same_speed(ints, numbers, ENTERED_STATE, STRUCK) == 0:
-            ints[SPEEDS_CHANGED] = 1
             for k in range(opened):
                 numbers[ints[PUSHED] + ints[touching + k]] = numbers[ints[IMPULSES] + k]
         entered = STRUCK

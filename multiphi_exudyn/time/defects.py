@@ -9,8 +9,8 @@ an impact has stopped. The difference to the state after it is the defect
 
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
-level d and w / Omega are linear in the states before and after; of these maps the triangular factors are kept, a few
-numbers per pair of levels.
+level d and w / Omega are linear in the state before and in what was changed beside the map of the levels
+(events/defect_forms.py); of these maps the triangular factors are kept, a few numbers per pair of levels.
 """
 
 from __future__ import annotations

@@ -65,6 +65,13 @@ def beside_each_other(stiffness, modes, **given):
     return mp.MultiPhiModel(chain(7), contacts, modes=modes)
 
 
+def padded(stops, pads, modes, limit):
+    """Rigid friction on a chain, beside rigid stops: some slip on beside an impact, several begin to at one instant."""
+    contacts = [mp.UnilateralContact(f"c{i}", f"m{point}", 0.05) for i, point in enumerate(stops)]
+    contacts += [mp.Friction(f"pad{i}", at, limit, static_limit=1.5 * limit) for i, at in enumerate(pads)]
+    return mp.MultiPhiModel(chain(7), contacts, modes=modes)
+
+
 WEIGHT = tuple(mp.ConstantLoad(f"m{i}", -0.03) for i in range(7))
 PULL = (mp.HarmonicLoad("m6", -0.4, 0.11), mp.HarmonicLoad("m2", 0.3, 0.37))
 END = 40.0
@@ -76,6 +83,8 @@ CASES = {
     "rigid, loads": (beside_each_other(math.inf, 3), WEIGHT + PULL),
     "jumps": (beside_each_other(5.0, 2), JUMPS),
     "rough": (rough_chain(3), WEIGHT),
+    "stops and pads": (padded([3, 6], ["m1", "m5"], 2, 0.05), WEIGHT + PULL),
+    "pads": (padded([], ["m1", "m4", {"m1": 1.0, "m4": -1.0}], 2, 0.1), PULL),
     "rough, loads": (rough_chain(3), WEIGHT + PULL),
 }
 
