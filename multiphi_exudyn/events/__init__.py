@@ -30,7 +30,7 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
-Order: load_channels, excitation, pieces, channels, loaded_level, defect_forms, transition, state, exits, exit_table,
+Order: load_channels, excitation, pieces, channels, loaded_level, transition, defect_forms, state, exits, exit_table,
 loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact_sizes, impact, phases,
 changes, independence, bounces, rebounds, resting, striking, switching, at_rest, sticking, decision, waiting, start,
 channel_arrays, element_arrays, work_forms, scratch_arrays, level_parts, level_records, level_tables, level_arrays,

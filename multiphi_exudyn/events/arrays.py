@@ -118,7 +118,8 @@ COMPRESSED = 216  # a state, in all modes too: where an impact with friction and
 UNMOVED = 224  # flags of elements that nothing lets move: nobody looks at their exits
 WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the segment under way are
 STARTS, START_STATES, START = 228, 229, 230  # where starts stand, their states in the ints; which of them a run has
-RUN_INTS = 231
+MAPPED_AGAIN, SPEEDS_CHANGED = 231, 232  # whether the decision under way took more than one map; impacts beside it
+RUN_INTS = 233
 
 # ---------------------------------------------------------------------- run record, numbers
 

@@ -26,6 +26,7 @@ from multiphi_exudyn.events.arrays import (
     LOSSES,
     LOST,
     LOST_NOW,
+    MAPPED_AGAIN,
     MODES,
     OK,
     OPEN,
@@ -148,6 +149,8 @@ def enter(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     copy_state(ints, numbers, state, WORKED)
     update_phases(ints, numbers, waves, WORKED, -1)
     ints[TRANSITIONS_NOW] += 1
+    if ints[TRANSITIONS_NOW] > 1:
+        ints[MAPPED_AGAIN] = 1
     for k in range(LOSSES):
         numbers[LOST + k] += numbers[LOST_NOW + k]
 

@@ -116,6 +116,7 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     LOST,
     LOST_NOW,
+    MAPPED_AGAIN,
     NOT_ADMISSIBLE,
     OK,
     OPEN,
@@ -128,6 +129,7 @@ from multiphi_exudyn.events.arrays import (
     RIGID,
     SHARED,
     SIGNAL,
+    SPEEDS_CHANGED,
     STATES,
     STICKS,
     STRIKING,
@@ -164,6 +166,8 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     first, struck = ints[FIRST_CHANGE], 0
     ints[CHANGE_COUNT] = first
     ints[TRANSITIONS_NOW] = 0
+    ints[MAPPED_AGAIN] = 0
+    ints[SPEEDS_CHANGED] = 0
     copy_state(ints, numbers, REACHED, WORKED)
     forget_bounces(ints)
     ints[TOGETHER] = 0

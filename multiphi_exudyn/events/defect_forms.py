@@ -2,8 +2,15 @@
 
     d = P (y - Psi eta - y_inf),   w = Q (v - Psi eta')
 
-as in time/defects.py; d and w / Omega are linear in the states before and after, of these maps triangular factors are
-kept.
+as in time/defects.py. From level l to level m the state after is the map's image of the state before (eq. 38.6), but
+for what impacts and further levels at the same instant have changed:
+
+    s = T xi_l + c - xi_m,   s' = T' xi'_l - xi'_m
+    d = P (Psi_l - Psi_m T) xi_l + P (y_l - y_m - Psi_m c) + P Psi_m s
+    w = Q (Psi_l - Psi_m T') xi'_l + Q Psi_m s'
+
+Of these maps from (1, xi_l, s) and (xi'_l, s') triangular factors are kept. Where s = 0 their first rows and columns
+are enough; the difference of the levels is formed in them, not that of two states.
 """
 
 from __future__ import annotations
@@ -15,50 +22,69 @@ import numpy as np
 from scipy.linalg.lapack import dgeqrf
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.orthonormal import least_squares
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
-__all__ += ["struck_defects"]
+__all__ += ["start_form", "struck_defects"]
 
 
 @dataclass(frozen=True)
 class DefectForm:
-    """The maps to defects from level to level: (eta, eta_after, 1) to d, (eta', eta'_after) to w / Omega.
+    """The maps to defects from level l to level m: (1, xi_l, s) to d, (xi'_l, s') to w / Omega.
 
-    modes: of either level.
+    matrix, offset, velocity_matrix: T, c and T' of s and s'.
     """
 
     displaced: np.ndarray
     moving: np.ndarray
-    modes: tuple[int, int]
+    matrix: np.ndarray
+    offset: np.ndarray
+    velocity_matrix: np.ndarray
 
     def squares(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """|defect|^2 (k,) between states (2, k, >= r) at an instant."""
-        r, s = self.modes
-        states = np.concatenate([before[:, :, :r], after[:, :, :s]], axis=2)
-        d = states[0] @ self.displaced[:, :-1].T + self.displaced[:, -1]
-        w = states[1] @ self.moving.T
+        """|defect|^2 (k,) between states (2, k, >= n) at an instant."""
+        n_after, n = self.matrix.shape
+        (x, v), (x_after, v_after) = before[:, :, :n], after[:, :, :n_after]
+        changed = x @ self.matrix.T + self.offset - x_after
+        slowed = v @ self.velocity_matrix.T - v_after
+        d = self.displaced[:, 0] + np.hstack([x, changed]) @ self.displaced[:, 1:].T
+        w = np.hstack([v, slowed]) @ self.moving.T
         return np.asarray(np.sum(d * d, axis=1) + np.sum(w * w, axis=1))
 
 
-def defect_form(before: LoadedLevel, after: LoadedLevel, stopped: tuple[int, ...]) -> DefectForm:
+def defect_form(way: Transition, stopped: tuple[int, ...]) -> DefectForm:
     """The maps into a level, which keeps them: under one load a level has one neighbour with given states."""
+    before, after = way.source, way.target
     key = before.states, stopped
     if key not in after.entries:
-        base, source, target = after.level.base, before.level.vectors, after.level.vectors
-        held, modes = held_rigidly(after), (source.shape[1], target.shape[1])
-        motion = np.empty((len(source), sum(modes) + 1), order="F")
-        motion[:, : modes[0]] = source
-        np.negative(target, out=motion[:, modes[0] : -1])
-        motion[:, -1] = before.asymptotic.configuration - after.asymptotic.configuration
-        displaced = allowed(base, held, motion)
-        moved = displaced if held.issuperset(stopped) else allowed(base, held | set(stopped), motion)
-        moving = over_omega(base, moved[:, :-1])
-        rates = factor(moving)
-        after.entries[key] = DefectForm(factor(displaced), rates, modes)
-    way: DefectForm = after.entries[key]
-    return way
+        base, held = after.level.base, held_rigidly(after)
+        displaced = allowed(base, held, _motion(way, way.matrix))
+        moved, as_displaced = displaced, way.velocity_matrix is way.matrix and held.issuperset(stopped)
+        if not as_displaced:
+            moved = allowed(base, held | set(stopped), _motion(way, way.velocity_matrix))
+        rates = factor(over_omega(base, moved[:, 1:]))
+        after.entries[key] = DefectForm(factor(displaced), rates, way.matrix, way.offset, way.velocity_matrix)
+    form: DefectForm = after.entries[key]
+    return form
+
+
+def _motion(way: Transition, matrix: np.ndarray) -> np.ndarray:
+    """The maps (m, 1 + n_l + n_m) from (1, xi_l, s) with T, or with T', to motions, whatever rigid contacts prevent."""
+    before, after = way.source, way.target
+    source, target = before.level.vectors, after.level.vectors
+    n = source.shape[1]
+    motion = np.empty((len(source), 1 + n + target.shape[1]), order="F")
+    motion[:, 0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ way.offset
+    np.subtract(source, target @ matrix, out=motion[:, 1 : n + 1])
+    motion[:, n + 1 :] = target
+    return motion
+
+
+def start_form(level: LoadedLevel) -> np.ndarray | None:
+    """(Psi, y_inf) (m, n + 1), with which d = y - Psi xi - y_inf at the start; None where a rigid link holds."""
+    return None if held_rigidly(level) else np.column_stack([level.level.vectors, level.asymptotic.configuration])
 
 
 def struck_defects(level: LoadedLevel) -> np.ndarray:
@@ -95,7 +121,7 @@ def _upper(rows: int, columns: int) -> np.ndarray:
 
 
 def held_rigidly(level: LoadedLevel) -> set[int]:
-    """The closed rigid contacts."""
+    """The rigid links that hold: closed rigid contacts, and rigid friction that sticks."""
     return {i for i in level.level.indices if level.level.base.links[i].rigid}
 
 

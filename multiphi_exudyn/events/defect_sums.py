@@ -1,7 +1,11 @@
 """Defects of a run as they happen: what levels entered cannot hold, added up for its warnings (defect_forms.py).
 
-At the start d = y - V xi - y_inf and w = (v - V xi') / Omega, row by row; between levels by the triangular factors
-of their map. A rigid contact that is struck and opens again takes more out than the factors know: where it alone is
+At the start d = y - V xi - y_inf and w = (v - V xi') / Omega, row by row; between levels by the triangular factors of
+their map: of the state before alone where one map has made the state after, else also of what was changed beside it,
+
+    s = T xi_l + c - xi_m,   s' = T' xi'_l - xi'_m
+
+A rigid contact that is struck and opens again takes more out than the factors know: where it alone is
 struck, that goes with the square of its impulse; where several are, or an instant passed through further levels, the
 sum is nan.
 """
@@ -19,23 +23,23 @@ from multiphi_exudyn.events.arrays import (
     COORDINATES,
     CURRENT,
     DEFECTS,
-    ELEMENTS,
     GIVEN,
     JUDGED,
-    KINDS,
     LEVEL,
     MAP_DEFECT,
+    MAPPED_AGAIN,
     MODES,
     OPEN,
     PERIODS,
     PLACE,
-    RIGID,
+    SET_SIZES,
     SHARED,
     SPEED,
+    SPEEDS_CHANGED,
     STATES,
     STRUCK_DEFECTS,
 )
-from multiphi_exudyn.events.maps import find_map
+from multiphi_exudyn.events.maps import find_map, move_part
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
 __all__ = ["add_defect", "add_start_defect"]
@@ -57,20 +61,39 @@ def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
     if way < 0 or ints[way + MAP_DEFECT] < 0:
         numbers[DEFECTS] = math.nan
         return
-    n, further = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
-    width, m = n + further, ints[COORDINATES]
-    row = ints[way + MAP_DEFECT]
+    n, n_after = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
+    row, changes = ints[way + MAP_DEFECT], ints[SET_SIZES]
     for part in range(2):
-        x, y = ints[before + PLACE + part], ints[after + PLACE + part]
-        constant = 1 - part
-        for i in range(min(m, width + constant)):
-            total = numbers[row + width] if part == 0 else 0.0
-            for j in range(i, n):
-                total += numbers[row + j] * numbers[x + j]
-            for j in range(max(i - n, 0), further):
-                total += numbers[row + n + j] * numbers[y + j]
-            numbers[DEFECTS] += total * total
-            row += width + constant
+        x, constants, further = ints[before + PLACE + part], 1 - part, 0
+        if ints[MAPPED_AGAIN] == 1 or (part == 1 and ints[SPEEDS_CHANGED] == 1):
+            move_part(ints, numbers, way, part, x, ints[after + LEVEL], n, changes, changes + n_after)
+            further = n_after
+        for i in range(further):
+            numbers[changes + i] -= numbers[ints[after + PLACE + part] + i]
+        width = constants + n + n_after
+        rows = min(ints[COORDINATES], constants + n + further)
+        numbers[DEFECTS] += square(numbers, row, width, rows, constants, x, n, changes, further)
+        row += min(ints[COORDINATES], width) * width
+
+
+@compiled
+def square(
+    numbers: Numbers, factor: int, width: int, rows: int, constants: int, x: int, n: int, changes: int, further: int
+) -> float:
+    """|R z|^2 of the first rows of a triangular factor R (.., width), z = (1, x, changes, 0) or without the 1.
+
+    constants: 1 or 0. x: (n,). changes: (further,).
+    """
+    result = 0.0
+    for i in range(rows):
+        row = factor + i * width
+        total = numbers[row] if i < constants else 0.0
+        for j in range(max(i - constants, 0), n):
+            total += numbers[row + constants + j] * numbers[x + j]
+        for j in range(max(i - constants - n, 0), further):
+            total += numbers[row + constants + n + j] * numbers[changes + j]
+        result += total * total
+    return result
 
 
 @compiled
@@ -98,16 +121,12 @@ def left_by_impact(ints: Ints, numbers: Numbers, sizes: int) -> float:
 
 @compiled
 def add_start_defect(ints: Ints, numbers: Numbers) -> None:
-    """Adds |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan where rigid contacts are closed."""
+    """Adds |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan where a rigid link holds."""
     if ints[JUDGED] == 0:
         return
     level, base = ints[CURRENT + LEVEL], ints[GIVEN + LEVEL]
     way = find_map(ints, base, level)
-    known = way >= 0 and who_is_struck(ints, numbers, CURRENT) == NOBODY
-    for i in range(ints[ELEMENTS]):
-        if ints[ints[KINDS] + i] == RIGID and ints[ints[level + STATES] + i] != OPEN:
-            known = False
-    if not known:
+    if way < 0 or ints[way + MAP_DEFECT] < 0 or who_is_struck(ints, numbers, CURRENT) != NOBODY:
         numbers[DEFECTS] = math.nan
         return
     n, row = ints[level + MODES] + ints[CHANNELS], ints[way + MAP_DEFECT]

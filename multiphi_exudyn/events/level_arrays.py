@@ -10,7 +10,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.channel_arrays import ChannelArrays
-from multiphi_exudyn.events.defect_forms import defect_form
+from multiphi_exudyn.events.defect_forms import defect_form, start_form
 from multiphi_exudyn.events.element_arrays import describe_elements
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
@@ -292,12 +292,13 @@ class LevelArrays:
         at = put("numbers", matrix)
         rates = at if rate_matrix is matrix or np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
         known = -1 if terms is None else put("numbers", terms)
-        defect = put("numbers", self._defect(source, level)) if self.ints[a.JUDGED] else -1
+        defect = self._defect(source, level) if self.ints[a.JUDGED] else -1
         return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known, defect])
 
-    def _defect(self, source: int, level: LoadedLevel) -> np.ndarray:
-        """What a defect is read from on the way from a level, or from the base, into a level (defect_sums.py)."""
+    def _defect(self, source: int, level: LoadedLevel) -> int:
+        """Where stands what a defect is read from on the way from a level, or from the base, into a level, or -1."""
         if source == self.base:
-            return np.column_stack([level.level.vectors, level.asymptotic.configuration]).ravel()
-        form = defect_form(self.loaded[int(self.ints[source + a.NUMBER])], level, ())
-        return np.concatenate([form.displaced.ravel(), form.moving.ravel()])
+            form = start_form(level)
+            return -1 if form is None else self.buffers.put("numbers", form)
+        parts = defect_form(self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level), ())
+        return self.buffers.put("numbers", np.concatenate([parts.displaced, parts.moving], axis=None))

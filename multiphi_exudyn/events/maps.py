@@ -37,7 +37,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
-__all__ = ["find_level", "find_map", "level_hash", "map_hash", "move"]
+__all__ = ["find_level", "find_map", "level_hash", "map_hash", "move", "move_part"]
 
 HASH_MODULUS = 1_000_003  # of keys: products of it with small numbers stay far below 2^63
 

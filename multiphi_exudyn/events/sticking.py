@@ -40,6 +40,7 @@ from multiphi_exudyn.events.arrays import (
     SLIP_FORWARD,
     SMALL_PROBLEM,
     SPEED,
+    SPEEDS_CHANGED,
     STATES,
     STATIC_LIMITS,
     STICKS,
@@ -214,6 +215,7 @@ def stand_still(ints: Ints, numbers: Numbers, count: int) -> int:
     if solve(ints, numbers, problem, 0) != SOLVED:
         ints[CAUSE] = UNSETTLED
         return FAILED
+    ints[SPEEDS_CHANGED] = 1
     for i in range(r):
         before = abs(numbers[v + i])
         numbers[v + i] += numbers[ints[CHANGE] + i]

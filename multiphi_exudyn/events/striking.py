@@ -23,6 +23,7 @@ from multiphi_exudyn.events.arrays import (
     LOST_IN_IMPACT,
     LOST_NOW,
     LOST_STILLED,
+    MAPPED_AGAIN,
     MODES,
     NEED,
     OK,
@@ -34,6 +35,7 @@ from multiphi_exudyn.events.arrays import (
     SLIP_FORWARD,
     SPEED,
     SPEEDS,
+    SPEEDS_CHANGED,
     STATES,
     STICKS,
     STILL,
@@ -75,6 +77,7 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     status = transfer(ints, numbers, WORKED, ints[COMPLIANT_KEY], RELEASED)
     if status < 0:
         return status
+    ints[SPEEDS_CHANGED] = 1
     clear(numbers, LOST_IN_IMPACT)
     bouncing = rebound(ints, numbers, RELEASED, count)
     if bouncing < 0:
@@ -145,6 +148,7 @@ def slide_on(ints: Ints, numbers: Numbers) -> int:
     status = level if level < 0 else move(ints, numbers, AFTER, AFTER, level, ENTERED_STATE)
     if status < 0:
         return status
+    ints[MAPPED_AGAIN] = 1
     lose(ints, numbers, AFTER, ENTERED_STATE, 0.0, LOST_NOW)
     copy_state(ints, numbers, ENTERED_STATE, AFTER)
     return OK

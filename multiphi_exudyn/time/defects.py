@@ -9,8 +9,8 @@ an impact has stopped. The difference to the state after it is the defect
 
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
-level d and w / Omega are linear in the states before and after; of these maps the triangular factors are kept, a few
-numbers per pair of levels.
+level d and w / Omega are linear in the state before and in what was changed beside the map of the levels
+(events/defect_forms.py); of these maps the triangular factors are kept, a few numbers per pair of levels.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigidly, over_omega
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
+from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.time.segment import Segments, listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -75,8 +76,8 @@ class DefectHistory:
         squares[0] = _at_start(trajectory, segments.levels[segments.numbers[0]], stopped.get(0, ()), first[:, 0])
         for (before, after_it, struck), places in ways.items():
             rows = np.searchsorted(entered, places)
-            way = defect_form(segments.levels[before], segments.levels[after_it], struck)
-            squares[rows] = way.squares(last[:, rows - 1], first[:, rows])
+            form = defect_form(Transition(segments.levels[before], segments.levels[after_it]), struck)
+            squares[rows] = form.squares(last[:, rows - 1], first[:, rows])
         return cls(segments, entered, squares)
 
     def indicator(self, end: float) -> float:
