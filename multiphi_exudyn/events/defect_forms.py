@@ -75,11 +75,11 @@ def _motion(way: Transition, matrix: np.ndarray) -> np.ndarray:
     before, after = way.source, way.target
     source, target = before.level.vectors, after.level.vectors
     n = source.shape[1]
-    motion = np.empty((len(source), 1 + n + target.shape[1]), order="F")
-    motion[:, 0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ way.offset
-    np.subtract(source, target @ matrix, out=motion[:, 1 : n + 1])
-    motion[:, n + 1 :] = target
-    return motion
+    columns = np.empty((1 + n + target.shape[1], len(source)))  # one after the other, as a factor is formed of them
+    columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ way.offset
+    np.subtract(source.T, matrix.T @ target.T, out=columns[1 : n + 1])
+    columns[n + 1 :] = target.T
+    return columns.T
 
 
 def start_form(level: LoadedLevel) -> np.ndarray | None:

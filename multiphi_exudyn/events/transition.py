@@ -139,7 +139,7 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     of a soft one may be small and count. The modes' own round-off, larger where there are many, is not seen here.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
-    stiff, soft = np.broadcast_arrays(target.omega[:, None], source.omega)
+    stiff, soft = target.omega[:, None], source.omega
     shares = np.divide(soft, stiff, out=np.ones(products.shape), where=stiff > soft)
     np.putmask(products, np.abs(products) <= np.maximum(PRODUCT, UNMIXED * shares), 0.0)
     return products
