@@ -36,12 +36,14 @@ def check_mass(mass: Any) -> None:
         raise MultiPhiValueError("mass: indefinite, need a positive definite matrix")
 
 
-def lanczos(mass: Any, stiffness: Any, count: int, shift: float, answer: Any) -> tuple[np.ndarray, np.ndarray]:
+def lanczos(
+    mass: Any, stiffness: Any, count: int, shift: float, answer: Any, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
 
-    answer: to a force, A^-1, or what other modes leave of it.
+    answer: to a force, A^-1, or what other modes leave of it. start: (n,), of the iteration.
     """
-    values, vectors = iterated(mass, stiffness, count + 1, shift, answer)
+    values, vectors = iterated(mass, stiffness, count + 1, shift, answer, start)
     apart = np.flatnonzero(np.diff(values) > NEAR * np.abs(values[1:]))
     whole = count >= stiffness.shape[0] - 2  # there is no more to part them from
     kept = count if whole and not apart.size else (apart[-1] + 1 if apart.size else 0)
@@ -54,15 +56,16 @@ def iterated(
     count: int,
     shift: float,
     answer: Any,
+    start: np.ndarray,
     tolerance: float = 0.0,
     vectors: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``count`` lowest omega^2 that a Lanczos iteration sees, ascending, and their shapes.
 
+    Of modes of one frequency it sees the part of ``start`` (n,) among them; any further one comes of round-off alone.
     tolerance: of omega^2, zero for round-off. vectors: at a time, None for twice as many as are looked for.
     """
     n = stiffness.shape[0]
-    start = np.random.default_rng(0).uniform(-1, 1, n)  # a start with a symmetry would not see all modes
     operator = scipy.sparse.linalg.LinearOperator((n, n), answer, dtype=float)
     try:
         values, shapes = scipy.sparse.linalg.eigsh(

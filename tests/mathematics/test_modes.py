@@ -3,6 +3,7 @@
 Chains and beams whose frequencies are known in closed form are the reference.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, planar_beam
+from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, mathematics, planar_beam
 from multiphi_exudyn.mathematics.lowest_modes import _Lowest, lowest_modes
 from multiphi_exudyn.mathematics.modes import complete_modes, right_singular_vectors
 
@@ -41,6 +42,12 @@ def free_beam(elements, *, scale=1.0):
         youngs_modulus=2.1e11 / scale, density=7800 / scale**3,
     )  # fmt: skip
     return planar_beam(Beam([section], {"tip": scale}, clamp=Clamp(0.0, 0.0)), elements=elements)
+
+
+def seen_of(cluster, omega, given):
+    """What an iteration without round-off sees of modes (n, k) of one frequency: omega^2 (1,) and the shape (n, 1)."""
+    shape = cluster @ (cluster.T @ given[-1])
+    return np.array([omega**2]), (shape / np.linalg.norm(shape))[:, None]
 
 
 FREE_FREE = np.array([4.730040744862704, 7.853204624095838, 10.99560783800167])  # beta L, Euler-Bernoulli
@@ -169,6 +176,27 @@ class TestLowestModes:
         mass, stiffness = (scipy.sparse.block_diag([m] * 3, format="csr") for m in chain(250, ends=2))
         found = lowest_modes(mass, stiffness, 9, np.zeros((0, 750))).modes
         assert_allclose(found.omega, np.repeat(chain_frequencies(250, ends=2)[:3], 3), rtol=1e-11)
+
+    @pytest.mark.parametrize("copies", range(2, 25))
+    def test_no_copy_of_a_mode_is_missed(self, copies):
+        """Equal chains side by side, looked for in numbers below and above that of the copies."""
+        for n, count in itertools.product((30, 47), (3, 10)):
+            mass, stiffness = (scipy.sparse.block_diag([m] * copies, format="csr") for m in chain(n, ends=2))
+            found = lowest_modes(mass, stiffness, count, np.zeros((0, n * copies)))
+            assert found.exact % copies == 0
+            expected = np.repeat(chain_frequencies(n, ends=2), copies)[: found.exact]
+            assert_allclose(found.modes.omega, expected, rtol=1e-9)
+
+    @pytest.mark.parametrize("copies", [2, 7, 12])
+    def test_all_are_found_where_an_iteration_sees_one_of_a_frequency_alone(self, monkeypatch, copies):
+        """As without round-off: of modes of one frequency an iteration sees the part of its start among them."""
+        mass, stiffness = (scipy.sparse.block_diag([m] * copies, format="csr") for m in chain(60, ends=2))
+        exact = lowest_modes(mass, stiffness, 3 * copies, np.zeros((0, 60 * copies))).modes
+        first = exact.shapes[:, :copies]
+        monkeypatch.setattr(mathematics.lowest_modes, "lanczos", lambda *given: seen_of(first, exact.omega[0], given))
+        found = lowest_modes(mass, stiffness, 1, np.zeros((0, 60 * copies)))
+        assert found.exact == copies
+        assert_allclose(found.modes.omega, exact.omega[0], rtol=1e-11)
 
     def test_without_rigid_body_modes_cost_one_factorisation(self, monkeypatch):
         calls, splu = [], scipy.sparse.linalg.splu
