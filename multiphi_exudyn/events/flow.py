@@ -29,6 +29,7 @@ from multiphi_exudyn.events.arrays import (
     FREE_SIZES,
     HORIZON,
     LEVEL,
+    MAPPED,
     MODES,
     MOTION,
     PIECE_NOW,
@@ -58,6 +59,7 @@ from multiphi_exudyn.mathematics.basis_arrays import (
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response_arrays import (
     FREE,
+    FROM_DISPLACEMENT,
     REACHED,
     SHAPES,
     coefficients_of,
@@ -187,11 +189,22 @@ def add_forced(
 
 @compiled
 def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
-    """Of which terms (p,) the coefficients of the flow from a state are the sums."""
+    """Of which terms (p,) the coefficients of the flow from a state are the sums.
+
+    The transition that has made the state counts: a stiff mode that hardly moves has the round-off of those it is
+    made of, and accelerates with it.
+    """
     for j in range(ints[FLOW_COUNT]):
         numbers[ints[FLOW_TERMS] + j] = abs(waves[ints[FLOW_WAVES] + j])
     if ints[PRESCRIBED] > 0:
         size_driven_terms(ints, numbers, state)
+    response, r = ints[ints[state + LEVEL] + RESPONSE], ints[ints[state + LEVEL] + MODES]
+    for j in range(ints[FLOW_FREE]):
+        reached, size = ints[response + REACHED] + 2 * j, 0.0
+        for i in range(ints[reached], ints[reached + 1]):
+            displaced = waves[ints[response + FROM_DISPLACEMENT] + j * r + i]
+            size += abs(displaced) * numbers[ints[state + MAPPED] + i]
+        numbers[ints[FLOW_TERMS] + j] += size * unit_of_flow(ints, numbers, ints[response + FREE], j)
 
 
 @compiled

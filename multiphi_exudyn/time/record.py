@@ -216,7 +216,7 @@ class Record:
     def _followed(self, places: np.ndarray) -> float:
         """What springs have taken up [J] in segments (k,) in which their stretch goes with the force of a link."""
         given, total = [level.potential_form.follows for level in self.levels], 0.0
-        for number in (k for k, rows in enumerate(given) if len(rows)):
+        for number in (k for k in np.unique(self.rows[places, 0]) if len(given[k])):
             own, n = places[self.rows[places, 0] == number], given[number].shape[1] - 1
             for sign, after in ((-1, np.zeros(len(own))), (1, self.instants[own + 1] - self.instants[own])):
                 x = self.states(own, after)[0][:, :n]

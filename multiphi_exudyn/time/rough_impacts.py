@@ -74,7 +74,8 @@ def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
     x, v = segments.states(places, times - segments.starts[places])
     numbers, largest = segments.numbers[places], np.zeros(len(rigid))
     gaps, speeds = np.zeros((len(times), len(rigid))), np.zeros((len(times), len(model.links)))
-    for number, level in enumerate(segments.levels):
+    for number in np.unique(numbers):  # the states have room for those levels alone
+        level = segments.levels[number]
         own, n, constants = numbers == number, level.width, level.gap_constants[: len(rigid)]
         rows = level.level.gap_rows[: len(rigid)]
         gaps[own], speeds[own] = x[own, :n] @ rows.T + constants, v[own, :n] @ level.level.speed_rows.T

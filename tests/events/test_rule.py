@@ -261,3 +261,20 @@ class TestRedundantContacts:
         assert_allclose(run.displacement(t)[0], 0, atol=1e-13)
         assert_allclose(run.displacement(t)[1], np.sin(t), atol=1e-12)
         assert {event.contact for event in run.events} == {"below", "above"}
+
+
+@pytest.mark.parametrize(("n", "seed"), [(3, 3), (3, 6), (3, 7), (4, 9), (7, 5), (7, 9), (7, 11)])
+def test_between_a_rigid_and_a_compliant_stop_without_play_a_body_goes_from_one_to_the_other(n, seed):
+    """The rigid one lets go where its force, and with it the acceleration, is zero: the next derivative decides.
+
+    In the level of the other one a stiff mode has the round-off of the modes that it is made of, and accelerates.
+    """
+    stops = [UnilateralContact("above", "m0", 0.0), UnilateralContact("below", {"m0": -1.0}, 0.0, stiffness=1e3)]
+    model = MultiPhiModel(chain(n), stops, modes="all")
+    run = simulate(model, 20.0, velocity=np.random.default_rng(seed).normal(size=n))
+    assert run.status == "ok", run.message
+    t = np.linspace(0, 20, 401)
+    assert len(run.contact_intervals("above")) > 2
+    assert np.min(run.gap("above", t)) > -1e-12
+    assert np.min(run.contact_force("below", t)) > -1e-10
+    assert abs(run.ledger.residual) < 1e-11 * run.ledger.initial

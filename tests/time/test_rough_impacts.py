@@ -58,3 +58,15 @@ class TestSeveralAnswers:
     )
     def test_are_not_where_there_is_one(self, coupling, friction, given):
         assert not told(struck(coupling, friction, **given))
+
+    def test_levels_that_no_impact_begins_in_may_have_more_coordinates(self):
+        """On the floor the body strikes the wall; then it is lifted, and moves as it has not before any impact."""
+        structure = mp.LinearStructure(np.eye(3), np.zeros((3, 3)), points={"x": 0, "y": 1, "z": 2})
+        floor = mp.UnilateralContact("floor", "y", 0.0, friction=0.2, tangential="x")
+        model = mp.MultiPhiModel(structure, [floor, mp.UnilateralContact("wall", "z", 0.1)], modes="all")
+        lift = mp.SampledLoad("y", [0.0, 0.5, 0.6, 1.0], [-1.0, -1.0, 1.0, 1.0])
+        run = mp.simulate(model, 1.0, velocity=[0.0, 0.0, -1.0], loads=[lift])
+        kinds = [(event.contact, event.kind) for event in run.events]
+        assert kinds == [("floor", "close"), ("wall", "close"), ("wall", "open"), ("floor", "open")]
+        assert run.status == "ok"
+        assert not told(run)
