@@ -70,7 +70,7 @@ def second_order(
     slope, value = 2 * (delta + mu), square + 2 * delta * mu + mu * mu
     size = math.hypot(value.real, value.imag)
     distance = math.sqrt(size)
-    if distance * horizon >= NEAREST_FAR + PER_DEGREE * (degree + 1):
+    if is_far(distance, degree + 1, horizon) == 1:
         inverse, first, second = complex(value.real / size / size, -value.imag / size / size), 0j, 0j
         for k in range(degree, -1, -1):
             above = (k + 1) / horizon * first
