@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 
 __all__ = [
     "Finite",
@@ -21,9 +23,12 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
+    "inside",
     "numbered",
     "place_in_words",
 ]
+
+T = TypeVar("T")
 
 
 def _not_zero(value: float) -> float:
@@ -72,6 +77,15 @@ def numbered(name: str, i: int) -> str:
 def place_in_words(at: str | Mapping[str, float]) -> str:
     """A place as part of a sentence."""
     return at if isinstance(at, str) else " and ".join(f"{factor:+g} {name}" for name, factor in at.items())
+
+
+def inside(place: str, build: Callable[[], T]) -> T:
+    """What ``build`` gives; its error names the place, and the field inside it where it begins with a dot."""
+    try:
+        return build()
+    except MultiPhiError as error:
+        text = " ".join(str(error).split())
+        raise MultiPhiValueError(f"{place}{'' if text.startswith('.') else ': '}{text}") from error
 
 
 class Table(BaseModel):

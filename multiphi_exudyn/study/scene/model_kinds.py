@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from multiphi_exudyn.study.scene.demands import (
-    Demands,
-    Fault,
+from multiphi_exudyn.study.scene.fields import Modes, Name, Positive, RelativeTolerance, Table
+from multiphi_exudyn.study.scene.lacks import (
     Lack,
     beams_only,
-    between_two,
     factors,
     no_damping,
     no_friction,
@@ -29,22 +27,15 @@ from multiphi_exudyn.study.scene.demands import (
     not_round,
     single_points,
 )
-from multiphi_exudyn.study.scene.fields import Modes, Name, Positive, RelativeTolerance, Table
+from multiphi_exudyn.study.scene.parts import Mechanics
 
 if TYPE_CHECKING:
     from typing import Self
 
-__all__ = [
-    "CraigBamptonModel",
-    "FullModel",
-    "GlobalBasisModel",
-    "ModelSpec",
-    "ReducedModel",
-    "SplittingModel",
-    "StepwiseModel",
-    "TrainedBasisModel",
-    "UserObjectModel",
-]
+__all__ = ["FullModel", "ModelSpec", "ReducedModel", "UserObjectModel"]
+
+# Field, of the model's own entry where it begins with a dot; what was given; what is needed.
+Fault = tuple[str, object, str]
 
 
 class _Model(Table):
@@ -66,20 +57,21 @@ class _Model(Table):
         modes = default if (given := getattr(self, "modes", None)) is None else given
         return self.model_copy(update={"modes": modes, "name": self.name.replace("{modes}", str(modes))})
 
-    def faults(self, demands: Demands) -> Iterator[Fault]:
+    def faults(self, scene: Mechanics) -> Iterator[Fault]:
         """What it cannot take of a scene."""
         for lack in self.lacks:
-            yield from (Fault("kind", self.kind, f"another kind: {why}") for why in lack(demands))
-        if self.penalty:
-            for contact in demands.contacts:
-                if contact.rigid:
-                    needed = f"a finite one: contacts of the model {self.name} are penalty springs"
-                    yield Fault(f"stiffness of contact {contact.name}", "inf", needed, whole=True)
-        yield from self.own_faults(demands)
+            yield from (self._another(why) for why in lack(scene))
+        rigid = [contact.name for contact in scene.contacts if contact.rigid and self.penalty]
+        needed = f"a finite one: contacts of the model {self.name} are penalty springs"
+        yield from ((f"stiffness of contact {name}", "inf", needed) for name in rigid)
+        yield from self.own_faults(scene)
 
-    def own_faults(self, demands: Demands) -> Iterator[Fault]:
+    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
         """What else; nothing but for some kinds."""
         yield from ()
+
+    def _another(self, why: str) -> Fault:
+        return ".kind", self.kind, f"another kind: {why}"
 
 
 class _Levels(_Model):
@@ -87,10 +79,10 @@ class _Levels(_Model):
 
     contact: Literal["as-given", "rigid"] = "as-given"
 
-    def own_faults(self, demands: Demands) -> Iterator[Fault]:
+    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
         """Printed frequencies are those of a rigid support."""
-        if demands.printed and not self.rigid:
-            yield Fault("contact", self.contact, "'rigid': the printed frequencies are of a rigid support")
+        if scene.printed and not self.rigid:
+            yield ".contact", self.contact, "'rigid': the printed frequencies are of a rigid support"
 
 
 class ReducedModel(_Levels):
@@ -137,33 +129,32 @@ class FullModel(_Model):
         """It has no modes."""
         return self
 
-    def own_faults(self, demands: Demands) -> Iterator[Fault]:
+    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
         """Elements act on a point or between two; friction has a spring; a round support is at rest and undamped."""
-        for contact in demands.contacts:
+        spring = f"a finite one: friction of the model {self.name} has a spring in series"
+        for contact in scene.contacts:
             if contact.friction and math.isinf(contact.tangential_stiffness):
-                yield self._springless(f"tangential_stiffness of contact {contact.name}")
-            given = factors(contact.direction)
-            if len(given) > 1 and (not between_two(given) or not given[0]):
-                yield self._another("contacts act on a point, or between two", contact.name, contact.direction)
-        for i, friction in enumerate(demands.frictions):
+                yield f"tangential_stiffness of contact {contact.name}", "inf", spring
+            if not _one_or_two(contact.direction):
+                acts = f"{contact.name} acts on {contact.direction}"
+                yield self._another(f"its contacts act on a point, or between two, and {acts}")
+        for i, friction in enumerate(scene.frictions):
             if friction.rigid:
-                yield self._springless(f"friction[{i}].stiffness")
-            given = factors(friction.direction)
-            if len(given) > 1 and not between_two(given):
-                yield self._another("friction acts on a point, or between two", friction.name, len(given))
-        for law in demands.laws:
-            if len(factors(law.at)) > 1:
-                yield self._another("force laws act on single points", law.name, len(factors(law.at)))
+                yield f"friction[{i}].stiffness", "inf", spring
+            if not _one_or_two(friction.direction):
+                acts = f"{friction.name} acts on {len(factors(friction.direction))}"
+                yield self._another(f"its friction acts on a point, or between two, and {acts}")
+        for law in scene.force_laws:
+            if (points := len(factors(law.at))) > 1:
+                yield self._another(f"its force laws act on single points, and {law.name} acts on {points}")
         if self.contact == "circle":
-            yield from (Fault("contact", "circle", f"'coordinate': {why}") for why in not_round(demands))
+            yield from ((".contact", "circle", f"'coordinate': {why}") for why in not_round(scene))
 
-    def _springless(self, field: str) -> Fault:
-        return Fault(
-            field, "inf", f"a finite one: friction of the model {self.name} has a spring in series", whole=True
-        )
 
-    def _another(self, does: str, name: str, given: object) -> Fault:
-        return Fault("kind", self.kind, f"another kind: its {does}, and {name} acts on {given}")
+def _one_or_two(at: object) -> bool:
+    """Whether something acts on a point, or on the difference of two."""
+    given = factors(at)
+    return len(given) == 1 or (len(given) == 2 and sum(given) == 0 and given[0] != 0)
 
 
 class CraigBamptonModel(_Model):
@@ -190,10 +181,10 @@ class StepwiseModel(_Model):
     lacks: ClassVar[tuple[Lack, ...]] = (no_loads, no_friction, no_damping, no_laws)
     penalty: ClassVar[bool] = True
 
-    def own_faults(self, demands: Demands) -> Iterator[Fault]:
+    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
         """Printed frequencies are those of a rigid support."""
-        if demands.printed:
-            yield Fault("kind", self.kind, "reduced: the printed frequencies are of a rigid support")
+        if scene.printed:
+            yield ".kind", self.kind, "reduced: the printed frequencies are of a rigid support"
 
 
 class GlobalBasisModel(_Model):

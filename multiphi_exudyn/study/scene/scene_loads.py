@@ -6,19 +6,18 @@ depends on its mesh and is given here by who has the mesh.
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sweep, TimeFunction
-from multiphi_exudyn.study.scene.fields import place_in_words
+from multiphi_exudyn.study.scene.fields import inside, place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
@@ -36,7 +35,6 @@ from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["described_loads", "loads_of"]
 
-
 Given = TypeVar("Given", bound=At)  # direction of a scene file
 
 
@@ -48,9 +46,9 @@ def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
     return tuple(_load(scene, f"loads[{i}]", spec, transverse) for i, spec in enumerate(scene.file.loads))
 
 
-def described_loads(scene: Scene) -> tuple[str, ...]:
+def described_loads(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
     """Every load in words, as parts of a sentence."""
-    return tuple(_described(spec) for spec in scene.file.loads)
+    return tuple(map(_described, loads))
 
 
 def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | None) -> Load:
@@ -88,12 +86,9 @@ def _smooth(spec: HarmonicCourse | SweepCourse) -> Harmonic | Sweep:
 
 
 def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
-    try:
-        if spec.csv is not None:
-            return Sampled.from_csv(Path(scene.path).parent / spec.csv, spec.column)
-        return Sampled(spec.time, spec.values)  # type: ignore[arg-type]
-    except MultiPhiError as error:
-        raise MultiPhiValueError(f"{scene.path}: {field}: {' '.join(str(error).split())}") from error
+    if spec.csv is None:
+        return inside(f"{scene.path}: {field}", lambda: Sampled(spec.time, spec.values))  # type: ignore[arg-type]
+    return inside(f"{scene.path}: {field}", lambda: Sampled.from_csv(scene.path.parent / str(spec.csv), spec.column))
 
 
 def _described(spec: LoadSpec) -> str:
