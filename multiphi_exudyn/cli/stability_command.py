@@ -11,9 +11,8 @@ from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case, warm_up
-from multiphi_exudyn.study.stability.stability_report import render_stability
+from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.summary import contents
-from multiphi_exudyn.study.stability.text_table import text_table
 
 __all__ = ["run_stability"]
 

@@ -81,7 +81,8 @@ class Runner(ABC):
         if not run.ok:
             return run
         histories, sampling = timed(lambda: self.histories(prepared, answer))
-        whole = replace(run, **{"time": self.bench.time, "sampling_s": sampling} | histories)
+        fields: dict[str, Any] = {"time": self.bench.time, "sampling_s": sampling}
+        whole = replace(run, **fields | histories)
         gained = _energy_gain(whole) if self.in_steps else ""
         return replace(run, status="failed", message=gained) if gained else whole
 

@@ -144,23 +144,16 @@ def _meshes() -> Iterator[Case]:
 
 
 CASES = (
-    Case(
-        "contact-at-clamp-side-node",
-        "The stop stands beside the clamp, where the beam hardly moves: forces are large, travel is microns.",
-        lambda quick: _strip(0.0625, 1e8, gap=1e-6),
-    ),
-    Case(
-        "contact-at-tip-mass",
-        "The stop is below a heavy tip mass: the impulse goes into one node.",
-        lambda quick: _strip(0.5, 1e6, 0.4, (PointMass(0.5, 1.0, 1e-4),)),
-    ),
-    Case(
-        "contact-at-node-of-a-mode",
-        "The stop stands where the second mode does not move: closed and open levels share that mode.",
-        lambda quick: _strip(0.5 * SECOND_NODE, 1e7),
-    ),
+    Case("contact-at-clamp-side-node",
+         "The stop stands beside the clamp, where the beam hardly moves: forces are large, travel is microns.",
+         lambda quick: _strip(0.0625, 1e8, gap=1e-6)),
+    Case("contact-at-tip-mass", "The stop is below a heavy tip mass: the impulse goes into one node.",
+         lambda quick: _strip(0.5, 1e6, 0.4, (PointMass(0.5, 1.0, 1e-4),))),
+    Case("contact-at-node-of-a-mode",
+         "The stop stands where the second mode does not move: closed and open levels share that mode.",
+         lambda quick: _strip(0.5 * SECOND_NODE, 1e7)),
     *_stiffnesses(),
     *_meshes(),
     *_mode_numbers(),
     *_amplitudes(),
-)
+)  # fmt: skip

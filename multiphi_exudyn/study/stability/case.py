@@ -90,12 +90,6 @@ class Problem:
         return self.structure.damping is not None or any(contact.damping > 0 for contact in self.parts)
 
     @property
-    def conservative(self) -> bool:
-        """Whether nothing but impacts may change the energy."""
-        rubs = self.frictions or any(contact.friction for contact in self.unilateral)
-        return not (self.damped or self.loads or rubs)
-
-    @property
     def driven(self) -> bool:
         """Whether a load varies in time."""
         return not all(isinstance(load, STATIC_LOADS) for load in self.loads)

@@ -1,4 +1,4 @@
-"""Runs the catalogue: every case through every model, in turn."""
+"""The shipped catalogue, and its run: every case through every model, in turn."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
+from multiphi_exudyn.study.stability import beams, driven, friction, laws, starts, systems
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.exudyn_runs import (
     FULL_MODEL,
     USER_OBJECT,
@@ -20,8 +20,9 @@ from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warning_groups import kept_back
 
-__all__ = ["FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
+__all__ = ["CATALOGUE", "FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
 
+CATALOGUE = (*starts.CASES, *beams.CASES, *systems.CASES, *laws.CASES, *driven.CASES, *friction.CASES)
 IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 
 

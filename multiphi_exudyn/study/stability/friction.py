@@ -14,7 +14,7 @@ from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.structures import chain, oscillator, stop
+from multiphi_exudyn.study.stability.structures import chain, oscillator, stop, two_masses
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_damping
 
@@ -58,10 +58,6 @@ def _never_slips(problem: Problem, trajectory: Trajectory) -> str:
 
 def _never_sticks(problem: Problem, trajectory: Trajectory) -> str:
     return "sticks to a belt that is faster than it" if len(trajectory.stick_intervals(RING)) else ""
-
-
-def _two_masses(*contacts: Friction | UnilateralContact) -> Problem:
-    return Problem(chain([1.0, 1.0], [1e4, 1e4]), contacts, 0.5, displacement=np.array([2.5e-3, 5e-3]))
 
 
 def _many(count: int, stiffness: float) -> Problem:
@@ -189,9 +185,9 @@ CASES = (
     Case("friction-light-and-heavy", "A gram and a thousand tons, each rubs.",
          lambda quick: _uneven()),
     Case("friction-beside-rigid-stop", "A ring and a rigid stop on neighbours: impacts while it slips and sticks.",
-         lambda quick: _two_masses(_ring(5.0, 1e5), stop("m1", 1e-3))),
+         lambda quick: two_masses(_ring(5.0, 1e5), stop("m1", 1e-3), start=5e-3)),
     Case("friction-beside-compliant-stop", "A block without a spring beside a soft stop.",
-         lambda quick: _two_masses(_ring(5.0), stop("m1", 1e-3, 1e5)), quick=False),
+         lambda quick: two_masses(_ring(5.0), stop("m1", 1e-3, 1e5), start=5e-3), quick=False),
     Case("friction-between-bodies", "Two bodies rub on each other alone.",
          lambda quick: _between()),
     Case("friction-rigid-floor", "A block strikes a rigid floor aslant, on the edge of the cone, and slides.",

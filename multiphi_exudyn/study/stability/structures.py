@@ -14,12 +14,15 @@ from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact
 
-__all__ = ["STOP", "chain", "oscillator", "pulled", "rig_problem", "stop"]
+__all__ = ["STOP", "chain", "oscillator", "pulled", "rig_problem", "stop", "two_masses"]
 
 STOP = "stop"
 ELEMENTS = 8  # of the full beam beside a case: few, as its own error is shown
@@ -48,6 +51,17 @@ def chain(
     held = np.array([*springs, 0.0][: len(masses) + 1], dtype=float)
     stiffness = np.diag(held[:-1] + held[1:]) - np.diag(held[1:-1], 1) - np.diag(held[1:-1], -1)
     return LinearStructure(np.diag(masses), stiffness, damping, {f"m{i}": i for i in range(len(masses))})
+
+
+def two_masses(
+    *contacts: UnilateralContact | ForceLaw | Friction,
+    start: float | None = None,
+    t_end: float = 0.5,
+    loads: Sequence[Load] = (),
+) -> Problem:
+    """1 kg and 1 kg in a row, 1e4 N/m before each, let go with the last displaced so far [m], the first by half."""
+    displacement = None if start is None else np.array([start / 2, start])
+    return Problem(chain([1.0, 1.0], [1e4, 1e4]), contacts, t_end, displacement=displacement, loads=loads)
 
 
 def pulled(
