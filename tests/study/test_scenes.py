@@ -177,6 +177,9 @@ BROKEN = {
     "unknown output": (["outputs", "points"], ["tap"], "outputs.points[0]: got 'tap', need one of the points"),
     "unknown direction": (["contacts", 0, "direction"], "tap", "contacts[0].direction: got 'tap', need one of"),
     "unknown coefficient": (["contacts", 0, "direction"], {"tap": 1.0}, "contacts[0].direction: got 'tap', need"),
+    "unknown beside a known one": (
+        ["contacts", 0, "direction"], {"tap": 1.0, "tip": -1.0}, "contacts[0].direction: got 'tap', need one of"
+    ),
     "unknown reference": (["comparison", "reference"], "full", "comparison.reference: got 'full', need one of"),
     "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need another name"),
     "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),

@@ -8,11 +8,12 @@ from __future__ import annotations
 import inspect
 import json
 import re
-import typing
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
+
+from multiphi_exudyn.study.scene.toml_file import kind_of, tables_in
 
 __all__ = ["file_reference"]
 
@@ -34,24 +35,15 @@ def _tables(whole: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
         path, table = waiting.pop(0)
         yield path, table
         for name, field in table.model_fields.items():
-            for inside in _models(field.annotation):
+            for inside in tables_in(field.annotation):
                 if inside not in met:
                     met.add(inside)
                     waiting.append((f"{path}.{name}".lstrip("."), inside))
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Classes of tables in an annotation."""
-    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inside in typing.get_args(annotation):
-        yield from _models(inside)
-
-
 def _section(path: str, table: type[BaseModel]) -> str:
     """Heading, what the table is, and its fields."""
-    kinds = typing.get_args(table.model_fields["kind"].annotation) if "kind" in table.model_fields else ()
-    kind = f", kind = {json.dumps(kinds[0])}" if kinds else ""
+    kind = f", kind = {json.dumps(kind_of(table))}" if kind_of(table) else ""
     heading = f"## `{path}`{kind}" if path else "## The file"
     fields = table.model_json_schema()["properties"]
     rows = [

@@ -7,26 +7,13 @@ its runner (multiphi_exudyn.study.running). A new kind is a class here, its plac
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from multiphi_exudyn.study.scene.fields import Modes, Name, Positive, RelativeTolerance, Table
-from multiphi_exudyn.study.scene.lacks import (
-    Lack,
-    beams_only,
-    factors,
-    no_damping,
-    no_friction,
-    no_laws,
-    no_loads,
-    no_sparse,
-    no_weight,
-    not_round,
-    single_points,
-)
 from multiphi_exudyn.study.scene.parts import Mechanics
 
 if TYPE_CHECKING:
@@ -36,6 +23,47 @@ __all__ = ["FullModel", "ModelSpec", "ReducedModel", "UserObjectModel"]
 
 # Field, of the model's own entry where it begins with a dot; what was given; what is needed.
 Fault = tuple[str, object, str]
+
+Lack = Literal["loads", "weight", "sparse", "matrices", "friction", "damping", "laws", "differences"]
+
+
+def _reasons(lack: Lack, scene: Mechanics) -> list[str]:
+    """Why a scene needs another kind of model than one that lacks something; empty where it does not."""
+    rubbing = [f"the contact {contact.name} has it" for contact in scene.contacts if contact.friction]
+    rubbing += [f"the scene has {friction.name}" for friction in scene.frictions]
+    damped = [contact.name for contact in scene.contacts if contact.damping]
+    points = {contact.name: len(_factors(contact.direction)) for contact in scene.contacts}
+    reasons: dict[Lack, list[str]] = {
+        "loads": ["this kind takes no loads"] if scene.loads else [],
+        "weight": ["this kind takes neither gravity nor base-motion"] if scene.carried else [],
+        "sparse": ["this kind takes dense matrices only"] if scene.sparse else [],
+        "matrices": [] if scene.beams else ["this kind is made of beams, and the structure is given as matrices"],
+        "friction": [f"this kind takes no friction, and {what}" for what in rubbing],
+        "damping": [f"this kind takes no damped contacts, and {name} is damped" for name in damped],
+        "laws": [f"this kind takes no force laws, and the scene has {law.name}" for law in scene.force_laws],
+        "differences": [
+            f"its contacts act on single points, and {name} acts on {count}"
+            for name, count in points.items()
+            if count > 1
+        ],
+    }
+    return reasons[lack]
+
+
+def _not_round(scene: Mechanics) -> Iterator[str]:
+    """Why a round support will not do."""
+    if scene.moving_stops:
+        yield "a round support does not move"
+    for contact in scene.contacts:
+        if contact.damping:
+            yield "a round support has no damping"
+        if len(_factors(contact.direction)) > 1:
+            yield f"a round support does not move, and {contact.name} is between two points"
+
+
+def _factors(at: object) -> list[float]:
+    """Coefficients of the points something acts on."""
+    return list(at.values()) if isinstance(at, Mapping) else [1.0]
 
 
 class _Model(Table):
@@ -60,7 +88,7 @@ class _Model(Table):
     def faults(self, scene: Mechanics) -> Iterator[Fault]:
         """What it cannot take of a scene."""
         for lack in self.lacks:
-            yield from (self._another(why) for why in lack(scene))
+            yield from (self._another(why) for why in _reasons(lack, scene))
         rigid = [contact.name for contact in scene.contacts if contact.rigid and self.penalty]
         needed = f"a finite one: contacts of the model {self.name} are penalty springs"
         yield from ((f"stiffness of contact {name}", "inf", needed) for name in rigid)
@@ -122,7 +150,7 @@ class FullModel(_Model):
     newton_tolerance: Positive = 1e-5  # relative and absolute
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
-    lacks: ClassVar[tuple[Lack, ...]] = (beams_only,)
+    lacks: ClassVar[tuple[Lack, ...]] = ("matrices",)
     penalty: ClassVar[bool] = True
 
     def filled(self, default: int) -> FullModel:
@@ -142,18 +170,18 @@ class FullModel(_Model):
             if friction.rigid:
                 yield f"friction[{i}].stiffness", "inf", spring
             if not _one_or_two(friction.direction):
-                acts = f"{friction.name} acts on {len(factors(friction.direction))}"
+                acts = f"{friction.name} acts on {len(_factors(friction.direction))}"
                 yield self._another(f"its friction acts on a point, or between two, and {acts}")
         for law in scene.force_laws:
-            if (points := len(factors(law.at))) > 1:
+            if (points := len(_factors(law.at))) > 1:
                 yield self._another(f"its force laws act on single points, and {law.name} acts on {points}")
         if self.contact == "circle":
-            yield from ((".contact", "circle", f"'coordinate': {why}") for why in not_round(scene))
+            yield from ((".contact", "circle", f"'coordinate': {why}") for why in _not_round(scene))
 
 
 def _one_or_two(at: object) -> bool:
     """Whether something acts on a point, or on the difference of two."""
-    given = factors(at)
+    given = _factors(at)
     return len(given) == 1 or (len(given) == 2 and sum(given) == 0 and given[0] != 0)
 
 
@@ -166,7 +194,7 @@ class CraigBamptonModel(_Model):
     newton_tolerance: Positive = 1e-6  # relative and absolute
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0  # of generalised-alpha; 1: the trapezoidal rule
 
-    lacks: ClassVar[tuple[Lack, ...]] = (no_sparse, no_loads, no_friction, no_damping, no_laws, single_points)
+    lacks: ClassVar[tuple[Lack, ...]] = ("sparse", "loads", "friction", "damping", "laws", "differences")
     penalty: ClassVar[bool] = True
 
 
@@ -178,7 +206,7 @@ class StepwiseModel(_Model):
     method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]  # of solve_ivp
     rtol: RelativeTolerance  # its relative tolerance
 
-    lacks: ClassVar[tuple[Lack, ...]] = (no_loads, no_friction, no_damping, no_laws)
+    lacks: ClassVar[tuple[Lack, ...]] = ("loads", "friction", "damping", "laws")
     penalty: ClassVar[bool] = True
 
     def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
@@ -194,7 +222,7 @@ class GlobalBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
     contact: Literal["as-given", "rigid"] = "as-given"
 
-    lacks: ClassVar[tuple[Lack, ...]] = (no_weight, no_friction)
+    lacks: ClassVar[tuple[Lack, ...]] = ("weight", "friction")
 
 
 class TrainedBasisModel(_Model):
@@ -204,7 +232,7 @@ class TrainedBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None
     training: Positive = 0.1  # s, of the scene's own motion from its start
 
-    lacks: ClassVar[tuple[Lack, ...]] = (no_weight, no_friction, no_laws)
+    lacks: ClassVar[tuple[Lack, ...]] = ("weight", "friction", "laws")
 
 
 class SplittingModel(_Model):
@@ -214,7 +242,7 @@ class SplittingModel(_Model):
     modes: Annotated[int, Field(ge=0)]  # with the interface held
     step: Positive  # s
 
-    lacks: ClassVar[tuple[Lack, ...]] = (no_sparse, no_loads, no_friction, no_damping, no_laws)
+    lacks: ClassVar[tuple[Lack, ...]] = ("sparse", "loads", "friction", "damping", "laws")
     penalty: ClassVar[bool] = True
 
 

@@ -26,12 +26,11 @@ STATIC_LOADS = (ConstantLoad, Gravity)
 class Pull:
     """A beam pulled and let go: what the full nonlinear beam needs beside the contacts and the end of the run.
 
-    elements, step [s]: of the full beam. displacement [m] of ``measured_at`` under a static force at ``load_at``.
+    elements, step [s]: of the full beam. displacement [m] of the point ``tip`` under a static force there.
     """
 
     beam: Beam
-    load_at: str
-    measured_at: str
+    tip: str
     displacement: float
     elements: int
     step: float

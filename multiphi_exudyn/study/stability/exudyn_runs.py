@@ -132,8 +132,8 @@ def _full_beam(
     beam = FullBeam(pull.beam, contacts, settings)
     found = beam.run(
         problem.t_end,
-        load_at=pull.load_at,
-        measured_at=pull.measured_at,
+        load_at=pull.tip,
+        measured_at=pull.tip,
         displacement=pull.displacement,
         damping=damping_matrix(replace(beam.structure, damping=problem.structure.damping)),
         progress=False,

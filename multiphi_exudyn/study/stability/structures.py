@@ -17,12 +17,13 @@ from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact
 
-__all__ = ["STOP", "chain", "oscillator", "pulled", "rig_problem", "stop", "two_masses"]
+__all__ = ["STOP", "chain", "differs", "oscillator", "pulled", "rig_problem", "stop", "two_masses"]
 
 STOP = "stop"
 ELEMENTS = 8  # of the full beam beside a case: few, as its own error is shown
@@ -87,7 +88,7 @@ def pulled(
         t_end,
         modes,
         displacement=_deflected(given, tip, displacement),
-        pull=Pull(beam, tip, tip, displacement, ELEMENTS, step),
+        pull=Pull(beam, tip, displacement, ELEMENTS, step),
         penalty=penalty,
     )
 
@@ -104,3 +105,19 @@ def rig_problem(stiffness: float, t_end: float, displacement: float = 0.02, **op
     if "gap" in options:
         contact = replace(contact, gap=options.pop("gap"))
     return pulled(rig_beam(), [contact], t_end, tip="node3", displacement=displacement, **options)
+
+
+def differs(trajectory: Trajectory, other: Trajectory, point: At | None, factor: float, share: float) -> str:
+    """What is wrong with a run that should be another one, lengths times ``factor``, to a ``share`` of its largest.
+
+    point: whose displacement is compared, None for all of them.
+    """
+    times = np.linspace(0.0, other.t_end, 5001)
+    ours, theirs = (run.displacement(times) if point is None else run.at(point, times) for run in (trajectory, other))
+    away = float(np.max(np.abs(ours / factor - theirs)) / np.max(np.abs(theirs)))
+    late = max((abs(a.time - b.time) for a, b in zip(trajectory.events, other.events, strict=False)), default=0.0)
+    kinds = ([(event.contact, event.kind) for event in run.events] for run in (trajectory, other))
+    if len(set(map(tuple, kinds))) == 1 and max(away, late / other.t_end) <= share:
+        return ""
+    counts = f"{len(trajectory.events)} events and {len(other.events)}"
+    return f"{counts}, {late:.1e} s and {away:.1e} of the displacement apart"

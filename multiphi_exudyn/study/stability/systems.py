@@ -13,7 +13,7 @@ from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
-from multiphi_exudyn.study.stability.structures import chain, oscillator, rig_problem, stop
+from multiphi_exudyn.study.stability.structures import chain, differs, oscillator, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.bars import clamped_bar, free_bar, nodes
@@ -130,14 +130,7 @@ def _same_in_metres(problem: Problem, trajectory: Trajectory) -> str:
     """The same case in SI units has the same events and displacements."""
     si = _in_units(1.0)
     other = simulate(si.model(), si.t_end, si.displacement, si.velocity, si.loads)
-    ours, theirs = ([(e.contact, e.kind) for e in run.events] for run in (trajectory, other))
-    times = np.linspace(0.0, si.t_end, 5001)
-    reference = other.displacement(times)
-    away = float(np.max(np.abs(trajectory.displacement(times) / problem.metre - reference)) / np.max(np.abs(reference)))
-    late = max((abs(a.time - b.time) for a, b in zip(trajectory.events, other.events, strict=False)), default=0.0)
-    if ours != theirs or max(away, late / si.t_end) > SAME:
-        return f"{len(ours)} events in mm, {len(theirs)} in m, {late:.1e} s and {away:.1e} of the displacement apart"
-    return ""
+    return differs(trajectory, other, None, problem.metre, SAME)
 
 
 def _settles(problem: Problem, trajectory: Trajectory) -> str:
