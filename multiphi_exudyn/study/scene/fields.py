@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    WithJsonSchema,
+)
 from pydantic_core import PydanticCustomError
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
@@ -27,6 +38,8 @@ __all__ = [
     "numbered",
     "place_in_words",
 ]
+
+REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
 
 T = TypeVar("T")
 
@@ -89,6 +102,15 @@ def inside(place: str, build: Callable[[], T]) -> T:
 
 
 class Table(BaseModel):
-    """A table of a scene file: every field typed, none unknown."""
+    """A table of a scene file: every field typed, none unknown; the remark behind a field describes it."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = handler.resolve_ref_schema(handler(core))
+        owners = [owner for owner in reversed(cls.__mro__) if issubclass(owner, Table)]
+        remarks = dict(remark for owner in owners for remark in REMARK.findall(inspect.getsource(owner)))
+        for name, field in schema["properties"].items():
+            field |= {"description": remarks[name]} if name in remarks else {}
+        return schema

@@ -1,13 +1,12 @@
 """The fields of a kind of file, table by table, as a page in Markdown, from the classes that check it.
 
-What a table is stands in its class's docstring, what a field is in the remark behind it.
+What a table is stands in its class's docstring, what a field is in the remark behind it (fields.py).
 """
 
 from __future__ import annotations
 
 import inspect
 import json
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -17,7 +16,6 @@ from multiphi_exudyn.study.scene.toml_file import kind_of, tables_in
 
 __all__ = ["file_reference"]
 
-REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
 LIMITS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 MANY = 5  # kinds of values from which a field is said to take any
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
@@ -47,20 +45,12 @@ def _section(path: str, table: type[BaseModel]) -> str:
     heading = f"## `{path}`{kind}" if path else "## The file"
     fields = table.model_json_schema()["properties"]
     rows = [
-        f"| `{name}` | {_type(field)} | {_default(table, name)} | {remark} |"
-        for (name, field), remark in zip(fields.items(), _remarks(table, fields), strict=True)
+        f"| `{name}` | {_type(field)} | {_default(table, name)} | {field.get('description', '')} |"
+        for name, field in fields.items()
         if name != "kind"
     ]
     text = inspect.getdoc(table) or ""
     return "\n".join([heading, "", text, "", "| field | value | default | |", "|---|---|---|---|", *rows, ""])
-
-
-def _remarks(table: type[BaseModel], names: Mapping[str, Any]) -> list[str]:
-    found: dict[str, str] = {}
-    for owner in reversed(table.__mro__):
-        if owner is not BaseModel and issubclass(owner, BaseModel):
-            found |= dict(REMARK.findall(inspect.getsource(owner)))
-    return [found.get(name, "") for name in names]
 
 
 def _default(table: type[BaseModel], name: str) -> str:

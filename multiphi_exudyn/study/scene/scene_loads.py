@@ -6,8 +6,8 @@ depends on its mesh and is given here by who has the mesh.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from multiphi_exudyn.study.scene.load_tables import (
     CourseSpec,
     GravitySpec,
     HarmonicCourse,
-    HarmonicLoadSpec,
     LoadSpec,
     SampledCourse,
     SampledLoadSpec,
@@ -35,6 +34,8 @@ from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["described_loads", "loads_of"]
 
+FORCES: dict[str, Callable[..., Load]] = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "sweep": SweepLoad}
+COURSES: dict[str, Callable[..., TimeFunction]] = {"harmonic": Harmonic, "sweep": Sweep}
 Given = TypeVar("Given", bound=At)  # direction of a scene file
 
 
@@ -55,17 +56,14 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | Non
     if isinstance(spec, GravitySpec):
         return Gravity(_along(scene, field, spec.direction, transverse), spec.acceleration)
     if isinstance(spec, BaseMotionSpec):
-        return BaseMotion(_along(scene, field, spec.direction, transverse), _smooth(spec.course), spec.fixed_stops)
+        course = _course(scene, f"{field}.course", spec.course)
+        return BaseMotion(_along(scene, field, spec.direction, transverse), course, spec.fixed_stops)
     if isinstance(spec, StopMotionSpec):
         return StopMotion(spec.contact, _course(scene, f"{field}.course", spec.course))
-    if isinstance(spec, ConstantLoadSpec):
-        return ConstantLoad(spec.at, spec.force)
     if isinstance(spec, SampledLoadSpec):
         samples = _samples(scene, field, spec)
         return SampledLoad(spec.at, samples.time, samples.values)
-    if isinstance(spec, HarmonicLoadSpec):
-        return HarmonicLoad(spec.at, spec.amplitude, spec.frequency_hz, spec.phase)
-    return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
+    return FORCES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
 def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
@@ -75,14 +73,10 @@ def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray
     return direction
 
 
-def _course(scene: Scene, field: str, spec: CourseSpec) -> TimeFunction:
-    return _samples(scene, field, spec) if isinstance(spec, SampledCourse) else _smooth(spec)
-
-
-def _smooth(spec: HarmonicCourse | SweepCourse) -> Harmonic | Sweep:
-    if isinstance(spec, HarmonicCourse):
-        return Harmonic(spec.amplitude, spec.frequency_hz, spec.phase)
-    return Sweep(spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
+def _course(scene: Scene, field: str, spec: CourseSpec) -> Any:
+    if isinstance(spec, SampledCourse):
+        return _samples(scene, field, spec)
+    return COURSES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
 def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:

@@ -12,7 +12,7 @@ from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
-from multiphi_exudyn.study.stability.structures import STOP, oscillator, stop, two_masses
+from multiphi_exudyn.study.stability.structures import STOP, in_a_row, stop, two_masses
 
 __all__ = ["CASES"]
 
@@ -35,12 +35,10 @@ def _moving_stop(stiffness: float, damping: float = 0.0) -> Problem:
 
 def _switched() -> Problem:
     """The bilinear oscillator under a force that ends when the mass comes to its stop."""
-    structure = oscillator(BILINEAR.mass, BILINEAR.stiffness)
-    contact = stop("m0", 0.0, BILINEAR.contact_stiffness)
-    closing = BILINEAR.closed_interval[0]
+    contact, start = stop("m0", 0.0, BILINEAR.contact_stiffness), 1.5 * BILINEAR.amplitude
     offset = BILINEAR.stiffness * BILINEAR.amplitude * np.array([0.5, 0.5])
-    load = SampledLoad("m0", np.array([0.0, 1.5 * closing]), offset)
-    return Problem(structure, [contact], 3.0, displacement=np.array([1.5 * BILINEAR.amplitude]), loads=[load])
+    load = SampledLoad("m0", np.array([0.0, 1.5 * BILINEAR.closed_interval[0]]), offset)
+    return in_a_row([BILINEAR.mass], [BILINEAR.stiffness], [contact], 3.0, [start], loads=[load])
 
 
 CASES = (

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.structures import STOP, chain, oscillator, rig_problem, stop
+from multiphi_exudyn.study.stability.structures import STOP, in_a_row, rig_problem, stop
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.exact import BilinearOscillator, PlasticImpact
 
@@ -30,31 +31,21 @@ def _closed_form(exact: BilinearOscillator | PlasticImpact, problem: Problem, tr
     return f"{away:.1e} m from the closed form" if away > EXACT * AMPLITUDE else ""
 
 
-def _swinging(gap: float, stiffness: float, penalty: float | None = None) -> Problem:
+def _swinging(gap: float, stiffness: float) -> Problem:
     """The mass of the closed forms, let go at AMPLITUDE above its rest."""
-    contact = stop("m0", gap, stiffness)
-    return Problem(oscillator(1.0, 100.0), [contact], 5.0, displacement=np.array([AMPLITUDE]), penalty=penalty)
+    return in_a_row([1.0], [100.0], [stop("m0", gap, stiffness)], 5.0, [AMPLITUDE])
 
 
-def _masses(
-    gap: float, stiffness: float, displacement: float, velocity: float, damping: np.ndarray | None = None
-) -> Problem:
+def _masses(gap: float, stiffness: float, displacement: float, velocity: float) -> Problem:
     """Three masses, a stop below the last one, which starts displaced and with a velocity."""
-    last = np.array([0.0, 0.0, 1.0])
-    return Problem(
-        chain([1.0, 1.0, 1.0], [1e4, 2e4, 3e4], damping),
-        [stop("m2", gap, stiffness)],
-        0.5,
-        displacement=displacement * last,
-        velocity=velocity * last,
-    )
+    contact, last = stop("m2", gap, stiffness), np.array([0.0, 0.0, 1.0])
+    return in_a_row([1.0] * 3, [1e4, 2e4, 3e4], [contact], 0.5, displacement * last, velocity=velocity * last)
 
 
 def _at_rest(stiffness: float) -> Problem:
     """Three masses pressed upwards by a stop, in their equilibrium."""
     problem = _masses(-1e-3, stiffness, 0.0, 0.0)
-    structure, contacts = problem.structure, problem.contacts
-    return Problem(structure, contacts, 0.5, displacement=problem.model().static_equilibrium({}))
+    return replace(problem, displacement=problem.model().static_equilibrium({}), velocity=None)
 
 
 def _stays(problem: Problem, trajectory: Trajectory) -> str:
@@ -83,9 +74,8 @@ def _does_not_touch(problem: Problem, trajectory: Trajectory) -> str:
 
 def _symmetric(stiffness: float) -> Problem:
     """Two masses beside a middle one, each over a stop of its own, moving as mirror images."""
-    structure = chain([1.0, 2.0, 1.0], [1e4, 2e4, 2e4, 1e4])
     contacts = [stop("m0", 1e-3, stiffness, "left"), stop("m2", 1e-3, stiffness, "right")]
-    return Problem(structure, contacts, 1.0, displacement=np.array([4e-3, 2e-3, 4e-3]))
+    return in_a_row([1.0, 2.0, 1.0], [1e4, 2e4, 2e4, 1e4], contacts, 1.0, [4e-3, 2e-3, 4e-3])
 
 
 def _stays_symmetric(problem: Problem, trajectory: Trajectory) -> str:

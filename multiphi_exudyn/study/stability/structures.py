@@ -16,14 +16,13 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact
 
-__all__ = ["STOP", "chain", "differs", "oscillator", "pulled", "rig_problem", "stop", "two_masses"]
+__all__ = ["STOP", "chain", "differs", "in_a_row", "pulled", "rig_problem", "stop", "two_masses"]
 
 STOP = "stop"
 ELEMENTS = 8  # of the full beam beside a case: few, as its own error is shown
@@ -33,11 +32,6 @@ FINE_STEPS = {1e9: 2e-6, 1e7: 5e-6, 0.0: 2e-5}  # s, from which stiffness [N/m] 
 def stop(at: Any, gap: float, stiffness: float = math.inf, name: str = STOP) -> UnilateralContact:
     """A stop below a point."""
     return UnilateralContact(name, at, gap, stiffness)
-
-
-def oscillator(mass: float, stiffness: float, damping: Matrix | RayleighDamping | None = None) -> LinearStructure:
-    """One mass on a spring, point m0."""
-    return LinearStructure([[mass]], [[stiffness]], damping, {"m0": 0})
 
 
 def chain(
@@ -54,15 +48,25 @@ def chain(
     return LinearStructure(np.diag(masses), stiffness, damping, {f"m{i}": i for i in range(len(masses))})
 
 
+def in_a_row(
+    masses: Sequence[float],
+    springs: Sequence[float],
+    contacts: Sequence[UnilateralContact | ForceLaw | Friction],
+    t_end: float,
+    start: Sequence[float] | np.ndarray | None = None,
+    damping: Matrix | ModalDamping | RayleighDamping | None = None,
+    **others: Any,
+) -> Problem:
+    """Masses as in ``chain``, let go at ``start`` [m]; others: of a Problem."""
+    displacement = None if start is None else np.array(start)
+    return Problem(chain(masses, springs, damping), contacts, t_end, displacement=displacement, **others)
+
+
 def two_masses(
-    *contacts: UnilateralContact | ForceLaw | Friction,
-    start: float | None = None,
-    t_end: float = 0.5,
-    loads: Sequence[Load] = (),
+    *contacts: UnilateralContact | ForceLaw | Friction, start: float = 0.0, t_end: float = 0.5, **others: Any
 ) -> Problem:
     """1 kg and 1 kg in a row, 1e4 N/m before each, let go with the last displaced so far [m], the first by half."""
-    displacement = None if start is None else np.array([start / 2, start])
-    return Problem(chain([1.0, 1.0], [1e4, 1e4]), contacts, t_end, displacement=displacement, loads=loads)
+    return in_a_row([1.0, 1.0], [1e4, 1e4], contacts, t_end, [start / 2, start], **others)
 
 
 def pulled(
