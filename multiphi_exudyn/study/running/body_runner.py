@@ -13,7 +13,6 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array, way
-from multiphi_exudyn.study.scene.workbench import start_of
 from reference_models.body_alone import solve_body_alone
 
 __all__ = ["BodyRunner"]
@@ -33,10 +32,6 @@ class BodyRunner(Runner):
     def steps(self) -> int:
         """How many there are."""
         return int(np.ceil(self.bench.t_end / self.spec.step * (1 - 1e-9)))
-
-    def prepare(self) -> Prepared:
-        model = self.bench.model(self.spec)
-        return model, start_of(self.bench, model)
 
     def solve(self, prepared: Prepared) -> tuple[BodyHistories, float]:
         bench = self.bench

@@ -42,10 +42,6 @@ class ReducedRunner(Runner):
         chosen = f"modes for a truncation error of {given.tolerance:g}" if given.tolerance else modes_words(given.modes)
         return f"Multi-Phi, {self.level_words()}, {chosen}{self.printed_words()}"
 
-    def prepare(self) -> Prepared:
-        model = self.bench.model(self.spec)
-        return model, start_of(self.bench, model)
-
     def solve(self, prepared: Prepared) -> tuple[Trajectory, float]:
         model, start = prepared
         return timed(lambda: simulate(model, self.bench.t_end, start=start, loads=self.bench.loads))

@@ -16,7 +16,7 @@ import numpy as np
 from multiphi_exudyn.mathematics.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.workbench import Workbench
+from multiphi_exudyn.study.scene.workbench import Workbench, start_of
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance
 
 __all__ = ["ENERGY_INTERVAL", "Runner", "modes_words"]
@@ -42,9 +42,10 @@ class Runner(ABC):
     def label(self) -> str:
         """How tables and figures call it."""
 
-    @abstractmethod
     def prepare(self) -> Any:
-        """What is done offline."""
+        """What is done offline: the Multi-Phi model and its start, unless a kind needs something else."""
+        model = self.bench.model(self.spec)
+        return model, start_of(self.bench, model)
 
     @abstractmethod
     def solve(self, prepared: Any) -> tuple[Any, float]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_words
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
@@ -57,14 +58,10 @@ class StepwiseRunner(_InSteps):
         method = f"{self.spec.method}, rtol {self.spec.rtol:g}"
         return f"solve_ivp, {method}, compliant levels, {modes_words(self.spec.modes)}"
 
-    def prepare(self) -> tuple[MultiPhiModel, np.ndarray]:
-        model = self.bench.model(self.spec)
-        return model, start_configuration(self.bench, model)
-
-    def solve(self, prepared: tuple[MultiPhiModel, np.ndarray]) -> tuple[StepwiseRun, float]:
+    def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
         model, start = prepared
         given = {"method": self.spec.method, "rtol": self.spec.rtol}
-        return timed(lambda: solve_stepwise(model, self.bench.t_end, start, **given))
+        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **given))
 
     def outcome(self, prepared: Any, answer: StepwiseRun) -> dict[str, Any]:
         return {

@@ -45,7 +45,7 @@ class _FollowedLaw(_Law):
     def _shape(self, q: Any) -> Any:
         raise NotImplementedError
 
-    def law(self) -> ForceLaw:
+    def built(self) -> ForceLaw:
         """Its shape followed by segments; raises the errors of ForceLaw."""
         return ForceLaw(self.at, self._shape, self.tolerance, self.name, self.span, self.segments)
 
@@ -57,7 +57,7 @@ class TableLawSpec(_Law):
     q: tuple[Finite, ...]  # m, ascending
     force: tuple[Finite, ...]  # F, N
 
-    def law(self) -> ForceLaw:
+    def built(self) -> ForceLaw:
         """Its lines; raises the errors of ForceLaw."""
         return ForceLaw(self.at, (self.q, self.force), name=self.name)
 

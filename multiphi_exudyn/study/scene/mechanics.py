@@ -8,23 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.scene.fields import Table, inside
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.parts import Mechanics
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, LoadedStart, SceneFile
+from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
-from multiphi_exudyn.study.scene.structure_tables import BeamsStructure, MatrixStructure, RigStructure
-from reference_models.beams import Beams, as_beams
-from reference_models.rig import assumptions, rig_beam, rig_contact, rig_damping
 
 __all__ = ["mechanics_of"]
 
@@ -33,22 +27,19 @@ OF_POINTS = ("load_at", "measured_at", "points", "judged_points", "direction", "
 
 def mechanics_of(scene: Scene) -> Mechanics:
     """Build and check what ``scene`` describes; raises MultiPhiValueError naming file and field."""
-    structure, file = _structure(scene), scene.file
-    contacts = tuple(
-        inside(f"{scene.path}: contacts[{i}]", partial(UnilateralContact, **spec.model_dump(exclude_defaults=True)))
-        for i, row in enumerate(file.contacts)
-        for spec in row.row
-    )
+    file = scene.file
+    structure = inside(f"{scene.path}: structure", lambda: file.structure.built(scene.path.parent))
+    contacts = [
+        inside(f"{scene.path}: contacts[{i}]", spec.built) for i, row in enumerate(file.contacts) for spec in row.row
+    ]
     mechanics = replace(
         structure,
-        contacts=structure.contacts + contacts,
-        force_laws=tuple(inside(f"{scene.path}: force_laws[{i}]", law.law) for i, law in enumerate(file.force_laws)),
-        frictions=tuple(
-            inside(f"{scene.path}: friction[{i}]", partial(Friction, **spec.model_dump()))
-            for i, spec in enumerate(file.friction)
-        ),
+        contacts=(*structure.contacts, *contacts),
+        force_laws=tuple(inside(f"{scene.path}: force_laws[{i}]", s.built) for i, s in enumerate(file.force_laws)),
+        frictions=tuple(inside(f"{scene.path}: friction[{i}]", s.built) for i, s in enumerate(file.friction)),
         loads=file.loads,
         damping=structure.damping if file.damping is None else file.damping.built(),
+        assumptions=(*structure.assumptions, *(_assumptions(file) if structure.parameter_set else ())),
     )
     _check_points(scene, mechanics)
     _check_names(scene, mechanics)
@@ -61,47 +52,24 @@ def mechanics_of(scene: Scene) -> Mechanics:
     return mechanics
 
 
-def _structure(scene: Scene) -> Mechanics:
-    """The structure alone, with the contact and the damping that the rig has of its own."""
-    spec, place = scene.file.structure, f"{scene.path}: structure"
-    if isinstance(spec, RigStructure):
-        return Mechanics(
-            contacts=(rig_contact(spec.support_stiffness),),
-            damping=rig_damping(),
-            beams=as_beams(rig_beam(spec.rig, spec.clamp)),
-            parameter_set=spec.rig,
-            assumptions=(*assumptions(spec.rig, spec.clamp), *_assumptions(scene.file, spec.support_stiffness)),
-        )
-    if isinstance(spec, MatrixStructure):
-        matrices = inside(place, lambda: spec.built(scene.path.parent))
-        return Mechanics(matrices=matrices, damping=matrices.damping)
-    if isinstance(spec, BeamsStructure):
-        parts = {name: inside(f"{place}.beams.{name}", beam.built) for name, beam in spec.beams.items()}
-        return Mechanics(beams=inside(place, lambda: Beams(parts, spec.ties)))
-    return Mechanics(beams=as_beams(inside(f"{place}.beam", spec.beam.built)))
-
-
-def _assumptions(file: SceneFile, stiffness: float) -> Iterator[str]:
+def _assumptions(file: SceneFile) -> Iterator[str]:
     """What a scene adds to the rig's own assumptions."""
     start = file.start
     if start is not None:
-        size = f"{start.force:+g} N" if isinstance(start, LoadedStart) else _travel(start)
-        yield f"start of this scene: {size} by a static force at {start.load_at} (assumed: no number is printed)"
+        given = f"{start.in_words()} by a static force at {start.load_at}"
+        yield f"start of this scene: {given} (assumed: no number is printed)"
     for law in file.force_laws:
         yield f"force law of this scene: {law.in_words()} (assumed: the paper's rig has none)"
     for friction in file.friction:
         yield f"friction of this scene: {friction.in_words()} (assumed: the paper's rig has none)"
     for load in described_loads(file.loads):
         yield f"load of this scene: {load} (assumed: the paper's rig is only released)"
+    stiffness = getattr(file.structure, "support_stiffness", math.inf)
     if math.isfinite(stiffness):
         yield (
             f"support stiffness: {stiffness:g} N/m (assumed: the paper's support is ideally rigid, "
             "a penalty contact element needs a number)"
         )
-
-
-def _travel(start: DisplacedStart) -> str:
-    return f"{1e3 * start.displacement:+g} mm at {start.measured_at}"
 
 
 def _check_points(scene: Scene, mechanics: Mechanics) -> None:

@@ -11,7 +11,9 @@ from typing import Annotated
 
 from pydantic import Field, Tag
 
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.scene.fields import (
     Finite,
     Name,
@@ -49,6 +51,10 @@ class ContactSpec(Table):
     tangential_velocity: Finite = 0.0  # m/s, of the counter-surface along it
     count: Annotated[int, Field(ge=1)] = 1  # how many contacts of this kind
 
+    def built(self) -> UnilateralContact:
+        """The contact; raises the errors of UnilateralContact."""
+        return UnilateralContact(**self.model_dump(exclude_defaults=True))
+
     @property
     def row(self) -> tuple[ContactSpec, ...]:
         """The contacts one by one."""
@@ -73,6 +79,10 @@ class FrictionSpec(Table):
     stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
     velocity: Finite = 0.0  # m/s, of the counter-surface along the direction
 
+    def built(self) -> Friction:
+        """The friction; raises the errors of Friction."""
+        return Friction(**self.model_dump())
+
     def in_words(self) -> str:
         """The friction as part of a sentence."""
         spring = "without a spring" if math.isinf(self.stiffness) else f"a spring of {self.stiffness:g} N/m in series"
@@ -87,12 +97,20 @@ class DisplacedStart(Table):
     measured_at: Name  # a point
     displacement: NotZero  # m
 
+    def in_words(self) -> str:
+        """How far, as part of a sentence."""
+        return f"{1e3 * self.displacement:+g} mm at {self.measured_at}"
+
 
 class LoadedStart(Table):
     """Static load ``force`` [N] at ``load_at``."""
 
     load_at: Name  # a point
     force: NotZero  # N
+
+    def in_words(self) -> str:
+        """How strong, as part of a sentence."""
+        return f"{self.force:+g} N"
 
 
 StartSpec = Annotated[

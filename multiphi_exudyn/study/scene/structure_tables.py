@@ -1,6 +1,6 @@
 """The table ``[structure]`` of a scene file: the rig, beams and their parts, matrices; SI units.
 
-Every table gives what it describes as an object of multiphi_exudyn.mechanics.
+Every table gives what it describes as mechanics; an error that begins with a dot names a field inside it.
 """
 
 from __future__ import annotations
@@ -28,10 +28,14 @@ from multiphi_exudyn.study.scene.fields import (
     Stiffness,
     Table,
     by_key,
+    inside,
     numbered,
 )
+from multiphi_exudyn.study.scene.parts import Mechanics
+from reference_models.beams import Beams, as_beams
+from reference_models.rig import assumptions, rig_beam, rig_contact, rig_damping
 
-__all__ = ["BeamsStructure", "MatrixStructure", "RigStructure", "StructureSpec"]
+__all__ = ["RigStructure", "StructureSpec"]
 
 PartName = Annotated[str, Field(min_length=1, pattern=r"^[\w-]+$")]
 TieSpec = Annotated[dict[Name, NotZero], Field(min_length=1, max_length=2)]  # the sum is zero; of one: held
@@ -45,10 +49,16 @@ class RigStructure(Table):
     clamp_translation: Stiffness = math.inf  # N/m
     clamp_rotation: Stiffness = math.inf  # N m/rad
 
-    @property
-    def clamp(self) -> Clamp:
-        """The clamp."""
-        return Clamp(self.clamp_translation, self.clamp_rotation)
+    def built(self, folder: Path) -> Mechanics:
+        """The rig with its contact and damping; ``folder``: of the scene file."""
+        clamp = Clamp(self.clamp_translation, self.clamp_rotation)
+        return Mechanics(
+            contacts=(rig_contact(self.support_stiffness),),
+            damping=rig_damping(),
+            beams=as_beams(rig_beam(self.rig, clamp)),
+            parameter_set=self.rig,
+            assumptions=assumptions(self.rig, clamp),
+        )
 
 
 class RectangleSection(Table):
@@ -143,12 +153,22 @@ class BeamStructure(Table):
 
     beam: BeamSpec
 
+    def built(self, folder: Path) -> Mechanics:
+        """The beam; ``folder``: of the scene file."""
+        return Mechanics(beams=as_beams(inside(".beam", self.beam.built)))
+
 
 class BeamsStructure(Table):
     """Several beams, along x each; the point "tip" of the beam "a" is "a.tip"."""
 
     beams: Annotated[dict[PartName, BeamSpec], Field(min_length=1)]
     ties: tuple[TieSpec, ...] = ()
+
+    def built(self, folder: Path) -> Mechanics:
+        """The beams; ``folder``: of the scene file."""
+        return Mechanics(
+            beams=Beams({n: inside(f".beams.{n}", beam.built) for n, beam in self.beams.items()}, self.ties)
+        )
 
 
 class MatrixFiles(Table):
@@ -169,8 +189,12 @@ class MatrixStructure(Table):
     matrices: str | MatrixFiles
     points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]
 
-    def built(self, folder: Path) -> LinearStructure:
-        """The structure; ``folder``: of the scene file."""
+    def built(self, folder: Path) -> Mechanics:
+        """The structure with its damping; ``folder``: of the scene file."""
+        structure = self._read(folder)
+        return Mechanics(matrices=structure, damping=structure.damping)
+
+    def _read(self, folder: Path) -> LinearStructure:
         files = self.matrices
         if isinstance(files, MatrixFiles):
             rows = {name: _own_row(folder, name, at) if isinstance(at, str) else at for name, at in self.points.items()}

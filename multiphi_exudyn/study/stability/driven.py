@@ -30,7 +30,8 @@ def _loaded(stiffness: float, load: HarmonicLoad | SampledLoad | BaseMotion, t_e
 def _moving_stop(stiffness: float, damping: float = 0.0) -> Problem:
     """Two masses let go above a stop that goes up and down."""
     contact = UnilateralContact(STOP, "m1", 3e-3, stiffness, damping)
-    return two_masses(contact, start=5e-3, t_end=1.0, loads=[StopMotion(STOP, SHAKEN)])
+    moving = StopMotion(STOP, SHAKEN)
+    return in_a_row([1.0, 1.0], [1e4, 1e4], [contact], 1.0, [2e-3, 5e-3], loads=[moving])
 
 
 def _switched() -> Problem:
