@@ -264,6 +264,13 @@ def prepared(tmp_path, data):
     return str(caught.value).removeprefix(file + ": ")
 
 
+def test_a_structure_that_has_no_modes_is_refused_where_it_is_prepared(tmp_path):
+    np.savez(tmp_path / "two.npz", mass=np.eye(2), stiffness=np.array([[1.0, 2.0], [2.0, 1.0]]))
+    data = changed(["structure"], {"matrices": "two.npz", "points": {"middle": 0, "tip": 1}})
+    data |= {"models": [{"kind": "reduced", "name": "all", "modes": "all"}], "comparison": {"reference": "all"}}
+    assert prepared(tmp_path, data).startswith("structure: stiffness: indefinite")
+
+
 @pytest.mark.parametrize("arrays", [{"mass": np.eye(2)}, {"mass": np.eye(2), "stiffness": np.eye(3)}])
 def test_wrong_matrices_are_one_line(tmp_path, arrays):
     np.savez(tmp_path / "two.npz", **arrays)

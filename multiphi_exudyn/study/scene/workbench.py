@@ -25,6 +25,7 @@ from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.planar_beam import beam_nodes
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
+from multiphi_exudyn.study.scene.fields import inside
 from multiphi_exudyn.study.scene.model_kinds import (
     CraigBamptonModel,
     FullModel,
@@ -162,6 +163,7 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
     bench = Workbench(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
     _check_modes(bench)
+    inside(f"{scene.path}: structure", lambda: bench.longest_period)  # refuses a structure that has no modes
     return bench
 
 
