@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Mesh:
     @classmethod
     def of(cls, beams: Beams, kind: str | None, elements: int) -> Mesh:
         """Beams in elements of a kind."""
-        return cls(beams, kind, elements, repr(beams))
+        return cls(beams, kind, elements, repr(asdict(beams)))
 
 
 class LinearBeams:
