@@ -1,7 +1,7 @@
 """Command line of the package.
 
-Order: animate_command, budget_command, compare_command, compile_command, file_commands, needs_command,
-stability_command, study_command, options, main.
+Order: options, animate_command, budget_command, compare_command, compile_command, file_commands, needs_command,
+stability_command, study_command, main.
 """
 
 from multiphi_exudyn.cli.main import command, main

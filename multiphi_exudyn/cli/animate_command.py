@@ -7,10 +7,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.comparison.animation import animation, gif, stage_of
-from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.time.warning_groups import grouped
 

@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.comparison.plots import png
 from multiphi_exudyn.study.comparison.wording import percent
-from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
 from multiphi_exudyn.study.comparison.findings import findings
@@ -20,7 +21,6 @@ from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment, import_times
-from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare

@@ -1,12 +1,15 @@
-"""Options of the commands, with their defaults, and the kinds of values they take."""
+"""Options of the commands, with their defaults, and the kinds of values they take; the folder of results."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import tempfile
 from pathlib import Path
 
-__all__ = ["animate_options", "scene_options", "stability_options", "study_options"]
+from multiphi_exudyn.errors import MultiPhiValueError
+
+__all__ = ["animate_options", "results_folder", "scene_options", "stability_options", "study_options"]
 
 
 def scene_options(parser: argparse.ArgumentParser, whose: str) -> None:
@@ -79,3 +82,14 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"got {text!r}, need a whole number >= 1")
     return int(text)
+
+
+def results_folder(path: Path) -> Path:
+    """The folder, made where there is none; an error, before anything has run, where it cannot be written."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path):
+            return path
+    except OSError as error:
+        needed = f"a folder that can be written: {error.strerror}"
+        raise MultiPhiValueError(f"--out: got {str(path)!r}, need {needed}") from error

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
+from multiphi_exudyn.mathematics.compiled import available, compile_entries
 from multiphi_exudyn.study.running.environment import environment
-from multiphi_exudyn.study.running.files import results_folder
-from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case, warm_up
-from multiphi_exudyn.study.stability.stability_report import render_stability
+from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case
+from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.summary import contents
-from multiphi_exudyn.study.stability.text_table import text_table
 
 __all__ = ["run_stability"]
 
@@ -25,7 +25,8 @@ def run_stability(name: str | None, quick: bool, out: Path | None) -> bool:
     results = []
     with tqdm(total=len(cases), disable=None, unit="case") as bar:
         bar.set_description("compiling")
-        warm_up()
+        if available():
+            compile_entries()  # before any time limit starts
         for case in cases:
             bar.set_description(case.name)
             results.append(run_case(case, QUICK if quick else FULL_LENGTH))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.analysis import cheapest, points, settings, times_faster, words
 from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
@@ -16,7 +17,6 @@ from multiphi_exudyn.study.accuracy.study_table import csv_text
 from multiphi_exudyn.study.accuracy.study_warnings import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
 from multiphi_exudyn.study.results import TABLE
-from multiphi_exudyn.study.running.files import results_folder
 from multiphi_exudyn.study.sweep.executors import open_executor
 from multiphi_exudyn.study.sweep.store import Store
 

@@ -107,6 +107,7 @@ def test_schemas_name_every_field_and_what_may_stand_for_infinity(capsys):
     contact = json.loads(out)["$defs"]["ContactSpec"]["properties"]
     assert {"const": "rigid"} in contact["stiffness"]["anyOf"]
     assert contact["tangential_stiffness"]["default"] == "rigid"
+    assert contact["gap"]["description"] == "m, at x = 0"
 
 
 def test_a_study_of_gap_stiffness_and_frequency_from_the_templates_alone(folder, capsys):

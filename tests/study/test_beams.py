@@ -10,9 +10,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.section import Section
-from multiphi_exudyn.study.running.full_runner import run_full
-from multiphi_exudyn.study.running.reduced_runner import run_reduced
-from multiphi_exudyn.study.running.runs import How
+from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
@@ -117,9 +115,8 @@ class TestScenes:
     def test_reduced_and_full_agree_through_the_first_contacts(self, name, t_end):
         scene = load_scene(name, t_end=t_end)
         bench = prepare(scene, mechanics_of(scene))
-        specs = list(scene.models.values())
-        reduced = run_reduced(bench, next(spec for spec in specs if spec.kind == "reduced"), "reduced", How())
-        full = run_full(bench, scene.models["full-cheapest"], "full", How())
+        first = next(name for name, spec in scene.models.items() if spec.kind == "reduced")
+        reduced, full = (run_model(bench, name, progress=False) for name in (first, "full-cheapest"))
         assert sum(len(given) for given in full.contact_intervals.values()) >= 1
         for point in bench.judged_points:
             difference = np.linalg.norm(reduced.points[point] - full.points[point])

@@ -29,7 +29,7 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
-from multiphi_exudyn.study.stability.text_table import text_table
+from multiphi_exudyn.study.stability.report import text_table
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped
 from reference_models.solver_settings import fixed_steps

@@ -13,7 +13,6 @@ from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scene_laws import described_laws
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
@@ -102,7 +101,7 @@ class TestForms:
 
     def test_every_kind_is_told_in_words(self, tmp_path):
         bench = bench_of(tmp_path, with_laws(*(LAWS[k] | {"name": k} for k in LAWS)))
-        assert described_laws(bench.scene) == (
+        assert tuple(law.in_words() for law in bench.scene.file.force_laws) == (
             "the force law table at tip (a table of 3 places)",
             "the force law cubic at tip (50 N/m q +2e+06 N/m³ q³)",
             "the force law hertz at tip (20000 N/m^1.5 beyond a gap of 1 mm)",

@@ -212,7 +212,7 @@ class TestReport:
 
 def test_every_kind_is_told_in_words(tmp_path):
     scene, _ = loaded(tmp_path, at_rest(*LOADS.values()))
-    assert described_loads(scene) == (
+    assert described_loads(scene.file.loads) == (
         "a constant force of -2 N at +1 tip and -0.5 middle",
         "a force at tip of 2 N, harmonic at 12 Hz",
         "a force at tip of 3 samples",

@@ -177,6 +177,9 @@ BROKEN = {
     "unknown output": (["outputs", "points"], ["tap"], "outputs.points[0]: got 'tap', need one of the points"),
     "unknown direction": (["contacts", 0, "direction"], "tap", "contacts[0].direction: got 'tap', need one of"),
     "unknown coefficient": (["contacts", 0, "direction"], {"tap": 1.0}, "contacts[0].direction: got 'tap', need"),
+    "unknown beside a known one": (
+        ["contacts", 0, "direction"], {"tap": 1.0, "tip": -1.0}, "contacts[0].direction: got 'tap', need one of"
+    ),
     "unknown reference": (["comparison", "reference"], "full", "comparison.reference: got 'full', need one of"),
     "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need another name"),
     "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),
@@ -259,6 +262,13 @@ def prepared(tmp_path, data):
     with pytest.raises(MultiPhiValueError) as caught:
         prepare(scene, mechanics_of(scene))
     return str(caught.value).removeprefix(file + ": ")
+
+
+def test_a_structure_that_has_no_modes_is_refused_where_it_is_prepared(tmp_path):
+    np.savez(tmp_path / "two.npz", mass=np.eye(2), stiffness=np.array([[1.0, 2.0], [2.0, 1.0]]))
+    data = changed(["structure"], {"matrices": "two.npz", "points": {"middle": 0, "tip": 1}})
+    data |= {"models": [{"kind": "reduced", "name": "all", "modes": "all"}], "comparison": {"reference": "all"}}
+    assert prepared(tmp_path, data).startswith("structure: stiffness: indefinite")
 
 
 @pytest.mark.parametrize("arrays", [{"mass": np.eye(2)}, {"mass": np.eye(2), "stiffness": np.eye(3)}])

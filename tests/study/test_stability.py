@@ -13,15 +13,13 @@ from multiphi_exudyn import MultiPhiModel, cli, simulate
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.study.stability import catalogue_run, native_run
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.catalogue import CATALOGUE
-from multiphi_exudyn.study.stability.catalogue_run import QUICK, chosen_cases, run_case
+from multiphi_exudyn.study.stability.catalogue_run import CATALOGUE, QUICK, chosen_cases, run_case
 from multiphi_exudyn.study.stability.exudyn_runs import run_user_object
 from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.native_run import run_native
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
-from multiphi_exudyn.study.stability.stability_report import render_stability
+from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.summary import contents, failures, summaries
-from multiphi_exudyn.study.stability.text_table import text_table
 from reference_models.full_matrices import run_matrices
 
 BUDGET = 20_000

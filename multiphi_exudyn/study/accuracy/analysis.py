@@ -12,7 +12,7 @@ from typing import Any
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
 from multiphi_exudyn.study.comparison.wording import seconds
-from multiphi_exudyn.study.running.reduced_runner import modes_words
+from multiphi_exudyn.study.running.runner import modes_words
 from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = [

@@ -18,7 +18,6 @@ from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import engineering
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_laws import described_laws
 from multiphi_exudyn.study.scene.scene_loads import described_loads
 
 __all__ = ["Findings", "findings"]
@@ -49,8 +48,8 @@ def findings(comparison: Comparison) -> Findings:
         bench=comparison.bench,
         until=comparison.headline_window,
         start=comparison.bench.scene.file.start,
-        loads=described_loads(comparison.bench.scene),
-        laws=described_laws(comparison.bench.scene),
+        loads=described_loads(comparison.bench.scene.file.loads),
+        laws=[law.in_words() for law in comparison.bench.scene.file.force_laws],
         contacts=comparison.bench.mechanics.contacts,
         listed_one_by_one=LISTED,
         meeting=meeting,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,100 +11,69 @@ from scipy.interpolate import CubicHermiteSpline
 from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.study.running.reduced_runner import level_words, printed_words
-from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array, way
-from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.model_kinds import UserObjectModel
-from multiphi_exudyn.study.scene.workbench import Workbench, start_of
+from multiphi_exudyn.study.running.runner import Runner
+from multiphi_exudyn.study.running.runs import interval_array, way
 from reference_models.body_alone import solve_body_alone
 
-__all__ = ["body_label", "run_user_object"]
+__all__ = ["BodyRunner"]
+
+Prepared = tuple[MultiPhiModel, Equilibrium]
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What one run needs: model, start, number of steps."""
+class BodyRunner(Runner):
+    """The body in an empty system, its modes matched to the step."""
 
-    model: MultiPhiModel
-    start: Equilibrium
-    steps: int
+    @property
+    def label(self) -> str:
+        levels = f"{self.level_words()}, r = {self.spec.modes}{self.printed_words()}"
+        return f"Exudyn user object, {levels}, step {self.spec.step * 1e6:g} µs"
 
+    @property
+    def steps(self) -> int:
+        """How many there are."""
+        return int(np.ceil(self.bench.t_end / self.spec.step * (1 - 1e-9)))
 
-def body_label(bench: Workbench, spec: UserObjectModel) -> str:
-    """How tables and figures call it."""
-    levels = f"{level_words(bench, spec.rigid)}, r = {spec.modes}{printed_words(bench)}"
-    return f"Exudyn user object, {levels}, step {spec.step * 1e6:g} µs"
+    def solve(self, prepared: Prepared) -> tuple[BodyHistories, float]:
+        bench = self.bench
+        return solve_body_alone(*prepared, bench.t_end, self.steps, bench.points, loads=bench.loads)
 
+    def outcome(self, prepared: Prepared, answer: BodyHistories) -> dict[str, Any]:
+        return {"dofs": prepared[0].level(()).modes, "steps": self.steps, "warnings": answer.warnings}
 
-def run_user_object(bench: Workbench, spec: UserObjectModel, label: str, how: How) -> ModelRun:
-    """Add the body to an empty system, its modes matched to the step, and solve."""
-    task, building = timed(lambda: _task(bench, spec))
-    recorded, first, repeats = repeated(
-        lambda: solve_body_alone(task.model, task.start, bench.t_end, task.steps, bench.points, loads=bench.loads),
-        bench.repeats,
-    )
-    histories, sampling = timed(lambda: _histories(bench, recorded))
-    return ModelRun(
-        name=spec.name,
-        kind=spec.kind,
-        label=label,
-        dofs=task.model.level(()).modes,
-        steps=task.steps,
-        offline_s=bench.structure_s + building,
-        first_s=first,
-        repeats_s=repeats,
-        sampling_s=sampling,
-        warnings=recorded.warnings,
-        **histories,
-    )
+    def histories(self, prepared: Prepared, answer: BodyHistories) -> dict[str, Any]:
+        contacts = [contact.name for contact in self.bench.mechanics.contacts]
+        return {
+            "points": {
+                name: CubicHermiteSpline(answer.time, values, answer.velocities[name])(self.bench.time)
+                for name, values in answer.points.items()
+            },
+            "gaps": self._interpolated(answer, {name: answer.gaps[name] for name in contacts}),
+            "contact_force": self._interpolated(answer, {name: answer.contact_force[name] for name in contacts}),
+            "contact_intervals": {name: interval_array(answer.contact_intervals[name]) for name in contacts},
+            "impulse": {name: _impulse(answer, name) for name in contacts},
+            "friction_force": self._interpolated(answer, answer.friction_force),
+            "slip": self._interpolated(answer, answer.slip),
+            "stick_intervals": dict(answer.stick_intervals),
+            "ledger": self._ledger(answer),
+        }
 
+    def _interpolated(self, answer: BodyHistories, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {name: np.interp(self.bench.time, answer.time, values) for name, values in given.items()}
 
-def _task(bench: Workbench, spec: UserObjectModel) -> _Task:
-    model = bench.model(spec)
-    steps = int(np.ceil(bench.t_end / spec.step * (1 - 1e-9)))
-    return _Task(model, start_of(bench, model), steps)
-
-
-def _histories(bench: Workbench, recorded: BodyHistories) -> dict[str, Any]:
-    """The fields of a ModelRun that the body's sensors give, on the common grid, without force laws."""
-    contacts = [contact.name for contact in bench.mechanics.contacts]
-    points = {
-        name: CubicHermiteSpline(recorded.time, values, recorded.velocities[name])(bench.time)
-        for name, values in recorded.points.items()
-    }
-    return {
-        "time": bench.time,
-        "points": points,
-        "gaps": {name: np.interp(bench.time, recorded.time, recorded.gaps[name]) for name in contacts},
-        "contact_force": {
-            name: np.interp(bench.time, recorded.time, recorded.contact_force[name]) for name in contacts
-        },
-        "contact_intervals": {name: interval_array(recorded.contact_intervals[name]) for name in contacts},
-        "impulse": {name: _impulse(recorded, name) for name in contacts},
-        "friction_force": _interpolated(bench, recorded, recorded.friction_force),
-        "slip": _interpolated(bench, recorded, recorded.slip),
-        "stick_intervals": dict(recorded.stick_intervals),
-        "ledger": _ledger(bench, recorded),
-    }
+    def _ledger(self, answer: BodyHistories) -> dict[str, float]:
+        """What left at events, and what friction has taken on its ways, which turn between samples at the earliest."""
+        rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if answer.slip else [])]
+        lost = {row: float(sum(getattr(event.loss, row) for event in answer.events)) for row in rows}
+        for friction in self.bench.mechanics.frictions:
+            lost["friction"] += friction.limit * way(answer.slip[friction.name])
+        for contact in self.bench.mechanics.contacts:
+            if contact.friction:
+                force, slip = answer.friction_force[contact.name], answer.slip[contact.name]
+                lost["friction"] += float(np.trapezoid(force, slip))
+        return lost
 
 
-def _interpolated(bench: Workbench, recorded: BodyHistories, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {name: np.interp(bench.time, recorded.time, values) for name, values in given.items()}
-
-
-def _ledger(bench: Workbench, recorded: BodyHistories) -> dict[str, float]:
-    """What left at events, and what friction has taken on its ways, which turn between the samples at the earliest."""
-    rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if recorded.slip else [])]
-    lost = {row: float(sum(getattr(event.loss, row) for event in recorded.events)) for row in rows}
-    for friction in bench.mechanics.frictions:
-        lost["friction"] += friction.limit * way(recorded.slip[friction.name])
-    for contact in bench.mechanics.contacts:
-        if contact.friction:
-            lost["friction"] += float(np.trapezoid(recorded.friction_force[contact.name], recorded.slip[contact.name]))
-    return lost
-
-
-def _impulse(recorded: BodyHistories, contact: str) -> float:
+def _impulse(answer: BodyHistories, contact: str) -> float:
     """Of the recorded force by the trapezoidal rule, and of the impacts [N s]."""
-    struck = sum(event.impulse for event in recorded.events if event.contact == contact)
-    return float(np.trapezoid(recorded.contact_force[contact], recorded.time) + struck)
+    struck = sum(event.impulse for event in answer.events if event.contact == contact)
+    return float(np.trapezoid(answer.contact_force[contact], answer.time) + struck)

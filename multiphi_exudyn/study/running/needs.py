@@ -18,7 +18,6 @@ from pathlib import Path
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.running.run_alone import Task
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel
 from multiphi_exudyn.study.scene.scenes import Scene
@@ -26,6 +25,7 @@ from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
 __all__ = ["Needs", "needs_of", "needs_table"]
 
+RUN_ALONE = "multiphi_exudyn.study.running.run_alone"
 HEADS = ("scene", "model", "levels built", "coordinates", "peak memory", "modules", "packages imported")
 
 
@@ -58,16 +58,14 @@ def needs_of(scene: Scene) -> Needs:
         raise MultiPhiValueError(f"{scene.path}: models: got none of kind 'reduced' with a number of modes, need one")
     bench = prepare(scene, mechanics_of(scene))
     model, given = bench.model(spec), bench.structure
-    task = Task(
-        structure=LinearStructure(given.mass, given.stiffness, given.damping, given.points),
-        contacts=bench.nonlinearities(spec.rigid),
-        modes=model.modes if isinstance(model.modes, (int, str)) else "all",
-        overrides=bench.overrides,
-        start=start_configuration(bench, model),
-        loads=bench.loads,
-        t_end=bench.t_end,
-    )
-    told = json.loads(_in_a_process(pickle.dumps(task)))
+    of_model = {
+        "structure": LinearStructure(given.mass, given.stiffness, given.damping, given.points),
+        "contacts": bench.nonlinearities(spec.rigid),
+        "modes": model.modes,
+        "overrides": bench.overrides,
+    }
+    of_run = {"t_end": bench.t_end, "displacement": start_configuration(bench, model), "loads": bench.loads}
+    told = json.loads(_in_a_process(pickle.dumps((of_model, of_run))))
     tuples = {name: tuple(told[name]) for name in ("packages", "warnings")}
     return Needs(scene=scene.name, model=spec.name, **told | tuples)
 
@@ -83,7 +81,7 @@ def _in_a_process(task: bytes) -> str:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "task"
         file.write_bytes(task)
-        command = [sys.executable, "-m", "multiphi_exudyn.study.running.run_alone", str(file)]
+        command = [sys.executable, "-m", RUN_ALONE, str(file)]
         done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
     if done.returncode:
         raise NumericalFailure(f"the run in a process of its own ended with {done.stderr.strip().splitlines()[-1]}")

@@ -1,7 +1,7 @@
 """One reduced run in a process of its own, which tells what it took: ``python -m ...run_alone FILE``.
 
-FILE holds a pickled :class:`Task`. Nothing but the reduced model is imported here, so that the modules and the memory
-told are those that a run needs.
+FILE holds a pickled task: the arguments of MultiPhiModel and those of simulate. Nothing but the reduced model is
+imported here, so that the modules and the memory told are those that a run needs.
 """
 
 from __future__ import annotations
@@ -10,44 +10,25 @@ import json
 import pickle
 import sys
 import tracemalloc
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warning_groups import kept_back
 
-__all__ = ["Task", "run_alone"]
+__all__ = ["run_alone"]
 
 OURS = "multiphi_exudyn"
 
 
-@dataclass(frozen=True)
-class Task:
-    """A reduced run: the arguments of MultiPhiModel and of simulate; start: x (n,)."""
-
-    structure: LinearStructure
-    contacts: Sequence[Any]
-    modes: int | str
-    overrides: Mapping[tuple[str, ...], Any]
-    start: np.ndarray
-    loads: Sequence[Load]
-    t_end: float
-
-
-def run_alone(task: Task) -> dict[str, Any]:
+def run_alone(of_model: dict[str, Any], of_run: dict[str, Any]) -> dict[str, Any]:
     """What the run took, as ``needs.Needs`` names it; memory counted from before its model is made."""
     tracemalloc.start()
-    model = MultiPhiModel(task.structure, task.contacts, modes=task.modes, overrides=task.overrides)
+    model = MultiPhiModel(**of_model)
     with kept_back():
-        run = simulate(model, task.t_end, displacement=task.start, loads=task.loads)
+        run = simulate(model, **of_run)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]
@@ -66,4 +47,4 @@ def run_alone(task: Task) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(run_alone(pickle.loads(Path(sys.argv[1]).read_bytes()))))
+    print(json.dumps(run_alone(*pickle.loads(Path(sys.argv[1]).read_bytes()))))

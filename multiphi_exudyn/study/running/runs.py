@@ -9,16 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["How", "ModelRun", "from_arrays", "interval_array", "to_arrays", "way"]
-
-
-@dataclass(frozen=True)
-class How:
-    """How a model is run: see ``run_model``."""
-
-    progress: bool = False
-    retry: bool = False
-    horizon: bool = False
+__all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays", "way"]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""Runs the reduced equations of a Multi-Phi model through scipy's solve_ivp.
+"""Runs models that take steps outside Exudyn: the reduced equations through scipy's solve_ivp, and a Craig-Bampton
+component by exact free motion with penalty forces in between (reference_models/splitting.py).
 
 A step size control that is asked for too little can feed energy to the highest modes; such a run has failed.
 """
@@ -6,74 +7,99 @@ A step size control that is asked for too little can feed energy to the highest 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.study.running.energy_gain import energy_gain
-from multiphi_exudyn.study.running.reduced_runner import ENERGY_INTERVAL, modes_words
-from multiphi_exudyn.study.running.runs import How, ModelRun, interval_array
-from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.model_kinds import StepwiseModel
-from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_words
+from multiphi_exudyn.study.running.runs import interval_array
+from multiphi_exudyn.study.running.timing import timed
+from multiphi_exudyn.study.scene.workbench import start_configuration
+from reference_models.splitting import Splitting, SplittingRun, splitting
 from reference_models.stepwise import StepwiseHistories, StepwiseRun, solve_stepwise
 
-__all__ = ["run_stepwise", "sampled", "stepwise_label"]
+__all__ = ["SplittingRunner", "StepwiseRunner"]
 
 
-def stepwise_label(bench: Workbench, spec: StepwiseModel) -> str:
-    """How tables and figures call it."""
-    return f"solve_ivp, {spec.method}, rtol {spec.rtol:g}, compliant levels, {modes_words(spec.modes)}"
+class _InSteps(Runner):
+    """A method whose answer gives histories of points at any times."""
+
+    in_steps = True
+
+    def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
+        """What gives the histories of points at times (k,) [s]."""
+        return answer.histories
+
+    def histories(self, prepared: Any, answer: StepwiseRun | SplittingRun) -> dict[str, Any]:
+        time, t_end, sampler = self.bench.time, self.bench.t_end, self.sampler(answer)
+        histories, sampling = timed(lambda: sampler(self.bench.points, time))
+        energy_time = np.linspace(0.0, t_end, round(t_end / ENERGY_INTERVAL) + 1)
+        forces = histories.contact_force
+        return {
+            "points": histories.points,
+            "gaps": histories.gaps,
+            "contact_force": forces,
+            "contact_intervals": {name: interval_array(answer.contact_intervals(name)) for name in forces},
+            "impulse": {name: float(np.trapezoid(force, time)) for name, force in forces.items()},
+            "energy_time": energy_time,
+            "energy": sampler((), energy_time).energy,
+            "sampling_s": sampling,
+        }
 
 
-def run_stepwise(bench: Workbench, spec: StepwiseModel, label: str, how: How) -> ModelRun:
-    """Start, integrate, sample."""
-    model = bench.model(spec)
-    start, building = timed(lambda: start_configuration(bench, model))
+class StepwiseRunner(_InSteps):
+    """The reduced equations of a Multi-Phi model by solve_ivp."""
 
-    def solve() -> StepwiseRun:
-        return solve_stepwise(model, bench.t_end, start, method=spec.method, rtol=spec.rtol)
+    @property
+    def label(self) -> str:
+        method = f"{self.spec.method}, rtol {self.spec.rtol:g}"
+        return f"solve_ivp, {method}, compliant levels, {modes_words(self.spec.modes)}"
 
-    solved, first, repeats = repeated(lambda: timed(solve), bench.repeats)
-    run = ModelRun(
-        name=spec.name,
-        kind=spec.kind,
-        label=label,
-        dofs=solved.segments[0].level.level.modes,
-        status="failed" if solved.message else "ok",
-        message=solved.message,
-        steps=solved.steps,
-        offline_s=bench.structure_s + building,
-        first_s=first,
-        repeats_s=repeats,
-    )
-    return sampled(bench, run, solved.histories, solved.contact_intervals) if run.ok else run
+    def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
+        model, start = prepared
+        given = {"method": self.spec.method, "rtol": self.spec.rtol}
+        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **given))
+
+    def outcome(self, prepared: Any, answer: StepwiseRun) -> dict[str, Any]:
+        return {
+            "dofs": answer.segments[0].level.level.modes,
+            "status": "failed" if answer.message else "ok",
+            "message": answer.message,
+            "steps": answer.steps,
+        }
 
 
-def sampled(
-    bench: Workbench,
-    run: ModelRun,
-    histories_of: Callable[[Sequence[str], np.ndarray], StepwiseHistories],
-    intervals_of: Callable[[str], list[tuple[float, float]]],
-) -> ModelRun:
-    """A run of a method with steps with its histories, or failed for an energy gain.
+class SplittingRunner(_InSteps):
+    """A Craig-Bampton component by Strang splitting; an explosion is a failed run."""
 
-    histories_of: points at times (k,) [s]; intervals_of: when a contact is closed [s].
-    """
-    histories, sampling = timed(lambda: histories_of(bench.points, bench.time))
-    energy_time = np.linspace(0.0, bench.t_end, round(bench.t_end / ENERGY_INTERVAL) + 1)
-    energy = histories_of((), energy_time).energy
-    gained = energy_gain(energy_time, energy)
-    if gained:
-        return replace(run, status="failed", message=gained)
-    forces = histories.contact_force
-    fields: dict[str, Any] = {
-        "time": bench.time,
-        "points": histories.points,
-        "gaps": histories.gaps,
-        "contact_force": forces,
-        "contact_intervals": {name: interval_array(intervals_of(name)) for name in forces},
-        "impulse": {name: float(np.trapezoid(force, bench.time)) for name, force in forces.items()},
-    }
-    return replace(run, energy_time=energy_time, energy=energy, sampling_s=sampling, **fields)
+    compiled = True
+
+    def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
+        return partial(answer.histories, self.bench.structure)
+
+    @property
+    def label(self) -> str:
+        modes = f"{self.spec.modes} + {len(self.bench.interface)} modes"
+        return f"Strang splitting, {modes}, step {1e6 * self.spec.step:g} us"
+
+    def prepare(self) -> tuple[Splitting, np.ndarray]:
+        bench = self.bench
+        contacts = bench.contacts(rigid=False)
+        component = splitting(bench.structure, contacts, bench.interface, self.spec.modes)
+        return component, start_configuration(bench, MultiPhiModel(bench.structure, contacts))
+
+    def solve(self, prepared: tuple[Splitting, np.ndarray]) -> tuple[SplittingRun, float]:
+        component, start = prepared
+        with np.errstate(over="ignore", invalid="ignore"):
+            return timed(lambda: component.run(start, self.bench.t_end, self.spec.step))
+
+    def outcome(self, prepared: tuple[Splitting, np.ndarray], answer: SplittingRun) -> dict[str, Any]:
+        return {
+            "dofs": len(prepared[0].squares),
+            "status": "ok" if answer.finite else "failed",
+            "message": "" if answer.finite else "its motion has grown beyond all numbers",
+            "steps": answer.steps,
+        }

@@ -21,15 +21,14 @@ def timed(run: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - started
 
 
-def repeated(run: Callable[[], tuple[T, float]], fewest: int) -> tuple[T, float, tuple[float, ...]]:
-    """Of a run that gives (result, seconds): the first result, its time, and the times of the repeats.
+def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float, ...]:
+    """Times [s] of the repeats of a run that took ``first`` [s] and gives the time it takes.
 
     There are ``fewest`` of them as far as they fit into REPEAT_BUDGET_S, none for 0; more of short runs, for STEADY_S.
     """
-    result, first = run()
     repeats: list[float] = []
     spent = 0.0
     while fewest and (len(repeats) < fewest or spent < STEADY_S) and first + spent < REPEAT_BUDGET_S:
-        repeats.append(run()[1])
+        repeats.append(run())
         spent += repeats[-1]
-    return result, first, tuple(repeats)
+    return tuple(repeats)

@@ -1,5 +1,5 @@
 """A scene: its file, what it means as mechanics, and the bench on which its models are built.
 
-Order: fields, places, toml_file, structure_tables, law_tables, load_tables, demands, model_kinds, scene_file, scenes,
-file_reference, scene_laws, scene_friction, scene_loads, described, mechanics, discretised, workbench.
+Order: fields, places, toml_file, law_tables, load_tables, parts, structure_tables, model_kinds, scene_file,
+scenes, file_reference, scene_loads, mechanics, discretised, workbench.
 """

@@ -8,14 +8,13 @@ from __future__ import annotations
 import functools
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
 from multiphi_exudyn.mechanics.assembly import Assembly, assemble
-from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.beam import Beam, Clamp
 from multiphi_exudyn.mechanics.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.beams import Beams
 from reference_models.full_beam import FullBeam, FullBeamSettings
@@ -23,34 +22,24 @@ from reference_models.full_beam import FullBeam, FullBeamSettings
 __all__ = ["LinearBeams", "Mesh", "discretised"]
 
 KEPT = 32  # discretised beams kept for later scenes; each is a few matrices of some 100 DoFs
-_Part = tuple[str, tuple[Section, ...], tuple[tuple[str, float], ...], tuple[PointMass, ...], Clamp]
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """What discretised beams are kept by: the beams as tuples, the kind of full beam (None: linear ones), elements."""
+    """Beams, and what discretises them: a kind of full beam (None: linear elements), and how many elements of each.
 
-    parts: tuple[_Part, ...]
-    ties: tuple[tuple[tuple[str, float], ...], ...]
+    written: the beams in full, by which meshes are compared.
+    """
+
+    beams: Beams = field(compare=False)
     kind: str | None
     elements: int
+    written: str
 
     @classmethod
     def of(cls, beams: Beams, kind: str | None, elements: int) -> Mesh:
         """Beams in elements of a kind."""
-        parts = tuple(
-            (name, tuple(beam.sections), tuple(beam.points.items()), tuple(beam.masses), beam.clamp)
-            for name, beam in beams.parts.items()
-        )
-        return cls(parts, tuple(tuple(tie.items()) for tie in beams.ties), kind, elements)
-
-    @property
-    def beams(self) -> Beams:
-        """The beams again."""
-        named = {
-            name: Beam(sections, dict(points), masses, clamp) for name, sections, points, masses, clamp in self.parts
-        }
-        return Beams(named, tuple(dict(tie) for tie in self.ties))
+        return cls(beams, kind, elements, repr(asdict(beams)))
 
 
 class LinearBeams:

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+import re
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    WithJsonSchema,
+)
 from pydantic_core import PydanticCustomError
+
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 
 __all__ = [
     "Finite",
@@ -21,9 +34,14 @@ __all__ = [
     "Stiffness",
     "Table",
     "by_key",
+    "inside",
     "numbered",
     "place_in_words",
 ]
+
+REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
+
+T = TypeVar("T")
 
 
 def _not_zero(value: float) -> float:
@@ -74,7 +92,25 @@ def place_in_words(at: str | Mapping[str, float]) -> str:
     return at if isinstance(at, str) else " and ".join(f"{factor:+g} {name}" for name, factor in at.items())
 
 
+def inside(place: str, build: Callable[[], T]) -> T:
+    """What ``build`` gives; its error names the place, and the field inside it where it begins with a dot."""
+    try:
+        return build()
+    except MultiPhiError as error:
+        text = " ".join(str(error).split())
+        raise MultiPhiValueError(f"{place}{'' if text.startswith('.') else ': '}{text}") from error
+
+
 class Table(BaseModel):
-    """A table of a scene file: every field typed, none unknown."""
+    """A table of a scene file: every field typed, none unknown; the remark behind a field describes it."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = handler.resolve_ref_schema(handler(core))
+        owners = [owner for owner in reversed(cls.__mro__) if issubclass(owner, Table)]
+        remarks = dict(remark for owner in owners for remark in REMARK.findall(inspect.getsource(owner)))
+        for name, field in schema["properties"].items():
+            field |= {"description": remarks[name]} if name in remarks else {}
+        return schema

@@ -1,22 +1,21 @@
 """The fields of a kind of file, table by table, as a page in Markdown, from the classes that check it.
 
-What a table is stands in its class's docstring, what a field is in the remark behind it.
+What a table is stands in its class's docstring, what a field is in the remark behind it (fields.py).
 """
 
 from __future__ import annotations
 
 import inspect
 import json
-import re
-import typing
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
+from multiphi_exudyn.study.scene.toml_file import kind_of, tables_in
+
 __all__ = ["file_reference"]
 
-REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
 LIMITS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 MANY = 5  # kinds of values from which a field is said to take any
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
@@ -34,41 +33,24 @@ def _tables(whole: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
         path, table = waiting.pop(0)
         yield path, table
         for name, field in table.model_fields.items():
-            for inside in _models(field.annotation):
+            for inside in tables_in(field.annotation):
                 if inside not in met:
                     met.add(inside)
                     waiting.append((f"{path}.{name}".lstrip("."), inside))
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Classes of tables in an annotation."""
-    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inside in typing.get_args(annotation):
-        yield from _models(inside)
-
-
 def _section(path: str, table: type[BaseModel]) -> str:
     """Heading, what the table is, and its fields."""
-    kinds = typing.get_args(table.model_fields["kind"].annotation) if "kind" in table.model_fields else ()
-    kind = f", kind = {json.dumps(kinds[0])}" if kinds else ""
+    kind = f", kind = {json.dumps(kind_of(table))}" if kind_of(table) else ""
     heading = f"## `{path}`{kind}" if path else "## The file"
     fields = table.model_json_schema()["properties"]
     rows = [
-        f"| `{name}` | {_type(field)} | {_default(table, name)} | {remark} |"
-        for (name, field), remark in zip(fields.items(), _remarks(table, fields), strict=True)
+        f"| `{name}` | {_type(field)} | {_default(table, name)} | {field.get('description', '')} |"
+        for name, field in fields.items()
         if name != "kind"
     ]
     text = inspect.getdoc(table) or ""
     return "\n".join([heading, "", text, "", "| field | value | default | |", "|---|---|---|---|", *rows, ""])
-
-
-def _remarks(table: type[BaseModel], names: Mapping[str, Any]) -> list[str]:
-    found: dict[str, str] = {}
-    for owner in reversed(table.__mro__):
-        if owner is not BaseModel and issubclass(owner, BaseModel):
-            found |= dict(REMARK.findall(inspect.getsource(owner)))
-    return [found.get(name, "") for name in names]
 
 
 def _default(table: type[BaseModel], name: str) -> str:

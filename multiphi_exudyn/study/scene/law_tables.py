@@ -4,16 +4,19 @@
 
 A positive slope of F is a spring that pulls back. A shape is followed by straight segments on its ``span``, to a
 ``tolerance`` or by so many ``segments`` (multiphi_exudyn.mechanics.force_law); the full beam has the shape itself.
+Every table gives its law of multiphi_exudyn.mechanics.force_law, and itself in words.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from multiphi_exudyn.study.scene.fields import Finite, Name, NotZero, Place, Positive, Table
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.study.scene.fields import Finite, Name, NotZero, Place, Positive, Table, place_in_words
 
 __all__ = ["CubicLawSpec", "HertzLawSpec", "LawSpec", "MagnetLawSpec", "TableLawSpec"]
 
@@ -24,6 +27,13 @@ class _Law(Table):
     name: Name
     at: Place  # a point, or {point = coefficient, ...}
 
+    def in_words(self) -> str:
+        """The law as part of a sentence."""
+        return f"the force law {self.name} at {place_in_words(self.at)} ({self._words()})"
+
+    def _words(self) -> str:
+        raise NotImplementedError
+
 
 class _FollowedLaw(_Law):
     """A shape that is followed by segments, given by exactly one of tolerance and segments."""
@@ -31,6 +41,13 @@ class _FollowedLaw(_Law):
     span: tuple[Finite, Finite]  # m, of q; beyond it the last segments go on
     tolerance: float | None = None  # of the largest force on the span
     segments: int | None = None  # number of straight segments; either this or a tolerance
+
+    def _shape(self, q: Any) -> Any:
+        raise NotImplementedError
+
+    def built(self) -> ForceLaw:
+        """Its shape followed by segments; raises the errors of ForceLaw."""
+        return ForceLaw(self.at, self._shape, self.tolerance, self.name, self.span, self.segments)
 
 
 class TableLawSpec(_Law):
@@ -40,6 +57,13 @@ class TableLawSpec(_Law):
     q: tuple[Finite, ...]  # m, ascending
     force: tuple[Finite, ...]  # F, N
 
+    def built(self) -> ForceLaw:
+        """Its lines; raises the errors of ForceLaw."""
+        return ForceLaw(self.at, (self.q, self.force), name=self.name)
+
+    def _words(self) -> str:
+        return f"a table of {len(self.q)} places"
+
 
 class CubicLawSpec(_FollowedLaw):
     """F = k1 q + k3 q^3: k3 > 0 hardens, k3 < 0 softens."""
@@ -47,6 +71,12 @@ class CubicLawSpec(_FollowedLaw):
     kind: Literal["cubic"]
     k1: Finite  # N/m
     k3: Finite  # N/m^3
+
+    def _shape(self, q: Any) -> Any:
+        return self.k1 * q + self.k3 * q**3
+
+    def _words(self) -> str:
+        return f"{self.k1:g} N/m q {self.k3:+g} N/m³ q³"
 
 
 class HertzLawSpec(_FollowedLaw):
@@ -59,6 +89,12 @@ class HertzLawSpec(_FollowedLaw):
     stiffness: Positive  # N/m^exponent
     gap: Finite  # m
     exponent: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.5
+
+    def _shape(self, q: Any) -> Any:
+        return -self.stiffness * np.maximum(-q - self.gap, 0.0) ** self.exponent
+
+    def _words(self) -> str:
+        return f"{self.stiffness:g} N/m^{self.exponent:g} beyond a gap of {1e3 * self.gap:g} mm"
 
 
 class MagnetLawSpec(_FollowedLaw):
@@ -73,6 +109,12 @@ class MagnetLawSpec(_FollowedLaw):
         if min(self.span) <= self.distance <= max(self.span):
             raise PydanticCustomError("span", "a span that does not contain q = distance, where the magnet is")
         return self
+
+    def _shape(self, q: Any) -> Any:
+        return -self.strength * np.sign(self.distance - q) / (self.distance - q) ** 2
+
+    def _words(self) -> str:
+        return f"a magnet of {self.strength:g} N m² at {1e3 * self.distance:+g} mm"
 
 
 LawSpec = Annotated[

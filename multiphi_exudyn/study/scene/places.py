@@ -6,7 +6,7 @@ every entry that is there. Names may have dots themselves. A place may be a whol
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
@@ -15,8 +15,6 @@ from multiphi_exudyn.mechanics.arguments import one_of
 __all__ = ["with_value"]
 
 EVERY = "*"
-
-Change = Callable[[Any, Sequence[str]], Any]  # a place further in, and what is left of its parts -> its new content
 
 
 def with_value(data: Mapping[str, Any], place: str, value: Any) -> dict[str, Any]:
@@ -32,33 +30,29 @@ def _changed(given: Any, parts: Sequence[str], value: Any, place: str) -> Any:
     if not parts:
         return value
     if isinstance(given, Mapping):
-        return _table(given, parts, lambda inner, rest: _changed(inner, rest, value, place))
+        count = _names(parts, given) or 1
+        name = ".".join(parts[:count])
+        names = list(given) if name == EVERY else [name]
+        return {**given, **{n: _changed(given.get(n, {}), parts[count:], value, place) for n in names}}
     if isinstance(given, list):
-        return _list(given, parts, lambda inner, rest: _changed(inner, rest, value, place), place)
+        chosen, count = _entries(given, parts, place)
+        return [_changed(e, parts[count:], value, place) if i in chosen else e for i, e in enumerate(given)]
     raise MultiPhiValueError(f"{place}: got {'.'.join(parts)!r} inside {given!r}, need a field of a table or a list")
 
 
-def _table(given: Mapping[str, Any], parts: Sequence[str], change: Change) -> dict[str, Any]:
-    if parts[0] == EVERY:
-        return {name: change(inner, parts[1:]) for name, inner in given.items()}
-    count = _names(parts, given) or 1
-    name = ".".join(parts[:count])
-    return {**given, name: change(given.get(name, {}), parts[count:])}
-
-
-def _list(given: list[Any], parts: Sequence[str], change: Change, place: str) -> list[Any]:
+def _entries(given: list[Any], parts: Sequence[str], place: str) -> tuple[set[int], int]:
+    """Which entries of a list the first parts name, and how many parts these are."""
     names = [entry.get("name") if isinstance(entry, Mapping) else None for entry in given]
-    count = _names(parts, [name for name in names if isinstance(name, str)])
-    if count:
-        chosen = {i for i, name in enumerate(names) if name == ".".join(parts[:count])}
-    elif parts[0] == EVERY:
-        chosen, count = set(range(len(given))), 1
-    else:
-        chosen, count = {int(parts[0])} if parts[0].isdecimal() else set(), 1
-    if not chosen or max(chosen) >= len(given):
-        known = [EVERY, *map(str, range(len(given))), *(name for name in names if isinstance(name, str))]
-        raise MultiPhiValueError(f"{place}: got {parts[0]!r}, need {one_of(parts[0], known, 'entries')}")
-    return [change(entry, parts[count:]) if i in chosen else entry for i, entry in enumerate(given)]
+    known = [name for name in names if isinstance(name, str)]
+    count = _names(parts, known) or 1
+    chosen = {i for i, name in enumerate(names) if name == ".".join(parts[:count])}
+    numbers = set(range(len(given)))
+    if not chosen:
+        chosen = numbers if parts[0] == EVERY else numbers & {int(parts[0]) if parts[0].isdecimal() else -1}
+    if not chosen:
+        entries = [EVERY, *map(str, numbers), *known]
+        raise MultiPhiValueError(f"{place}: got {parts[0]!r}, need {one_of(parts[0], entries, 'entries')}")
+    return chosen, count
 
 
 def _names(parts: Sequence[str], known: Any) -> int:

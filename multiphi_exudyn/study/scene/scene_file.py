@@ -11,6 +11,9 @@ from typing import Annotated
 
 from pydantic import Field, Tag
 
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.scene.fields import (
     Finite,
     Name,
@@ -22,20 +25,14 @@ from multiphi_exudyn.study.scene.fields import (
     Table,
     by_key,
     numbered,
+    place_in_words,
 )
 from multiphi_exudyn.study.scene.law_tables import LawSpec
 from multiphi_exudyn.study.scene.load_tables import LoadSpec
 from multiphi_exudyn.study.scene.model_kinds import ModelSpec
 from multiphi_exudyn.study.scene.structure_tables import StructureSpec
 
-__all__ = [
-    "ContactSpec",
-    "DisplacedStart",
-    "FrictionSpec",
-    "LoadedStart",
-    "ModalDampingSpec",
-    "SceneFile",
-]
+__all__ = ["DisplacedStart", "LoadedStart", "SceneFile"]
 
 
 class ContactSpec(Table):
@@ -53,6 +50,10 @@ class ContactSpec(Table):
     tangential_stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
     tangential_velocity: Finite = 0.0  # m/s, of the counter-surface along it
     count: Annotated[int, Field(ge=1)] = 1  # how many contacts of this kind
+
+    def built(self) -> UnilateralContact:
+        """The contact; raises the errors of UnilateralContact."""
+        return UnilateralContact(**self.model_dump(exclude_defaults=True))
 
     @property
     def row(self) -> tuple[ContactSpec, ...]:
@@ -78,6 +79,16 @@ class FrictionSpec(Table):
     stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
     velocity: Finite = 0.0  # m/s, of the counter-surface along the direction
 
+    def built(self) -> Friction:
+        """The friction; raises the errors of Friction."""
+        return Friction(**self.model_dump())
+
+    def in_words(self) -> str:
+        """The friction as part of a sentence."""
+        spring = "without a spring" if math.isinf(self.stiffness) else f"a spring of {self.stiffness:g} N/m in series"
+        place = place_in_words(self.direction)
+        return f"the friction {self.name} at {place} (at most {self.limit:g} N, {spring})"
+
 
 class DisplacedStart(Table):
     """Static load at ``load_at``, as large as moves ``measured_at`` by ``displacement`` [m]."""
@@ -86,12 +97,20 @@ class DisplacedStart(Table):
     measured_at: Name  # a point
     displacement: NotZero  # m
 
+    def in_words(self) -> str:
+        """How far, as part of a sentence."""
+        return f"{1e3 * self.displacement:+g} mm at {self.measured_at}"
+
 
 class LoadedStart(Table):
     """Static load ``force`` [N] at ``load_at``."""
 
     load_at: Name  # a point
     force: NotZero  # N
+
+    def in_words(self) -> str:
+        """How strong, as part of a sentence."""
+        return f"{self.force:+g} N"
 
 
 StartSpec = Annotated[
@@ -106,12 +125,20 @@ class ModalDampingSpec(Table):
     modal_ratios: tuple[NotNegative, ...]  # 0.01 is 1 %
     beyond: NotNegative | None = None  # of all further modes; none given: undamped
 
+    def built(self) -> ModalDamping:
+        """The damping."""
+        return ModalDamping(self.modal_ratios, self.beyond)
+
 
 class RayleighDampingSpec(Table):
     """C = alpha M + beta K."""
 
     alpha: NotNegative  # 1/s
     beta: NotNegative  # s
+
+    def built(self) -> RayleighDamping:
+        """The damping."""
+        return RayleighDamping(self.alpha, self.beta)
 
 
 DampingSpec = Annotated[

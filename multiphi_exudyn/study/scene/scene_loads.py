@@ -6,26 +6,24 @@ depends on its mesh and is given here by who has the mesh.
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
 from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sweep, TimeFunction
-from multiphi_exudyn.study.scene.fields import place_in_words
+from multiphi_exudyn.study.scene.fields import inside, place_in_words
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
     CourseSpec,
     GravitySpec,
     HarmonicCourse,
-    HarmonicLoadSpec,
     LoadSpec,
     SampledCourse,
     SampledLoadSpec,
@@ -36,7 +34,8 @@ from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["described_loads", "loads_of"]
 
-
+FORCES: dict[str, Callable[..., Load]] = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "sweep": SweepLoad}
+COURSES: dict[str, Callable[..., TimeFunction]] = {"harmonic": Harmonic, "sweep": Sweep}
 Given = TypeVar("Given", bound=At)  # direction of a scene file
 
 
@@ -48,26 +47,23 @@ def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
     return tuple(_load(scene, f"loads[{i}]", spec, transverse) for i, spec in enumerate(scene.file.loads))
 
 
-def described_loads(scene: Scene) -> tuple[str, ...]:
+def described_loads(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
     """Every load in words, as parts of a sentence."""
-    return tuple(_described(spec) for spec in scene.file.loads)
+    return tuple(map(_described, loads))
 
 
 def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | None) -> Load:
     if isinstance(spec, GravitySpec):
         return Gravity(_along(scene, field, spec.direction, transverse), spec.acceleration)
     if isinstance(spec, BaseMotionSpec):
-        return BaseMotion(_along(scene, field, spec.direction, transverse), _smooth(spec.course), spec.fixed_stops)
+        course = _course(scene, f"{field}.course", spec.course)
+        return BaseMotion(_along(scene, field, spec.direction, transverse), course, spec.fixed_stops)
     if isinstance(spec, StopMotionSpec):
         return StopMotion(spec.contact, _course(scene, f"{field}.course", spec.course))
-    if isinstance(spec, ConstantLoadSpec):
-        return ConstantLoad(spec.at, spec.force)
     if isinstance(spec, SampledLoadSpec):
         samples = _samples(scene, field, spec)
         return SampledLoad(spec.at, samples.time, samples.values)
-    if isinstance(spec, HarmonicLoadSpec):
-        return HarmonicLoad(spec.at, spec.amplitude, spec.frequency_hz, spec.phase)
-    return SweepLoad(spec.at, spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
+    return FORCES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
 def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
@@ -77,23 +73,16 @@ def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray
     return direction
 
 
-def _course(scene: Scene, field: str, spec: CourseSpec) -> TimeFunction:
-    return _samples(scene, field, spec) if isinstance(spec, SampledCourse) else _smooth(spec)
-
-
-def _smooth(spec: HarmonicCourse | SweepCourse) -> Harmonic | Sweep:
-    if isinstance(spec, HarmonicCourse):
-        return Harmonic(spec.amplitude, spec.frequency_hz, spec.phase)
-    return Sweep(spec.amplitude, spec.start_hz, spec.end_hz, spec.duration, spec.law, spec.tolerance)
+def _course(scene: Scene, field: str, spec: CourseSpec) -> Any:
+    if isinstance(spec, SampledCourse):
+        return _samples(scene, field, spec)
+    return COURSES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
 def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
-    try:
-        if spec.csv is not None:
-            return Sampled.from_csv(Path(scene.path).parent / spec.csv, spec.column)
-        return Sampled(spec.time, spec.values)  # type: ignore[arg-type]
-    except MultiPhiError as error:
-        raise MultiPhiValueError(f"{scene.path}: {field}: {' '.join(str(error).split())}") from error
+    if spec.csv is None:
+        return inside(f"{scene.path}: {field}", lambda: Sampled(spec.time, spec.values))  # type: ignore[arg-type]
+    return inside(f"{scene.path}: {field}", lambda: Sampled.from_csv(scene.path.parent / str(spec.csv), spec.column))
 
 
 def _described(spec: LoadSpec) -> str:

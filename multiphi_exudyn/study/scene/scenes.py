@@ -39,8 +39,7 @@ class Scene:
 
 def shipped_scenes() -> dict[str, str]:
     """name -> title of the scenes that come with the package."""
-    files = sorted((p for p in _shipped_folder().iterdir() if p.suffix == ".toml"), key=lambda p: p.stem)
-    return {path.stem: load_scene(path.stem).file.title for path in files}
+    return {name: load_scene(name).file.title for name in _shipped()}
 
 
 def load_scene(source: str, *, t_end: float | None = None, modes: int | None = None) -> Scene:
@@ -77,14 +76,16 @@ def refuse(scene: Scene, field: str, given: object, needed: str) -> NoReturn:
     raise MultiPhiValueError(f"{scene.path}: {field}: got {given!r}, need {needed}")
 
 
-def _shipped_folder() -> Path:
-    return Path(str(resources.files("multiphi_exudyn.study.scene"))) / "shipped"
+def _shipped() -> dict[str, Path]:
+    """name -> file, in alphabetical order."""
+    folder = Path(str(resources.files("multiphi_exudyn.study.scene"))) / "shipped"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"), key=lambda path: path.stem)}
 
 
 def _find(source: str, folder: Path) -> Path:
-    shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
+    shipped = _shipped()
     if source in shipped:
-        return _shipped_folder() / f"{source}.toml"
+        return shipped[source]
     if (folder / source).is_file():
         return folder / source
     raise MultiPhiValueError(f"SCENE: got {source!r}, need a TOML file or {one_of(source, shipped)}")
@@ -94,11 +95,10 @@ def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     """The scene a file is a variant of (its field ``base``), the file's own fields in place of its fields."""
     if "base" not in data:
         return data
-    base = data.pop("base")
-    shipped = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
-    if base not in shipped:
+    base, shipped = data.pop("base"), _shipped()
+    if base not in list(shipped):
         raise MultiPhiValueError(f"{path}: base: got {base!r}, need {one_of(base, shipped)}")
-    content = read_toml(_shipped_folder() / f"{base}.toml")
+    content = read_toml(shipped[base])
     if "base" in content:
         raise MultiPhiValueError(f"{path}: base: got {base!r}, need a scene that has no base itself")
     return content | data

@@ -1,12 +1,24 @@
-"""The table ``[structure]`` of a scene file: the rig, beams and their parts, matrices; SI units."""
+"""The table ``[structure]`` of a scene file: the rig, beams and their parts, matrices; SI units.
+
+Every table gives what it describes as mechanics; an error that begins with a dot names a field inside it.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
+import scipy.sparse
 from pydantic import Field, Tag
 
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.matrix_files import read_array, read_arrays, read_structure
+from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.fields import (
     Finite,
     Name,
@@ -16,20 +28,14 @@ from multiphi_exudyn.study.scene.fields import (
     Stiffness,
     Table,
     by_key,
+    inside,
+    numbered,
 )
+from multiphi_exudyn.study.scene.parts import Mechanics
+from reference_models.beams import Beams, as_beams
+from reference_models.rig import assumptions, rig_beam, rig_contact, rig_damping
 
-__all__ = [
-    "BeamSpec",
-    "BeamStructure",
-    "BeamsStructure",
-    "MatrixFiles",
-    "MatrixStructure",
-    "PointRow",
-    "RectangleSection",
-    "RigStructure",
-    "SectionSpec",
-    "StructureSpec",
-]
+__all__ = ["RigStructure", "StructureSpec"]
 
 PartName = Annotated[str, Field(min_length=1, pattern=r"^[\w-]+$")]
 TieSpec = Annotated[dict[Name, NotZero], Field(min_length=1, max_length=2)]  # the sum is zero; of one: held
@@ -43,6 +49,17 @@ class RigStructure(Table):
     clamp_translation: Stiffness = math.inf  # N/m
     clamp_rotation: Stiffness = math.inf  # N m/rad
 
+    def built(self, folder: Path) -> Mechanics:
+        """The rig with its contact and damping; ``folder``: of the scene file."""
+        clamp = Clamp(self.clamp_translation, self.clamp_rotation)
+        return Mechanics(
+            contacts=(rig_contact(self.support_stiffness),),
+            damping=rig_damping(),
+            beams=as_beams(rig_beam(self.rig, clamp)),
+            parameter_set=self.rig,
+            assumptions=assumptions(self.rig, clamp),
+        )
+
 
 class RectangleSection(Table):
     """A piece of rectangular beam, ``height`` along z."""
@@ -54,6 +71,10 @@ class RectangleSection(Table):
     youngs_modulus: Positive  # Pa
     density: Positive  # kg/m3
     poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
+
+    def section(self) -> Section:
+        """The piece."""
+        return Section.rectangle(**self.model_dump())
 
 
 class GeneralSection(Table):
@@ -67,6 +88,10 @@ class GeneralSection(Table):
     density: Positive  # kg/m3
     shear_modulus: Positive  # Pa
     shear_factor: Positive = 5 / 6  # k in the shear stiffness k G A
+
+    def section(self) -> Section:
+        """The piece."""
+        return Section(**self.model_dump())
 
 
 class MassSpec(Table):
@@ -106,11 +131,31 @@ class BeamSpec(Table):
     masses: tuple[MassSpec, ...] = ()
     clamp: ClampSpec = ClampSpec()
 
+    def built(self) -> Beam:
+        """The beam with its points, masses and clamp."""
+        masses = [PointMass(**mass.model_dump()) for mass in self.masses]
+        clamp = Clamp(**self.clamp.model_dump())
+        return Beam([section.section() for section in self.sections], dict(self._places()), masses, clamp)
+
+    def _places(self) -> Iterator[tuple[str, float]]:
+        for name, at in self.points.items():
+            if not isinstance(at, PointRow):
+                yield name, at
+            elif "{i}" not in name:
+                raise MultiPhiValueError(f"points: got the name {name!r} for {at.count} points, need one with {{i}}")
+            else:
+                places = np.linspace(at.first, at.last, at.count).tolist()
+                yield from ((numbered(name, i), x) for i, x in enumerate(places, start=1))
+
 
 class BeamStructure(Table):
     """A beam described in the scene."""
 
     beam: BeamSpec
+
+    def built(self, folder: Path) -> Mechanics:
+        """The beam; ``folder``: of the scene file."""
+        return Mechanics(beams=as_beams(inside(".beam", self.beam.built)))
 
 
 class BeamsStructure(Table):
@@ -118,6 +163,12 @@ class BeamsStructure(Table):
 
     beams: Annotated[dict[PartName, BeamSpec], Field(min_length=1)]
     ties: tuple[TieSpec, ...] = ()
+
+    def built(self, folder: Path) -> Mechanics:
+        """The beams; ``folder``: of the scene file."""
+        return Mechanics(
+            beams=Beams({n: inside(f".beams.{n}", beam.built) for n, beam in self.beams.items()}, self.ties)
+        )
 
 
 class MatrixFiles(Table):
@@ -137,6 +188,32 @@ class MatrixStructure(Table):
 
     matrices: str | MatrixFiles
     points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]
+
+    def built(self, folder: Path) -> Mechanics:
+        """The structure with its damping; ``folder``: of the scene file."""
+        structure = self._read(folder)
+        return Mechanics(matrices=structure, damping=structure.damping)
+
+    def _read(self, folder: Path) -> LinearStructure:
+        files = self.matrices
+        if isinstance(files, MatrixFiles):
+            rows = {name: _own_row(folder, name, at) if isinstance(at, str) else at for name, at in self.points.items()}
+            damping = None if files.damping is None else folder / files.damping
+            return read_structure(folder / files.mass, folder / files.stiffness, damping, rows)
+        arrays = read_arrays("matrices", folder / files)
+        rows = {name: _array(arrays, at) if isinstance(at, str) else at for name, at in self.points.items()}
+        return LinearStructure(_array(arrays, "mass"), _array(arrays, "stiffness"), arrays.get("damping"), rows)
+
+
+def _own_row(folder: Path, name: str, path: str) -> np.ndarray:
+    row = read_array(f"points[{name!r}]", folder / path)
+    return np.squeeze(row.toarray() if scipy.sparse.issparse(row) else row)
+
+
+def _array(arrays: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    if name not in arrays:
+        raise MultiPhiValueError(f"matrices: got the arrays {', '.join(arrays) or 'none'}, need {name!r}")
+    return arrays[name]
 
 
 StructureSpec = Annotated[

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import functools
+import inspect
 import json
 import sys
-from collections.abc import Mapping, Sequence
+import typing
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,7 +20,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["read_toml", "validated"]
+__all__ = ["kind_of", "read_toml", "tables_in", "validated"]
 
 Form = TypeVar("Form", bound=BaseModel)
 
@@ -59,39 +60,31 @@ def _complaint(form: type[BaseModel], error: ValidationError, data: Mapping[str,
     return "; ".join(faults[:MOST]) + more
 
 
-@functools.cache
-def _schema(form: type[BaseModel]) -> dict[str, Any]:
-    return form.model_json_schema()
-
-
 def _known(form: type[BaseModel], data: Any, location: Sequence[int | str]) -> set[str]:
     """Names of the fields that the table around a place may have."""
-    schema = _schema(form)
-    forms = _forms(schema, schema, data)
+    tables = [form]
     for part in location[:-1]:
-        if isinstance(data, Mapping) and part in data:
-            inner = [each.get("properties", {}).get(part, each.get("additionalProperties", {})) for each in forms]
-        elif isinstance(data, list) and isinstance(part, int):
-            inner = [each.get("items", {}) for each in forms]
-        else:
-            continue  # a label that the validator gives to the branch of a union
-        data = data[part]
-        forms = [each for branch in inner if branch for each in _forms(schema, branch, data)]
-    return {name for each in forms for name in each.get("properties", {})}
+        fields = [table.model_fields[str(part)] for table in tables if part in table.model_fields]
+        tables = [inner for field in fields for inner in tables_in(field.annotation)] or tables
+        if part in data if isinstance(data, Mapping) else isinstance(part, int):
+            data = data[part]  # else a label that the validator gives to the branch of a union
+    return {
+        name for table in tables if data.get("kind", kind_of(table)) == kind_of(table) for name in table.model_fields
+    }
 
 
-def _forms(schema: Mapping[str, Any], form: Any, data: Any) -> list[Mapping[str, Any]]:
-    """The branches of a form that may be meant: of tables with a kind, those of this kind."""
-    if not isinstance(form, Mapping):
-        return []
-    if "$ref" in form:
-        return _forms(schema, schema["$defs"][form["$ref"].rpartition("/")[2]], data)
-    branches = form.get("anyOf", form.get("oneOf"))
-    if branches:
-        return [each for branch in branches for each in _forms(schema, branch, data)]
-    kind = form.get("properties", {}).get("kind", {}).get("const")
-    other = isinstance(data, Mapping) and kind not in (None, data.get("kind", kind))
-    return [] if other else [form]
+def tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Classes of tables in the annotation of a field."""
+    if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inside in typing.get_args(annotation):
+        yield from tables_in(inside)
+
+
+def kind_of(table: type[BaseModel]) -> str | None:
+    """What the field ``kind`` of a table says; None where it has no such field."""
+    field = table.model_fields.get("kind")
+    return typing.get_args(field.annotation)[0] if field else None
 
 
 def _needed(item: Mapping[str, Any]) -> str:

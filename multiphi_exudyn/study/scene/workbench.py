@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,8 +25,7 @@ from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.planar_beam import beam_nodes
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.discretised import Mesh, discretised
-from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec
-from multiphi_exudyn.study.scene.mechanics import Mechanics
+from multiphi_exudyn.study.scene.fields import inside
 from multiphi_exudyn.study.scene.model_kinds import (
     CraigBamptonModel,
     FullModel,
@@ -35,6 +33,7 @@ from multiphi_exudyn.study.scene.model_kinds import (
     StepwiseModel,
     UserObjectModel,
 )
+from multiphi_exudyn.study.scene.parts import Mechanics
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.scene_loads import loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
@@ -56,7 +55,6 @@ class Workbench:
     """A scene ready to run.
 
     structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
-    longest_period: of the open level without force laws [s]; infinite where it has a rigid-body mode.
     repeats: of a model's online part, for its time; more where it is short.
     """
 
@@ -65,8 +63,13 @@ class Workbench:
     structure: LinearStructure
     structure_s: float
     time: np.ndarray
-    longest_period: float
     repeats: int = REPEATS
+
+    @functools.cached_property
+    def longest_period(self) -> float:
+        """Of the open level without force laws [s]; infinite where it has a rigid-body mode."""
+        lowest = float(MultiPhiModel(self.structure, modes=1).level(()).frequencies[0])
+        return 1 / lowest if lowest > 0 else math.inf
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -109,20 +112,20 @@ class Workbench:
     @property
     def interface(self) -> tuple[str, ...]:
         """Points a Craig-Bampton component keeps: of contacts and outputs, those independent of each other."""
-        return _interface(self.structure, self.mechanics, self.points)
+        return independent_points(self.structure, dict.fromkeys([*self.contact_points, *self.points]))
+
+    @property
+    def contact_points(self) -> tuple[str, ...]:
+        """Points that contacts act on, each once."""
+        directions = [contact.direction for contact in self.mechanics.contacts]
+        points = (name for at in directions for name in ([at] if isinstance(at, str) else at))
+        return tuple(dict.fromkeys(points))
 
     @functools.cached_property
     def loads(self) -> tuple[Load, ...]:
         """The scene's loads on its structure."""
-        return loads_of(self.scene, self._transverse)
-
-    @property
-    def _transverse(self) -> np.ndarray | None:
-        """Unit rigid-body motion along +z (n,) of a beam that has a load along it."""
-        along = any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.scene.file.loads)
-        if self.mechanics.beams is None or not along:
-            return None
-        return discretised(_mesh(self.scene, self.mechanics))[0].transverse
+        along = self.mechanics.beams is not None and self.mechanics.carried
+        return loads_of(self.scene, discretised(_mesh(self.scene, self.mechanics))[0].transverse if along else None)
 
     def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
         """The scene's loads on a full beam's own mesh."""
@@ -136,18 +139,32 @@ class Workbench:
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
-        return _full_beam(self.scene, self.mechanics, spec)
+        given = self.mechanics
+        assert given.beams is not None, "checked where the scene was loaded"
+        settings = FullBeamSettings(
+            kind=spec.beam,
+            elements=spec.elements,
+            step=spec.step,
+            contact=spec.contact,
+            spectral_radius=spec.spectral_radius,
+            newton_tolerance=spec.newton_tolerance,
+            output_step=self.scene.file.outputs.interval,
+        )
+        return FullBeam(given.beams, given.contacts, settings, given.force_laws, given.frictions)
 
 
 def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
     """Build what the scene's models share; raises MultiPhiValueError naming file and field."""
-    structure, elapsed = _structure(scene, mechanics)
-    structure = replace(structure, damping=mechanics.damping)
-    _check_modes(scene, structure, mechanics)
+    structure, elapsed = mechanics.matrices, 0.0
+    if structure is None:
+        beams, elapsed = discretised(_mesh(scene, mechanics))  # the same beams are linearised once for all scenes
+        structure = beams.structure
     outputs = scene.file.outputs
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
-    lowest = float(MultiPhiModel(structure, modes=1).level(()).frequencies[0])
-    return Workbench(scene, mechanics, structure, elapsed, grid, 1 / lowest if lowest > 0 else math.inf)
+    bench = Workbench(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
+    _check_modes(bench)
+    inside(f"{scene.path}: structure", lambda: bench.longest_period)  # refuses a structure that has no modes
+    return bench
 
 
 def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
@@ -187,14 +204,6 @@ def mesh_nodes(scene: Scene, mechanics: Mechanics) -> dict[str, np.ndarray]:
     return {name: beam_nodes(beam, elements) for name, beam in mechanics.beams.parts.items()}
 
 
-def _structure(scene: Scene, mechanics: Mechanics) -> tuple[LinearStructure, float]:
-    """M, K and points, and what it took to get them [s]; the same beam is linearised once for all scenes."""
-    if mechanics.matrices is not None:
-        return mechanics.matrices, 0.0
-    beams, seconds = discretised(_mesh(scene, mechanics))
-    return beams.structure, seconds
-
-
 def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
     """The beams, and what discretises them: kind and elements of the reference, or of another full model."""
     full = [model for model in scene.models.values() if model.kind == "full"]
@@ -204,51 +213,29 @@ def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
     return Mesh.of(mechanics.beams, kind, elements)
 
 
-def _full_beam(scene: Scene, mechanics: Mechanics, spec: FullModel) -> FullBeam:
-    assert mechanics.beams is not None, "checked where the scene was loaded"
-    settings = FullBeamSettings(
-        kind=spec.beam,
-        elements=spec.elements,
-        step=spec.step,
-        contact=spec.contact,
-        spectral_radius=spec.spectral_radius,
-        newton_tolerance=spec.newton_tolerance,
-        output_step=scene.file.outputs.interval,
-    )
-    return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws, mechanics.frictions)
-
-
-def _interface(structure: LinearStructure, mechanics: Mechanics, outputs: Sequence[str]) -> tuple[str, ...]:
-    return independent_points(structure, dict.fromkeys([*_contact_points(mechanics), *outputs]))
-
-
-def _contact_points(mechanics: Mechanics) -> list[str]:
-    """Points the contacts act on, each once."""
-    directions = [contact.direction for contact in mechanics.contacts]
-    return list(dict.fromkeys(name for given in directions for name in ([given] if isinstance(given, str) else given)))
-
-
-def _check_modes(scene: Scene, structure: LinearStructure, mechanics: Mechanics) -> None:
+def _check_modes(bench: Workbench) -> None:
     """No model has more modes than there are."""
-    most = structure.n - mechanics.directions
+    given = bench.mechanics.directions
+    most = bench.structure.n - given
     if most < 1:
         raise MultiPhiValueError(
-            f"{scene.path}: structure: got {structure.n} degrees of freedom and {mechanics.directions} contacts, "
+            f"{bench.scene.path}: structure: got {bench.structure.n} degrees of freedom and {given} contacts, "
             "frictions or force laws, need more degrees of freedom than those"
         )
-    for model in scene.models.values():
+    for model in bench.scene.models.values():
         if model.kind == "craig-bampton":
-            _check_component(scene, structure, mechanics, model)
+            _check_component(bench, model)
         elif model.kind != "full" and model.modes not in (None, "all") and int(model.modes) > most:
-            refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
+            refuse(bench.scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
 
 
-def _check_component(scene: Scene, structure: LinearStructure, mechanics: Mechanics, model: CraigBamptonModel) -> None:
+def _check_component(bench: Workbench, model: CraigBamptonModel) -> None:
     """Every contact on a coordinate of its own, and no more modes than are left."""
-    interface = _interface(structure, mechanics, scene.file.outputs.points or mechanics.points)
-    missing = [name for name in _contact_points(mechanics) if name not in interface]
+    interface = bench.interface
+    missing = [name for name in bench.contact_points if name not in interface]
     if missing:
-        refuse(scene, f"kind of {model.name}", model.kind, f"another: point {missing[0]} follows from the others")
-    most = structure.n - len(interface)
+        refuse(bench.scene, f"kind of {model.name}", model.kind, f"another: point {missing[0]} follows from the others")
+    most = bench.structure.n - len(interface)
     if model.modes > most:
-        refuse(scene, f"modes of {model.name}", model.modes, f"at most {most} beside {len(interface)} interface points")
+        needed = f"at most {most} beside {len(interface)} interface points"
+        refuse(bench.scene, f"modes of {model.name}", model.modes, needed)

@@ -46,10 +46,9 @@ TIME_ROUND_OFF = 1e-12  # of the run: an event this near to a sample may lie on 
 
 @dataclass(frozen=True)
 class Sampling:
-    """times (k,) ascending; per_period: samples in the shortest period; covered: share of the run at that density."""
+    """times (k,) ascending; covered: share of the run with SAMPLES_PER_PERIOD."""
 
     times: np.ndarray
-    per_period: float
     covered: float
 
 
@@ -109,11 +108,11 @@ def sampling(trajectory: Trajectory, budget: int) -> Sampling:
     happened = trajectory.events[:: 1 + len(trajectory.events) // MOST_EVENTS]
     at = np.array([event.time for event in happened])
     if whole <= budget:
-        return Sampling(np.unique([*np.linspace(0.0, end, whole + 1), *at]), SAMPLES_PER_PERIOD, 1.0)
+        return Sampling(np.unique([*np.linspace(0.0, end, whole + 1), *at]), 1.0)
     grid = np.linspace(0.0, end, budget // 2)
     windows = _windows(trajectory, shortest, max(1, budget // 2 // SAMPLES_PER_PERIOD))
     times = np.unique(np.clip(np.concatenate([grid, at, *windows]), 0.0, end))
-    return Sampling(times, SAMPLES_PER_PERIOD, min(1.0, len(windows) * shortest / end))
+    return Sampling(times, min(1.0, len(windows) * shortest / end))
 
 
 def highest_frequency(trajectory: Trajectory) -> float:

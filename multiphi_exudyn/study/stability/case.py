@@ -26,12 +26,11 @@ STATIC_LOADS = (ConstantLoad, Gravity)
 class Pull:
     """A beam pulled and let go: what the full nonlinear beam needs beside the contacts and the end of the run.
 
-    elements, step [s]: of the full beam. displacement [m] of ``measured_at`` under a static force at ``load_at``.
+    elements, step [s]: of the full beam. displacement [m] of the point ``tip`` under a static force there.
     """
 
     beam: Beam
-    load_at: str
-    measured_at: str
+    tip: str
     displacement: float
     elements: int
     step: float
@@ -88,12 +87,6 @@ class Problem:
     def damped(self) -> bool:
         """Whether structure or contacts are."""
         return self.structure.damping is not None or any(contact.damping > 0 for contact in self.parts)
-
-    @property
-    def conservative(self) -> bool:
-        """Whether nothing but impacts may change the energy."""
-        rubs = self.frictions or any(contact.friction for contact in self.unilateral)
-        return not (self.damped or self.loads or rubs)
 
     @property
     def driven(self) -> bool:

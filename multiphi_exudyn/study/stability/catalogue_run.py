@@ -1,14 +1,13 @@
-"""Runs the catalogue: every case through every model, in turn."""
+"""The shipped catalogue, and its run: every case through every model, in turn."""
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
+from multiphi_exudyn.study.stability import beams, driven, friction, laws, starts, systems
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.catalogue import CATALOGUE
 from multiphi_exudyn.study.stability.exudyn_runs import (
     FULL_MODEL,
     USER_OBJECT,
@@ -17,11 +16,11 @@ from multiphi_exudyn.study.stability.exudyn_runs import (
 )
 from multiphi_exudyn.study.stability.native_run import Native, run_native
 from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
-from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warning_groups import kept_back
 
-__all__ = ["FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case", "warm_up"]
+__all__ = ["CATALOGUE", "FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case"]
 
+CATALOGUE = (*starts.CASES, *beams.CASES, *systems.CASES, *laws.CASES, *driven.CASES, *friction.CASES)
 IN_EXUDYN = (USER_OBJECT, FULL_MODEL)
 
 
@@ -55,14 +54,6 @@ def chosen_cases(name: str | None, quick: bool) -> list[Case]:
     if not found:
         raise MultiPhiValueError(f"--case: got {name!r}, need {one_of(name, (case.name for case in CATALOGUE))}")
     return found
-
-
-def warm_up() -> None:
-    """Compile the loop, where numba is installed and has not kept it from an earlier run: some 15 s, once."""
-    if importlib.util.find_spec("numba") is not None:
-        problem = chosen_cases("zero-gap-rigid", quick=True)[0].build(True)
-        with kept_back():
-            simulate(problem.model(), problem.t_end, problem.displacement, compiled=True)
 
 
 def run_case(case: Case, limits: Limits) -> CaseResult:

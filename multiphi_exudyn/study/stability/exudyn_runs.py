@@ -32,7 +32,6 @@ MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; 
 STEPS_PER_PERIOD = 200  # of the full model in it
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
-GRID = 10_001  # times at which two native answers are compared
 AGREEMENT = 0.01  # of the largest travel: two answers that are nearer agree
 VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
 MOST_WORDS = 200  # characters of a cause that is not our own
@@ -56,9 +55,15 @@ def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit
             cpu_limit_s=limit_s,
         )
         remark = "" if matched else f"{steps} steps allowed, {wanted} needed to match its modes: plain trapezoidal rule"
-        outcome = Outcome(USER_OBJECT, message=remark, events=len(found.events), steps=steps, time_s=time_s)
-        told = replace(outcome, warnings=found.warnings)
-        return _compared(told, problem, native, found.time, found.gaps, found.slip)
+        outcome = Outcome(
+            USER_OBJECT,
+            message=remark,
+            events=len(found.events),
+            steps=steps,
+            time_s=time_s,
+            warnings=found.warnings,
+        )
+        return _compared(outcome, problem, native, found.time, found.gaps, found.slip)
 
     return _guarded(USER_OBJECT, solve)
 
@@ -132,8 +137,8 @@ def _full_beam(
     beam = FullBeam(pull.beam, contacts, settings)
     found = beam.run(
         problem.t_end,
-        load_at=pull.load_at,
-        measured_at=pull.measured_at,
+        load_at=pull.tip,
+        measured_at=pull.tip,
         displacement=pull.displacement,
         damping=damping_matrix(replace(beam.structure, damping=problem.structure.damping)),
         progress=False,

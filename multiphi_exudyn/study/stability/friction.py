@@ -12,9 +12,8 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import HarmonicLoad, Load, SampledLoad
 from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad
-from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
-from multiphi_exudyn.study.stability.structures import chain, oscillator, stop
+from multiphi_exudyn.study.stability.structures import chain, in_a_row, stop, two_masses
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_damping
 
@@ -31,7 +30,7 @@ def _ring(limit: float, stiffness: float = math.inf, static: float | None = None
 
 def _block(friction: Friction, start: float, t_end: float = 0.5, *loads: Load, scale: float = 1.0) -> Problem:
     """1 kg on 1e4 N/m at 100 rad/s, let go ``start`` [m] away; scale: of the units of mass and of force."""
-    return Problem(oscillator(scale, 1e4 * scale), [friction], t_end, displacement=np.array([start]), loads=loads)
+    return in_a_row([scale], [1e4 * scale], [friction], t_end, [start], loads=loads)
 
 
 def _decays(scale: float) -> Problem:
@@ -60,16 +59,11 @@ def _never_sticks(problem: Problem, trajectory: Trajectory) -> str:
     return "sticks to a belt that is faster than it" if len(trajectory.stick_intervals(RING)) else ""
 
 
-def _two_masses(*contacts: Friction | UnilateralContact) -> Problem:
-    return Problem(chain([1.0, 1.0], [1e4, 1e4]), contacts, 0.5, displacement=np.array([2.5e-3, 5e-3]))
-
-
 def _many(count: int, stiffness: float) -> Problem:
     """A chain that rubs at every mass, each with another limit."""
-    structure = chain([1.0] * count, [1e4] * count)
     rings = [Friction(f"{RING}{i}", f"m{i}", 2.0 + i % 5, stiffness=stiffness) for i in range(count)]
     load = HarmonicLoad(f"m{count - 1}", 40.0, 4.0)
-    return Problem(structure, rings, 0.2, displacement=np.linspace(0, 0.02, count), loads=[load])
+    return in_a_row([1.0] * count, [1e4] * count, rings, 0.2, np.linspace(0, 0.02, count), loads=[load])
 
 
 def _beam(stiffness: float, modes: int) -> Problem:
@@ -89,16 +83,14 @@ def _between() -> Problem:
 def _uneven() -> Problem:
     """A millionth of a million times the mass."""
     rings = [Friction("light", "m0", 1.0), Friction("heavy", "m1", 1e4, stiffness=1e7)]
-    structure = chain([1e-3, 1e6], [1e4, 1e8])
-    return Problem(structure, rings, 1.0, displacement=np.array([0.01, 0.01]))
+    return in_a_row([1e-3, 1e6], [1e4, 1e8], rings, 1.0, [0.01, 0.01])
 
 
 def _dropped(sideways: float, friction: float, restitution: float = 0.0) -> Problem:
     """1 kg falls 20 mm onto a rigid floor on which it rubs, and slides to rest."""
-    structure = LinearStructure(np.eye(2), np.zeros((2, 2)), points={"m0": 0, "m1": 1})
     floor = UnilateralContact("floor", "m1", 0.0, friction=friction, tangential="m0", restitution=restitution)
-    place, velocity, weight = np.array([0.0, 0.02]), np.array([sideways, 0.0]), ConstantLoad("m1", -10.0)
-    return Problem(structure, [floor], 0.5, displacement=place, velocity=velocity, loads=[weight])
+    velocity, weight = np.array([sideways, 0.0]), ConstantLoad("m1", -10.0)
+    return in_a_row([1.0, 1.0], [0.0, 0.0], [floor], 0.5, [0.0, 0.02], velocity=velocity, loads=[weight])
 
 
 def _slides_to_rest(problem: Problem, trajectory: Trajectory) -> str:
@@ -118,7 +110,7 @@ def _rough_stops(modes: int | str = "all") -> Problem:
         UnilateralContact("above", {"m3": -1.0}, 1e-3, friction=0.3, static_friction=0.6, tangential="m4"),
     ]
     loads = [HarmonicLoad("m2", 60.0, 9.0), HarmonicLoad("m4", 40.0, 13.0)]
-    return Problem(chain([1.0] * 8, [1e4] * 8), stops, 0.5, modes=modes, loads=loads)
+    return in_a_row([1.0] * 8, [1e4] * 8, stops, 0.5, modes=modes, loads=loads)
 
 
 def _inside_cones(problem: Problem, trajectory: Trajectory) -> str:
@@ -189,9 +181,9 @@ CASES = (
     Case("friction-light-and-heavy", "A gram and a thousand tons, each rubs.",
          lambda quick: _uneven()),
     Case("friction-beside-rigid-stop", "A ring and a rigid stop on neighbours: impacts while it slips and sticks.",
-         lambda quick: _two_masses(_ring(5.0, 1e5), stop("m1", 1e-3))),
+         lambda quick: two_masses(_ring(5.0, 1e5), stop("m1", 1e-3), start=5e-3)),
     Case("friction-beside-compliant-stop", "A block without a spring beside a soft stop.",
-         lambda quick: _two_masses(_ring(5.0), stop("m1", 1e-3, 1e5)), quick=False),
+         lambda quick: two_masses(_ring(5.0), stop("m1", 1e-3, 1e5), start=5e-3), quick=False),
     Case("friction-between-bodies", "Two bodies rub on each other alone.",
          lambda quick: _between()),
     Case("friction-rigid-floor", "A block strikes a rigid floor aslant, on the edge of the cone, and slides.",

@@ -7,7 +7,8 @@
                 open -a;   closed and rigid |g|;   closed and compliant max(g, |lambda + k g + c g'| / |k|)
                 with a as in brute_force.py; a force law: |force on the structure + F(q)| / max |F'|
     pulling     most negative reaction of a rigid or viscous contact over the largest one
-    friction    see friction_judgement.py: its ways are among ``beyond``
+    friction    sticks: |T| - static limit;   slips: | |T| - limit |;   T against the slip: |T|;   all over the limit;
+                its way, |h.x - v t - T / k - (the same at the start) - slip| [m], is among ``beyond``
 
 A truncated model may leave negative gaps; its event rule says where, in the phases, and ``Trajectory.deepest_gap``
 how deep. There only what no phase excuses is wrong, and a depth that the trajectory does not report.
@@ -22,6 +23,7 @@ import numpy as np
 
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability import run_laws
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
@@ -33,7 +35,6 @@ from multiphi_exudyn.study.stability.brute_force import (
     untold_switches,
 )
 from multiphi_exudyn.study.stability.case import Problem
-from multiphi_exudyn.study.stability.friction_judgement import judge_friction
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["BEYOND", "Judgement", "judge"]
@@ -42,6 +43,8 @@ BEYOND = 1e-9  # m beyond the contact law
 FRICTION = 1e-9  # of its limit: what a friction force may be off
 PULLING = 1e-9  # of the largest reaction: round-off of a release
 REPORTED = 0.5  # of a depth that sampling finds: less must not be reported; both are sampled, on different grids
+ROUND_OFF = 1e-14  # of the largest way of a point that rubs, which a stiff spring makes a force
+MOVED = 1e-9  # of the largest way of a point that rubs: a smaller slip between two samples has no direction
 SMALL = 1e-6  # of a newton metre and of a metre: cases may be as small
 
 
@@ -92,8 +95,8 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     parts = problem.unilateral
     seen = [sample_contact(trajectory, contact, table, look.times, problem.loads) for contact in parts]
     beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
-    rubbed = [judge_friction(trajectory, friction, table, look.times) for friction in problem.frictions]
-    laws = [*(found.way for found in rubbed)] + [_beyond_law(law, trajectory, look.times) for law in problem.laws]
+    rubbed = [_rubbed(trajectory, friction, table, look.times) for friction in problem.frictions]
+    laws = [way for way, _, _ in rubbed] + [_beyond_law(law, trajectory, look.times) for law in problem.laws]
     small, ends = SMALL * problem.metre, run_laws.ends_of(trajectory)
     largest = run_laws.largest_energy(trajectory, ends, small)
     residual = _share(trajectory.ledger.residual, largest)
@@ -104,7 +107,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         energy=rise,
         residual=residual,
         events=len(trajectory.events),
-        missed=sum(found.missed for found in rubbed)
+        missed=sum(untold for _, _, untold in rubbed)
         + sum(untold_switches(trajectory, table, law.name) for law in problem.laws)
         + sum(
             missed(trajectory, found, table, contact.name, tolerance)
@@ -114,7 +117,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         unexcused=_largest([*(np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, seen, strict=True)), *laws]),
         open_depth=_largest([-np.min(s.apart[~s.closed], initial=0.0) for s in seen]),
         pulling=_pulling(parts, seen),
-        friction=_largest([found.force for found in rubbed]),
+        friction=_largest([force for _, force, _ in rubbed]),
         truncated=truncated(trajectory),
         reported=_largest([-trajectory.deepest_gap(contact.name) for contact in parts]),
         samples=len(look.times),
@@ -151,3 +154,23 @@ def _pulling(contacts: Sequence[UnilateralContact], seen: Sequence[ContactSample
         if (contact.rigid or contact.damping > 0) and np.any(found.closed):
             worst = max(worst, _share(min(0.0, float(np.min(found.force))), float(np.max(np.abs(found.force)))))
     return worst
+
+
+def _rubbed(
+    trajectory: Trajectory, friction: Friction, table: SegmentTable, times: np.ndarray
+) -> tuple[float, float, int]:
+    """Of a friction at times (k,) [s]: its way [m], its force, and changes of its state without an event."""
+    name, i = friction.name, trajectory.model.index(friction.name)
+    tension = np.asarray(trajectory.friction_force(name, times))
+    slip, place = np.asarray(trajectory.slip(name, times)), np.asarray(trajectory.at(friction.direction, times))
+    patch = place - friction.velocity * times - tension / friction.stiffness
+    owner = table.owners(times)
+    sticks, one = table.closed[owner, i], np.diff(owner) == 0
+    beyond = np.where(sticks, np.abs(tension) - friction.most, np.abs(np.abs(tension) - friction.limit))
+    moved = np.diff(slip)
+    against = one & (moved * tension[1:] < 0) & (np.abs(moved) > MOVED * np.max(np.abs(place), initial=0.0))
+    force = max(float(np.max(beyond)), float(np.max(np.abs(tension[1:][against]), initial=0.0)))
+    spring = 0.0 if friction.rigid else friction.stiffness
+    force -= ROUND_OFF * spring * float(np.max(np.abs(place), initial=0.0))
+    way = float(np.max(np.abs(patch - patch[0] - slip)))
+    return way, max(0.0, force) / friction.limit, untold_switches(trajectory, table, name)

@@ -13,7 +13,6 @@ from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_info
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.study.running.environment import machine
@@ -119,5 +118,5 @@ def _line(text: str) -> str:
 @functools.cache
 def _environment() -> dict[str, Any]:
     """Machine and versions of the process that computes."""
-    threads = max((pool["num_threads"] for pool in threadpool_info()), default=1)
-    return {"host": platform.node(), "blas_threads": threads, **machine()}
+    here = machine()
+    return {"host": platform.node(), "blas_threads": here["threads"]["BLAS threads"], **here}

@@ -1,15 +1,19 @@
-"""The table on a terminal: a line for every case and model."""
+"""A run of the catalogue to read: the table on a terminal, and the page, one self-contained HTML file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
+from multiphi_exudyn.study.comparison.pages import environment_of
 from multiphi_exudyn.study.comparison.wording import seconds
+from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement, run_laws
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
-from multiphi_exudyn.study.stability.summary import headline, warned
+from multiphi_exudyn.study.stability.summary import failures, headline, summaries, warned
 
-__all__ = ["figure", "text_table"]
+__all__ = ["render_stability", "text_table"]
 
+TEMPLATE = "stability.html.j2"
 HEADS = ("status", "energy", "ledger", "events", "missed", "beyond", "differs", "time")
 WIDTHS = (7, 8, 8, 7, 6, 8, 8, 8)
 
@@ -22,7 +26,26 @@ def text_table(results: Sequence[CaseResult]) -> str:
     return "\n".join([*lines, "", *(f"warning: {sentence}" for sentence in warned(results)), headline(results)])
 
 
-def figure(value: float | None) -> str:
+def render_stability(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> str:
+    """The page as HTML."""
+    page = environment_of(__package__ or "")
+    page.filters["figure"] = _figure
+    return page.get_template(TEMPLATE).render(
+        results=results,
+        headline=headline(results),
+        warned=warned(results),
+        summaries=summaries(results),
+        failures=failures(results),
+        quick=quick,
+        environment=environment,
+        limits=judgement,
+        laws=run_laws,
+        brute=brute_force,
+        exudyn=exudyn_runs,
+    )
+
+
+def _figure(value: float | None) -> str:
     """A figure of which the power of ten counts."""
     if value is None:
         return "–"
@@ -41,10 +64,10 @@ def _cells(outcome: Outcome) -> tuple[str, ...]:
     counts = ("–" if count is None else str(count) for count in (outcome.events, outcome.missed))
     return (
         outcome.status,
-        figure(outcome.energy),
-        figure(outcome.residual),
+        _figure(outcome.energy),
+        _figure(outcome.residual),
         *counts,
-        figure(outcome.beyond),
-        figure(outcome.difference),
+        _figure(outcome.beyond),
+        _figure(outcome.difference),
         seconds(outcome.time_s),
     )
