@@ -65,9 +65,20 @@ def defect_form(way: Transition, stopped: tuple[int, ...]) -> DefectForm:
         if not as_displaced:
             moved = allowed(base, held | set(stopped), _motion(way, way.velocity_matrix))
         rates = factor(over_omega(base, moved[:, 1:]))
-        after.entries[key] = DefectForm(factor(displaced), rates, way.matrix, way.offset, way.velocity_matrix)
+        places = factor(displaced) if way.source.excitation.channels else _factor_beside(displaced, after.level.modes)
+        after.entries[key] = DefectForm(places, rates, way.matrix, way.offset, way.velocity_matrix)
     form: DefectForm = after.entries[key]
     return form
+
+
+def _factor_beside(rows: np.ndarray, modes: int) -> np.ndarray:
+    """``factor`` of (rest, modes): what modes cannot hold has no part in them, and they are orthonormal."""
+    m, columns = rows.shape
+    if m < columns:
+        return factor(rows)
+    found, rest = np.eye(columns), columns - modes
+    found[:rest, :rest] = factor(rows[:, :rest])
+    return found
 
 
 def _motion(way: Transition, matrix: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ class ExitTable:
             for state, own in enumerate(element.states)
             for exit_ in own.exits
         ]
-        self._count = len(elements)
+        self._numbers = np.arange(len(elements) + 1)
         self._exits = [exit_ for _, _, exit_ in given]
         self._turns = [k for k, exit_ in enumerate(self._exits) if exit_.turn is not None]
         self._states = np.array([state for _, state, _ in given], int)
@@ -47,7 +47,7 @@ class ExitTable:
 
     def firsts(self, kept: np.ndarray) -> np.ndarray:
         """The first one (c + 1,) of every element among those that are kept, and how many these are."""
-        return np.searchsorted(self.described[kept, 0], np.arange(self._count + 1))
+        return self.described[kept, 0].searchsorted(self._numbers)
 
     def turning(self, kept: np.ndarray) -> list[tuple[int, Exit]]:
         """Those that a speed may turn, by their numbers among those that are kept."""

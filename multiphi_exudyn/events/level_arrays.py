@@ -20,6 +20,7 @@ from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.scratch_arrays import ScratchArrays
+from multiphi_exudyn.events.transition import Transition
 
 __all__ = ["LevelArrays"]
 
@@ -283,22 +284,22 @@ class LevelArrays:
     def _map(self, source: int, target: int) -> int:
         """The record of the map between two levels."""
         put, level = self.buffers.put, self.loaded[int(self.ints[target + a.NUMBER])]
-        sizes, terms = np.zeros(0), None
+        sizes, terms, way = np.zeros(0), None, None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
-            move = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
-            matrix, offset, rate_matrix, terms = move.matrix, move.offset, move.velocity_matrix, move.terms
+            way = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
+            matrix, offset, rate_matrix, terms = way.matrix, way.offset, way.velocity_matrix, way.terms
         at = put("numbers", matrix)
         rates = at if rate_matrix is matrix or np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
         known = -1 if terms is None else put("numbers", terms)
-        defect = self._defect(source, level) if self.ints[a.JUDGED] else -1
+        defect = self._defect(way, level) if self.ints[a.JUDGED] else -1
         return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known, defect])
 
-    def _defect(self, source: int, level: LoadedLevel) -> int:
+    def _defect(self, way: Transition | None, level: LoadedLevel) -> int:
         """Where stands what a defect is read from on the way from a level, or from the base, into a level, or -1."""
-        if source == self.base:
+        if way is None:
             form = start_form(level)
             return -1 if form is None else self.buffers.put("numbers", form)
-        parts = defect_form(self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level), ())
+        parts = defect_form(way, ())
         return self.buffers.put("numbers", np.concatenate([parts.displaced, parts.moving], axis=None))

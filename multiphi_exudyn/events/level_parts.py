@@ -18,7 +18,8 @@ __all__ = ["base_parts", "from_base", "level_parts", "powers"]
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
     """Motion, gaps and energies of a level."""
     own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
-    stiffness, drive = np.diag(-modal.squares) - modal.coupling, level.asymptotic.drive[:, None]
+    stiffness, drive = -modal.coupling, level.asymptotic.drive[:, None]
+    stiffness.flat[:: modal.modes + 1] -= modal.squares
     motion = [stiffness, channels.force, -modal.damping_matrix, channels.force_rate, drive]
     parts = {
         a.MOTION: np.concatenate(motion, axis=1),

@@ -145,13 +145,15 @@ def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
 
 def _record(batch: Batch, given: dict[int, int]) -> int:
     """A level's record; where it says nothing else, speeds are those of gaps."""
-    slots = {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}
-    return batch.put("ints", [slots.get(slot, 0) for slot in range(a.LEVEL_INTS)])
+    record = [0] * a.LEVEL_INTS
+    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}.items():
+        record[slot] = value
+    return batch.put("ints", record)
 
 
 def _frequencies(batch: Batch, omega: np.ndarray) -> dict[int, int]:
     """Where omega (r,) stands, and its inverses, zero where it is."""
-    periods = np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
+    periods = 1 / omega if omega.all() else np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
     return {a.FREQUENCIES: batch.put("numbers", omega), a.PERIODS: batch.put("numbers", periods)}
 
 

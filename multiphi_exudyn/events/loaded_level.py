@@ -241,8 +241,9 @@ class LoadedLevel(Shown):
         """The same as a form in xi."""
         own, base, rest, patterns = self.level, self.level.base, self.asymptotic, self.excitation.patterns
         y, r, q, static = rest.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
-        pushed = rest.load - self.modal.vectors.T @ static if base.general else 0.0  # by elements
-        modal = pushed - self.alone.asymptotic.drive
+        modal = -self.alone.asymptotic.drive
+        if base.general:
+            modal += rest.load - self.modal.vectors.T @ static  # of what elements push
         constant = rest.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)
@@ -282,6 +283,8 @@ class LoadedLevel(Shown):
     def follows(self) -> np.ndarray:
         """Rows (s, r + q + 1) of their springs' stretches, times the root of the stiffness."""
         rows, base = list[np.ndarray](), self.level.base
+        if not self.rubbing_elements:
+            return np.zeros((0, self.level.modes + 1))
         for i in self.rubbing_elements:
             stiffness = next(base.stiffnesses[k] for k in base.link_places[i] if base.links[k].held)
             if np.isfinite(stiffness):

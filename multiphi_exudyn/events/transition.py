@@ -30,6 +30,7 @@ import numpy as np
 
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
 
 __all__ = ["Transition", "modal_projection"]
 
@@ -139,7 +140,18 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     of a soft one may be small and count. The modes' own round-off, larger where there are many, is not seen here.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
-    stiff, soft = target.omega[:, None], source.omega
-    shares = np.divide(soft, stiff, out=np.ones(products.shape), where=stiff > soft)
-    np.putmask(products, np.abs(products) <= np.maximum(PRODUCT, UNMIXED * shares), 0.0)
+    clear_unmixed(products.ravel(), target.omega, source.omega, *products.shape)
     return products
+
+
+@compiled
+def clear(products: Numbers, omega: Numbers, source: Numbers, rows: int, columns: int) -> None:
+    """Products (rows, columns) of modes with these omega become zero where they are round-off in both energies."""
+    for i in range(rows):
+        for j in range(columns):
+            share, k = source[j] / omega[i] if omega[i] > source[j] else 1.0, i * columns + j
+            if abs(products[k]) <= max(PRODUCT, UNMIXED * share):
+                products[k] = 0.0
+
+
+clear_unmixed = entry(clear)

@@ -42,7 +42,8 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     squares, vectors, seen = _turned(base, squares, vectors, closed)
     _check_interlacing(base, squares, closed_directions, accuracy)
     gap_rows = drop_round_off(seen[: len(base.links)], base.lengths[:, None])  # of a mode all components have some
-    gap_rows[following] = 0.0  # by definition, whatever a soft mode leaves
+    if following.any():
+        gap_rows[following] = 0.0  # by definition, whatever a soft mode leaves
     damped = base.damped(vectors, closed)
     forces, rates = _force_rows(base, closed, squares, vectors, damped, gap_rows[closed])
     zero = squares == 0
@@ -73,9 +74,9 @@ def _turned(
     for ever, the others come to rest.
     """
     rows, sizes = base.seen
-    free = np.flatnonzero(squares == 0)
-    if not len(free):
+    if squares.all():
         return turned(squares, vectors, rows, sizes)
+    free = np.flatnonzero(squares == 0)
     squares, vectors, seen = squares.copy(), vectors.copy(), np.empty((len(rows), len(squares)))
     resisted, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
     drifting = int(np.sum(resisted <= UNDAMPED * base.largest_damping(closed)))
@@ -95,9 +96,9 @@ def _force_rows(
     gap_rows: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
-    rigid = np.isinf(base.stiffnesses[closed])
+    rigid = [base.links[i].rigid for i in closed]
     forces, rates = base.restoring[:, closed, None] * gap_rows
-    if rigid.any():
+    if any(rigid):
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]
         forces[rigid] = _reaction_rows(base, pinned, squares, vectors, directions @ forces)
@@ -141,10 +142,14 @@ def _following(base: ModalBase, held: Sequence[int]) -> np.ndarray:
         names = ", ".join(base.links[i].name for i in held)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     along = q.T @ units
-    following = np.sum(along * along, axis=0) > ALMOST
-    left = units[:, following] - q @ along[:, following]
-    following[following] = np.linalg.norm(left, axis=0) <= INDEPENDENT
-    return following | (base.lengths == 0)
+    almost = (along * along).sum(axis=0) > ALMOST
+    almost[list(held)] = False  # of themselves nothing is left
+    following = base.lengths == 0
+    following[list(held)] = True
+    if almost.any():
+        left = units[:, almost] - q @ along[:, almost]
+        following[almost] |= np.linalg.norm(left, axis=0) <= INDEPENDENT
+    return following
 
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:
@@ -165,17 +170,17 @@ def _reaction_rows(
 
     Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
     """
-    squared = base.squares[:, None]
-    total = squared + np.abs(squares)
-    if not total[0].all():
-        smallest = np.min(np.where(total > 0, total, np.inf), axis=0, initial=np.inf)
+    total = base.squares + np.abs(squares)[:, None]  # a row for every mode, as vectors stand in memory
+    if not total[:, 0].all():
+        smallest = np.min(np.where(total > 0, total, np.inf), axis=1, initial=np.inf, keepdims=True)
         total = np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
-    residuals = (squared - squares) * vectors - spring_forces
+    residuals = (base.squares - squares[:, None]) * vectors.T - spring_forces.T
     if pinned.shape[1] == 1:
-        return np.asarray(pinned.T @ (residuals / total) / ((pinned * pinned).T @ (1 / total)))
+        along = pinned[:, 0]
+        return np.asarray((residuals / total @ along) / (along * along / total).sum(axis=1))[None, :]
     roots = 1 / np.sqrt(total)
-    q, r = np.linalg.qr(roots.T[:, :, None] * pinned)
-    given = np.einsum("ijk,ji->ik", q, roots * residuals)
+    q, r = np.linalg.qr(roots[:, :, None] * pinned)
+    given = np.einsum("ijk,ij->ik", q, roots * residuals)
     return np.asarray(np.linalg.solve(r, given[:, :, None])[:, :, 0].T)
 
 
@@ -186,7 +191,9 @@ def _check_interlacing(
     stiffness, slack = closed_directions.stiffness.tolist(), INTERLACING * accuracy
     stiffening, softening = sum(k > 0 for k in stiffness), sum(k < 0 for k in stiffness)
     below, above = base.square_bounds
-    below, above = below[: len(squares) - softening] - slack, above[stiffening : len(squares) + stiffening] + slack
+    below, above = below[: len(squares) - softening], above[stiffening : len(squares) + stiffening]
+    if slack:
+        below, above = below - slack, above + slack
     if not ((squares[softening:] >= below).all() and (squares[: len(above)] <= above).all()):
         raise NumericalFailure(
             "level: its modes are not accurate (interlacing violated); are units and magnitudes of mass and stiffness "

@@ -300,8 +300,10 @@ class Level(Shown):
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(f, y, what drives zero-frequency modes) under a load (m,)."""
+        """(f, y, what drives zero-frequency modes, if there are any) under a load (m,)."""
         if self.neutral.size:
             return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
+        if self.squares.all():
+            return along, configuration, total
         return along, configuration, total + closed_directions.vectors @ along

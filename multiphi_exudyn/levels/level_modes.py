@@ -26,6 +26,7 @@ modes.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -57,7 +58,7 @@ def level_modes(
     Raises NumericalFailure where they are not orthogonal.
     """
     if not closed_directions.members:
-        return base.squares[:modes].copy(), np.eye(base.modes.count, modes), 0.0
+        return base.squares[:modes].copy(), np.eye(modes or base.modes.count, base.modes.count).T, 0.0
     found = _found(base, closed_directions, modes)
     error = _error(found[1])
     if error > ORTHOGONAL:
@@ -87,24 +88,30 @@ def _found(
 def _error(vectors: np.ndarray) -> float:
     """The largest number in Phi^T Phi - 1."""
     products = vectors.T @ vectors
-    products.flat[:: len(products) + 1] -= 1.0
-    return float(np.abs(products).max(initial=0.0))
+    products -= _one(len(products))
+    return float(np.abs(products, out=products).max(initial=0.0))
+
+
+@functools.lru_cache(maxsize=64)
+def _one(count: int) -> np.ndarray:
+    return np.eye(count)
 
 
 def _rank_one(
     base: ModalBase, closed_directions: ClosedDirections, modes: int
 ) -> tuple[np.ndarray, np.ndarray, float] | None:
     """``_modes``, the lowest ones only, where they are those of a rank-one change."""
-    sprung = np.flatnonzero(closed_directions.stiffness)
-    if len(sprung) != 1 or closed_directions.stiffness[sprung[0]] < 0:
+    sprung = [(j, k) for j, k in enumerate(closed_directions.stiffness.tolist()) if k]
+    if len(sprung) != 1 or sprung[0][1] < 0:
         return None
-    along, stiffness = closed_directions.vectors[:, sprung[0]], closed_directions.stiffness[sprung[0]]
-    found = rank_one_modes(base.squares, along, float(stiffness), modes)
+    j, stiffness = sprung[0]
+    along = closed_directions.vectors[:, j]
+    found = rank_one_modes(base.squares, along, stiffness, modes)
     if found is None:
         return None
     squares, vectors = found
     if math.isinf(stiffness):
-        vectors = vectors - np.outer(along, along @ vectors) / (along @ along)
+        vectors -= np.outer(along @ vectors, along / (along @ along)).T  # as the vectors stand in memory
     return squares, vectors, 0.0
 
 

@@ -2,11 +2,13 @@
 
     y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
 
-P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body coordinates.
+P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body coordinates. Along a single direction
+of a structure without rigid-body modes f is a quotient.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -16,10 +18,13 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "neutral_response", "static_response"]
+
+NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 
 
 @dataclass(frozen=True)
@@ -44,11 +49,50 @@ def static_response(
     base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forces (d,) along closed directions and configuration y (m,) at rest, motion nobody resists left out."""
+    if len(closed_directions.stiffness) == 1 and not base.modes.rigid:
+        along, configuration = np.ascontiguousarray(closed_directions.vectors[:, 0]), np.empty(len(load))
+        stiffness, offset = float(closed_directions.stiffness[0]), float(closed_directions.offsets[0])
+        force = bend(along, base.compliance, np.array(load, float), configuration, stiffness, offset, len(load))
+        if math.isfinite(force):
+            return np.array([force]), configuration
     turned, mixing = closed_directions.orthogonal
     forces, configuration = _response(base, turned, load)
     if turned is not closed_directions:
         forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
     return forces, configuration
+
+
+@compiled
+def bend_one(
+    along: Numbers, compliance: Numbers, load: Numbers, result: Numbers, stiffness: float, offset: float, m: int
+) -> float:
+    """The force along one direction p (m,), and y (m,) as the result; infinite or no number where it has no answer.
+
+    As ``_response`` for one direction, the force corrected once by what soft modes have magnified.
+    """
+    sprung = 1.0 if stiffness != 0.0 else 0.0
+    own, bent, pressed = 1.0 / stiffness if stiffness != 0.0 else 1.0, 0.0, 0.0
+    for i in range(m):
+        bent += along[i] * (compliance[i] * along[i])
+        pressed += load[i] * (compliance[i] * along[i])
+    flexibility = own + sprung * bent
+    if flexibility == 0.0:
+        return math.inf
+    force, left = (-offset - sprung * pressed) / flexibility, 0.0
+    for i in range(m):
+        pushed = along[i] * force
+        total = load[i] + pushed
+        if abs(total) <= ZERO * (abs(load[i]) + abs(pushed)):
+            total = 0.0
+        result[i] = compliance[i] * total
+        left += along[i] * result[i]
+    further = -(offset + own * force + sprung * left) / flexibility
+    for i in range(m):
+        result[i] += compliance[i] * along[i] * further
+    return force + further
+
+
+bend = entry(bend_one)
 
 
 def neutral_response(
@@ -76,22 +120,30 @@ def neutral_response(
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``static_response`` where the directions of rigid contacts are orthogonal."""
     rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
-    free, touching, pressing = closed_directions.vectors[:rigid], closed_directions.vectors[rigid:], load[rigid:]
+    vectors, touching, pressing = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
     sprung = closed_directions.stiffness != 0  # the others push with G, whatever y is
-    own = 1 / np.where(sprung, closed_directions.stiffness, 1.0)
-    carried = np.zeros((rigid, 0))
-    if rigid:
-        carried = _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
-    bent = compliance[:, None] * touching
-    solved = _solver(touching.T @ bent, own, sprung, free.T @ carried)
-    pressed = -offsets - sprung * (bent.T @ pressing)
-    forces, moved = solved(pressed, -carried.T @ load[:rigid])
+    own, carried = 1 / np.where(sprung, closed_directions.stiffness, 1.0), _carried(base, closed_directions)
+    bent = (compliance * touching.T).T
+    solved = _solver(touching.T @ bent, own, sprung, vectors[:rigid].T @ carried)
+    forces, moved = solved(-offsets - sprung * (pressing @ bent), -(load[:rigid] @ carried))
     total = drop_round_off(pressing + touching @ forces, np.abs(pressing) + np.abs(touching) @ np.abs(forces))
-    configuration = np.concatenate([carried @ moved, compliance * total])
-    left = offsets + own * forces + sprung * (closed_directions.vectors.T @ configuration)
+    configuration = _above(carried, moved, compliance * total)
+    left = offsets + own * forces + sprung * (configuration @ vectors)
     further, moved = solved(-left, np.zeros(len(moved)))  # what soft modes magnified
-    added = np.concatenate([carried @ moved, bent @ further])
-    return forces + further, configuration + added
+    return forces + further, configuration + _above(carried, moved, bent @ further)
+
+
+def _carried(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
+    """Orthonormal basis (rigid, .) of the rigid-body motions that closed contacts resist."""
+    rigid = base.modes.rigid
+    if not rigid:
+        return NONE
+    return _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
+
+
+def _above(carried: np.ndarray, moved: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """Rigid-body motions that contacts resist, above elastic coordinates."""
+    return np.concatenate([carried @ moved, elastic]) if len(carried) else elastic
 
 
 Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -104,9 +156,6 @@ def _solver(bent: np.ndarray, own: np.ndarray, sprung: np.ndarray, coupling: np.
     the matrix is singular: springs that cancel, under a load they allow.
     """
     d = len(own)
-    if d == 1 and not coupling.size and own[0] + sprung[0] * bent[0, 0] != 0:
-        flexibility = own[0] + sprung[0] * bent[0, 0]
-        return lambda a, b: (a / flexibility, b)
     sizes = _sizes(bent.diagonal() + sprung * np.abs(own), coupling)
     matrix = np.zeros((d + coupling.shape[1],) * 2)
     matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = sprung[:, None] * bent, sprung[:, None] * coupling, coupling.T

@@ -17,6 +17,7 @@ same vectors make the motion of a start (F. Tisseur, K. Meerbergen, The quadrati
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -55,16 +56,23 @@ def _response(numbers: np.ndarray, r: int) -> ModalResponse:
     """Closed form for vectors that are found."""
     waves = np.zeros((1 + 4 * r, r), complex)
     write_response(numbers, waves.ravel(), r)
+    nothing, every, powers = _flags(r)
     return ModalResponse(
-        basis=Exponentials(waves[0], np.zeros(r, int)),
+        basis=Exponentials(waves[0], powers),
         shapes=waves[1 : 1 + r].T,
         from_displacement=waves[1 + r : 1 + 2 * r],
         from_velocity=waves[1 + 2 * r : 1 + 3 * r],
         from_force=waves[1 + 3 * r :],
         diagonal=False,
-        alone=np.zeros(r, bool),
-        poles=np.ones(r, bool),
+        alone=nothing,
+        poles=every,
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _flags(r: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of coupled modes: that none is alone, that every exponential is a pole, and that none has a power of time."""
+    return np.zeros(r, bool), np.ones(r, bool), np.zeros(r, int)
 
 
 @compiled

@@ -36,6 +36,7 @@ FAR = 16.0  # times the d beside the highest root: sums over larger d are power 
 ORDERS = 14  # of such a series, the next one is round-off
 SIZE, SLOPE_BELOW, SLOPE_ABOVE, SERIES = range(4)  # sums: their round-off over epsilon, slopes to d_l and beyond
 SUMS = SERIES + ORDERS
+NOT_WHOLE = -1
 
 
 def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -43,9 +44,11 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
 
     d: (m,), ascending, none negative. stiffness: k > 0, inf for the motions with p.v = 0 alone.
     """
-    numbers = _arranged(d, p, count)
-    if count < len(d) and all_take_part(numbers, len(d), count):
-        return _roots(numbers, len(d), stiffness, count)
+    if count < len(d):
+        numbers = _arranged(d, p, count)
+        outcome = find_roots(numbers, len(d), count, 1 / stiffness, 1)
+        if outcome != NOT_WHOLE:
+            return _found(numbers, len(d), count) if outcome else None
     turns, own = _turns(d, p), p
     if turns:
         own = p.copy()
@@ -57,9 +60,10 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
     roots = min(count, len(poles) - 1)
     if roots < 1 or (roots < count and np.isfinite(stiffness)) or roots + len(left) < count:
         return None
-    found = _roots(_arranged(d[poles], own[poles], roots), len(poles), stiffness, roots)
-    if found is None:
+    numbers = _arranged(d[poles], own[poles], roots)
+    if not find_roots(numbers, len(poles), roots, 1 / stiffness, 0):
         return None
+    found = _found(numbers, len(poles), roots)
     values = np.concatenate([found[0], d[left]])
     order = np.argsort(values, kind="stable")[:count]
     vectors = np.zeros((len(d), len(values)))
@@ -87,13 +91,14 @@ def _turns(d: np.ndarray, p: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
 
 def _arranged(d: np.ndarray, p: np.ndarray, count: int) -> np.ndarray:
     """d and p (m,), and room for so many roots, as ``roots`` has them."""
-    return np.concatenate([d, p, np.empty(SUMS + count * (1 + len(d)))])
+    m = len(d)
+    numbers = np.empty(2 * m + SUMS + count * (1 + m))
+    numbers[:m], numbers[m : 2 * m] = d, p
+    return numbers
 
 
-def _roots(numbers: np.ndarray, m: int, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """The ``count`` lowest roots, and their vectors of unit length; None where the iteration fails."""
-    if not find_roots(numbers, m, count, 1 / stiffness):
-        return None
+def _found(numbers: np.ndarray, m: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The ``count`` lowest roots, and their vectors of unit length."""
     found = numbers[2 * m + SUMS :]
     return found[:count], found[count:].reshape(count, m).T
 
@@ -116,8 +121,13 @@ def is_whole(numbers: Numbers, m: int, count: int) -> int:
 
 
 @compiled
-def roots(numbers: Numbers, m: int, count: int, yielding: float) -> int:
-    """Whether all are found. numbers: d, p (m,), sums, then roots (count,) and vectors (count, m); yielding: 1 / k."""
+def roots(numbers: Numbers, m: int, count: int, yielding: float, asked: int) -> int:
+    """Whether all are found. numbers: d, p (m,), sums, then roots (count,) and vectors (count, m); yielding: 1 / k.
+
+    asked: 1 where it is NOT_WHOLE that has to come back if something is to be left as it is.
+    """
+    if asked == 1 and is_whole(numbers, m, count) == 0:
+        return NOT_WHOLE
     sums, found, near = 2 * m, 2 * m + SUMS, count + 1
     while near < m and numbers[near] <= FAR * numbers[count]:
         near += 1
@@ -232,4 +242,4 @@ def add_up(
     return yielding + below + above
 
 
-all_take_part, find_roots = entry(is_whole), entry(roots)
+find_roots = entry(roots)

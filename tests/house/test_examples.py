@@ -281,3 +281,11 @@ def test_run_cost(capsys):
         0 < time < math.inf for cost in costs.values() for time in (cost.short, cost.run, cost.bare, cost.ledger)
     )
     assert capsys.readouterr().out.count("of which warnings") == 6
+
+
+def test_level_cost(capsys):
+    """Times are not asserted: every level takes longer with each of the things that its first event needs."""
+    costs = load("level_cost").main(rounds=1)
+    assert len(costs) == 4
+    assert all(row[0] > 0 and row == sorted(row) and row[-1] < math.inf for row in costs.values())
+    assert capsys.readouterr().out.count("ledger's forms") == 4

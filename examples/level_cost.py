@@ -1,0 +1,96 @@
+"""What a new level costs, one contact away from the open one: all that its first event needs.
+
+A cantilever of 200 degrees of freedom over stops, all of its modes in the base, 12 in a level. Of every level the modes
+are found first; then the loop is given its motion, gaps and exits, the map to it and the map back, and the forms from
+which a ledger is summed. CPU time up to each of these, median of many new levels; code and base are warm. A first run
+with two new levels took 6 to 9 ms a level at commit de51912.
+
+Run: python examples/level_cost.py
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import statistics
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.loaded_levels import LoadedLevels
+
+LENGTH, ELEMENTS, STOPS, GAP = 1.0, 100, 12, 1e-3  # m, , , m
+MODES, ROUNDS = 12, 20
+STIFFNESSES = {"compliant": 1e6, "rigid": math.inf}  # N/m
+DAMPINGS = {"Rayleigh damping": mp.RayleighDamping(0.5, 1e-6), "modal damping": mp.ModalDamping(0.01)}
+STEPS = ("level", "packing", "map", "map back", "ledger's forms")
+BEFORE = "6 to 9 ms"  # a level of a first run with two new ones, at commit de51912
+
+
+def cantilever(stiffness: float, damping: mp.RayleighDamping | mp.ModalDamping) -> mp.MultiPhiModel:
+    """The beam over stops in its outer half, its base built."""
+    steel = mp.Section.rectangle(0.0, LENGTH, width=0.03, height=0.01, youngs_modulus=2.1e11, density=7850.0)
+    places = {f"p{i}": LENGTH * (ELEMENTS - 4 * i) / ELEMENTS for i in range(STOPS)}
+    beam = mp.planar_beam(mp.Beam([steel], places), ELEMENTS, damping)
+    contacts = [mp.UnilateralContact(f"stop {i}", f"p{i}", GAP, stiffness) for i in range(STOPS)]
+    model = mp.MultiPhiModel(beam, contacts, modes=MODES)
+    assert model.base.modes.count == 2 * ELEMENTS, "all modes are in the base"
+    return model
+
+
+def supply(arrays: LevelArrays, needed: int, source: int, states: Sequence[int]) -> None:
+    """Give the loop what it asks for: a level, a map, or forms of the level ``source``."""
+    ints = arrays.ints
+    ints[a.NEEDED], ints[a.NEEDED_FROM] = needed, source
+    key = int(ints[a.NEEDED_KEY])
+    ints[key : key + len(states)] = states
+    arrays.supply()
+
+
+def costs(model: mp.MultiPhiModel) -> list[list[float]]:
+    """CPU times [ms] of every level one contact away from the open one, up to the end of each of the ``STEPS``."""
+    arrays, rows = LevelArrays(LoadedLevels.static(model, np.zeros(model.base.modes.count))), list[list[float]]()
+    nowhere = [0] * len(model.contacts)
+    open_level = arrays.level(nowhere)
+    for i in range(len(model.contacts)):
+        states = [int(k == i) for k in range(len(model.contacts))]
+        times = [time.process_time()]
+        model.level_at((i,))
+        times.append(time.process_time())
+        new = arrays.level(states)
+        times.append(time.process_time())
+        for needed, source, target in (
+            (a.NEED_MAP, open_level, states),
+            (a.NEED_MAP, new, nowhere),
+            (a.NEED_POWERS, new, states),
+        ):
+            supply(arrays, needed, source, target)
+            times.append(time.process_time())
+        rows.append([1e3 * (end - times[0]) for end in times[1:]])
+    return rows
+
+
+def main(rounds: int = ROUNDS) -> dict[str, list[float]]:
+    """Medians [ms] up to each of the ``STEPS`` by contact and damping; cases alternate."""
+    cases = {
+        f"{contact}, {damping}": (STIFFNESSES[contact], DAMPINGS[damping])
+        for contact, damping in itertools.product(STIFFNESSES, DAMPINGS)
+    }
+    rows: dict[str, list[list[float]]] = {name: [] for name in cases}
+    for number in range(rounds + 1):
+        for name, case in cases.items():
+            new = costs(cantilever(*case))
+            rows[name] += new[1:] if number else []  # the first one warms the base, the first round all code
+    medians = {name: [statistics.median(column) for column in zip(*given, strict=True)] for name, given in rows.items()}
+    for name, found in medians.items():
+        shown = ", ".join(f"{step} {value:.3f}" for step, value in zip(STEPS, found, strict=True))
+        print(f"{name:27s} up to {shown} ms; before {BEFORE}")
+    return medians
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Static response along one direction: the quotient is what a dense solution of all coordinates gives."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from small_structures import chain
+
+import multiphi_exudyn as mp
+from multiphi_exudyn.levels.static_response import bend_one, static_response
+from multiphi_exudyn.mathematics.compiled import entry
+
+
+def base_of(stiffness):
+    return mp.MultiPhiModel(chain(7), [mp.UnilateralContact("stop", "m5", 0.02, stiffness)], modes=4).base
+
+
+def bent(base, stiffness, offset, load):
+    """The force along the contact's direction, and y, from the quotient."""
+    along, result = np.ascontiguousarray(base.directions[:, 0]), np.empty(len(load))
+    force = entry(bend_one)(along, base.compliance, load, result, stiffness, offset, len(load))
+    return force, result
+
+
+def solved(base, stiffness, offset, load):
+    """The same from one system of all coordinates and the force: y Omega^2 - p f = load, f / k + p.y = -offset."""
+    m, p = len(load), base.directions[:, 0]
+    system = np.zeros((m + 1, m + 1))
+    system[:m, :m], system[:m, m], system[m, :m] = np.diag(base.squares), -p, p
+    system[m, m] = 1 / stiffness
+    found = np.linalg.solve(system, np.append(load, -offset))
+    return found[m], found[:m]
+
+
+@pytest.mark.parametrize("stiffness", [1e-3, 30.0, 1e6, math.inf, -0.2])
+def test_along_one_direction(stiffness):
+    base = base_of(math.inf)
+    load = np.random.default_rng(1).normal(size=len(base.squares))
+    (force, y), (wanted, configuration) = (found(base, stiffness, 0.02, load) for found in (bent, solved))
+    assert force == pytest.approx(wanted, rel=1e-11)
+    assert_allclose(y, configuration, rtol=0, atol=1e-12 * np.max(np.abs(configuration)))
+
+
+def test_a_spring_of_no_stiffness_pushes_with_its_constant_force():
+    base = base_of(1.0)
+    load = np.random.default_rng(2).normal(size=len(base.squares))
+    force, y = bent(base, 0.0, 0.7, load)
+    assert force == -0.7
+    assert_allclose(y, (load - 0.7 * base.directions[:, 0]) / base.squares, rtol=1e-12)
+
+
+def test_springs_that_cancel_have_no_answer_of_one_quotient():
+    """1/k = -1/2 against a flexibility of 1/2."""
+    along, compliance, load, result = np.array([[1.0], [0.5], [0.3], [0.0]])
+    assert math.isinf(entry(bend_one)(along, compliance, load, result, -2.0, 0.7, 1))
+
+
+def test_what_is_round_off_of_a_load_and_a_force_is_none():
+    """A load on the stop itself is carried by the rigid stop alone."""
+    base = base_of(math.inf)
+    load = 3.0 * base.directions[:, 0]
+    force, y = bent(base, math.inf, 0.0, load)
+    assert force == pytest.approx(-3.0, rel=1e-12)
+    assert not y.any()
+
+
+def test_levels_with_one_closed_contact_rest_there():
+    base = base_of(30.0)
+    load = np.random.default_rng(3).normal(size=len(base.squares))
+    load.flags.writeable = False
+    (force,), y = static_response(base, base.closed_at((0,)), load)
+    wanted, configuration = solved(base, 30.0, 0.02, load)
+    assert force == pytest.approx(wanted, rel=1e-11)
+    assert_allclose(y, configuration, rtol=0, atol=1e-12 * np.max(np.abs(configuration)))
