@@ -123,23 +123,25 @@ RUN_INTS = 233
 
 # ---------------------------------------------------------------------- run record, numbers
 
-TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
+TIME, HORIZON, LAST_DECISION, ALLOWED, INSTANT_TIME, AGE = 0, 1, 2, 3, 5, 6
+SWUNG = 4  # twice the largest energy so far, as far as it was looked for
 GIVEN_SPRINGS = 7  # strain energy [J] of the links that hold at the start, all in one
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
-LOST_AT_START = 36
-DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
-SWUNG = 47  # twice the largest energy so far, as far as it was looked for
-GIVEN_ENERGY = 48  # kinetic and strain energy [J] that the run was given, less the potential of static loads
-LOST_SO_FAR = 49  # energies lost at events
-LOOKED = 55  # instants of the motion looked at; of these the mean of |y|^2, and the largest energy (time/looking.py)
-LOOK_FIRST, LOOK_END = 58, 59  # the first and the last such instant, one and the same where nobody looks on
-GIVEN_SQUARE = 60  # |y|^2 at the start, zero where a run goes on from another
-INDEPENDENCE = 61  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 62  # of the segment under way
-SEEN = 65  # like LOOKED, with the segment under way; of samples of a run that is over (time/sampling.py)
-RUN_NUMBERS = 68
+LOST_AT_START = 36  # from here to LOST_SO_FAR and its losses: what a ledger is made of (time/balance.py)
+WORKS = 42  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
+WORK = 45  # [J] of varying loads and stops on the present state
+GIVEN_ENERGY = 46  # kinetic and strain energy [J] that the run was given, less the potential of static loads
+LEFT_ENERGY = 47  # the same of the state in which the loop was left
+LOST_SO_FAR = 48  # energies lost at events
+DEFECTS, TRUNCATED = 54, 55  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
+GIVEN_SQUARE = 56  # |y|^2 at the start, zero where a run goes on from another
+LOOKED = 57  # instants of the motion looked at; of these the mean of |y|^2, and the largest energy (time/looking.py)
+LOOK_FIRST, LOOK_END = 60, 61  # the first and the last such instant, one and the same where nobody looks on
+INDEPENDENCE = 62  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 63  # of the segment under way
+SEEN = 66  # like LOOKED, with the segment under way; of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 69
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 from multiphi_exudyn.display import Shown
+from multiphi_exudyn.events.arrays import BY_IMPACT, DAMPING, FRICTION, KINETIC, STOP_WORK, STRAIN
 
 __all__ = ["Ledger", "Statistics"]
 
@@ -34,6 +35,7 @@ class Ledger(Shown):
 
     Made by ``Trajectory.ledger``. Two independent sides: what was lost is added up event by event and in closed form,
     the final energy is read off the last state; ``residual`` is what is left over, round-off if nothing was forgotten.
+    The loop has done both when a run ends.
 
     Attributes
     ----------
@@ -76,6 +78,26 @@ class Ledger(Shown):
     damping: float
     friction: float
     final: float
+
+    @classmethod
+    def of(cls, sums: Sequence[float], works: tuple[float, float, float], static: tuple[float, float]) -> Ledger:
+        """Of the numbers (18,) of a run from LOST_AT_START on (events/arrays.py).
+
+        works [J]: of damping, of what varies and of friction, of all segments. static: potentials f.y [J] that constant
+        loads have at the start and at the end; energies are less these there.
+        """
+        impact, kinetic, strain, stopped, damping, friction, _, _, _, work, given, left, *lost = sums
+        (damped, varying, rubbed), (first, last) = works, static
+        return cls(
+            initial=given + first,
+            work_of_loads=last - first + (stopped + lost[STOP_WORK]) + varying + work,
+            impact=impact + lost[BY_IMPACT],
+            truncation_kinetic=kinetic + lost[KINETIC],
+            truncation_strain=strain + lost[STRAIN],
+            damping=damping + lost[DAMPING] + damped,
+            friction=friction + lost[FRICTION] + rubbed,
+            final=left + last,
+        )
 
     @property
     def residual(self) -> float:

@@ -25,7 +25,7 @@ from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigid
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.events.transition import Transition
-from multiphi_exudyn.time.segment import Segments, listed
+from multiphi_exudyn.time.segment import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["Defect", "DefectHistory", "defects", "indicator", "total_defect"]
@@ -63,7 +63,7 @@ class DefectHistory:
     @classmethod
     def of(cls, trajectory: Trajectory) -> DefectHistory:
         """Of a run with segments."""
-        segments = listed(trajectory.segments)
+        segments = trajectory.segments
         table = event_table(trajectory.events, trajectory.model.index)
         stopped = _stopped(table, segments.starts)
         ways = _ways(segments.numbers, stopped)
@@ -93,9 +93,9 @@ def indicator(lost: float, square: float) -> float:
     return math.sqrt(lost / square)
 
 
-def total_defect(trajectory: Trajectory, segments: Segments) -> float:
+def total_defect(trajectory: Trajectory) -> float:
     """Sum of |defect|^2 [m2 kg] over the segments of a run, which the loop has added up where it could."""
-    known = segments.defects
+    known = trajectory.segments.defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(known) else known
 
 

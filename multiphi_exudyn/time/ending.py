@@ -65,9 +65,10 @@ class Ending(NamedTuple):
         return Loss(*self.numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
 
     @property
-    def work(self) -> float:
-        """Work [J] that varying loads and stops have done on the last state."""
-        return float(self.numbers[a.WORK])
+    def sums(self) -> list[float]:
+        """What a ledger is made of, see ``Ledger.of``."""
+        sums: list[float] = self.numbers[a.LOST_AT_START : a.LOST_SO_FAR + a.LOSSES].tolist()
+        return sums
 
     def statistics(self, segments: int, events: int, possible: int) -> Statistics:
         """What the run has taken; possible: levels."""

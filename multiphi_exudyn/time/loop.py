@@ -45,6 +45,7 @@ from multiphi_exudyn.events.arrays import (
     INSTANT_TIME,
     JUDGED,
     LAST_DECISION,
+    LEFT_ENERGY,
     LEVEL,
     LOSSES,
     LOST,
@@ -116,6 +117,15 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
 
     END_REACHED, EVENT, NEED, FULL or FAILED.
     """
+    status = travel(ints, numbers, waves, end)
+    if ints[STARTING] == 0:
+        numbers[LEFT_ENERGY] = energy(ints, numbers, CURRENT)
+    return status
+
+
+@compiled
+def travel(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """The same, without what is told of the state that it comes to."""
     if ints[STARTING] > 0:
         fresh = ints[STARTING] == FRESH
         status = set_out(ints, numbers, waves) if fresh else go_on(ints, numbers, waves)

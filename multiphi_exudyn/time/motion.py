@@ -120,10 +120,11 @@ class Motion:
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
         numbers = self._ending.numbers
-        defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
+        damped, varying, rubbed = numbers[a.WORKS : a.WORKS + 3].tolist()
+        defects, truncated = numbers[a.DEFECTS : a.TRUNCATED + 1].tolist()
         return Trajectory(
             model=self.model,
-            segments=Recorded(self.record, defects, truncated, tuple(works)),
+            segments=Recorded(self.record, defects, truncated, (damped, varying, rubbed)),
             events=self.events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",

@@ -140,6 +140,11 @@ class Segments(Sequence[Segment], ABC):
     def levels(self) -> Sequence[LoadedLevel]:
         """The levels that were visited, each once."""
 
+    @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """The same by the states of their elements."""
+        return tuple([level.states for level in self.levels])
+
     @abstractmethod
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.

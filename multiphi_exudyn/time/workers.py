@@ -25,7 +25,6 @@ from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
 from multiphi_exudyn.time.refinement import refined
 from multiphi_exudyn.time.reliability import Known
-from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.several import Several
 from multiphi_exudyn.time.simulate import Run, warned
 from multiphi_exudyn.time.start import first_start
@@ -149,8 +148,7 @@ class Task:
             visited = several.visited(k)
             if visited not in self._around:
                 trajectory = several.land(k).trajectory(several.end)
-                segments = listed(trajectory.segments)
-                self._around[visited] = Known.of(model, segments).around(trajectory, segments)
+                self._around[visited] = Known.of(model, trajectory.segments).around(trajectory)
             before, after = self._around[visited]
             if k in sizes:
                 struck = rigid and several.struck(k)
@@ -176,7 +174,7 @@ class Task:
         known = self.times <= trajectory.t_end
         if not (trajectory.segments and known.any()):
             return
-        segments, times = listed(trajectory.segments), self.times[known]
+        segments, times = trajectory.segments, self.times[known]
         for place, row in enumerate(self._rows_of(trajectory.model)):
             self.samples[number, place, known] = segments.values(times, "right", partial(point_row, row))
 

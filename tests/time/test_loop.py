@@ -238,7 +238,7 @@ def test_a_run_whose_arrays_were_lent_to_a_question_goes_on_as_if_they_had_not_b
         expected.segments.defects,
         expected.segments.truncated,
     )
-    assert found.final_work == expected.final_work
+    assert found.ledger == expected.ledger
 
 
 def test_a_warm_run_without_events_is_made_by_few_calls():
