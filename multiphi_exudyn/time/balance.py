@@ -35,7 +35,6 @@ class Ledger(Shown):
 
     Made by ``Trajectory.ledger``. Two independent sides: what was lost is added up event by event and in closed form,
     the final energy is read off the last state; ``residual`` is what is left over, round-off if nothing was forgotten.
-    The loop has done both when a run ends.
 
     Attributes
     ----------
@@ -80,23 +79,24 @@ class Ledger(Shown):
     final: float
 
     @classmethod
-    def of(cls, sums: Sequence[float], works: tuple[float, float, float], static: tuple[float, float]) -> Ledger:
-        """Of the numbers (18,) of a run from LOST_AT_START on (events/arrays.py).
+    def of(
+        cls, sums: Sequence[float], works: tuple[float, float, float], static: float, initial: float, final: float
+    ) -> Ledger:
+        """Of the numbers (13,) of a run from LOST_AT_START to WORK (events/arrays.py).
 
-        works [J]: of damping, of what varies and of friction, of all segments. static: potentials f.y [J] that constant
-        loads have at the start and at the end; energies are less these there.
+        works [J]: of damping, of what varies and of friction, of all segments. static: work [J] of constant loads.
         """
-        impact, kinetic, strain, stopped, damping, friction, _, _, _, work, given, left, *lost = sums
-        (damped, varying, rubbed), (first, last) = works, static
+        impact, kinetic, strain, stopped, damping, friction, *lost, work = sums
+        damped, varying, rubbed = works
         return cls(
-            initial=given + first,
-            work_of_loads=last - first + (stopped + lost[STOP_WORK]) + varying + work,
+            initial=initial,
+            work_of_loads=static + (stopped + lost[STOP_WORK]) + varying + work,
             impact=impact + lost[BY_IMPACT],
             truncation_kinetic=kinetic + lost[KINETIC],
             truncation_strain=strain + lost[STRAIN],
             damping=damping + lost[DAMPING] + damped,
             friction=friction + lost[FRICTION] + rubbed,
-            final=left + last,
+            final=final,
         )
 
     @property

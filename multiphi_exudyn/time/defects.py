@@ -27,8 +27,9 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.events.transition import Transition
 from multiphi_exudyn.time.segment import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.verdict import indicator
 
-__all__ = ["Defect", "DefectHistory", "defects", "indicator", "total_defect"]
+__all__ = ["Defect", "DefectHistory", "defects", "total_defect"]
 
 
 @dataclass(frozen=True)
@@ -84,13 +85,6 @@ class DefectHistory:
         """The truncation indicator of [0, end] (truncation.py)."""
         lost = float(np.sum(self.squares[self.segments.starts[self.places] <= end]))
         return indicator(lost, self.segments.sizes(end)[0])
-
-
-def indicator(lost: float, square: float) -> float:
-    """The truncation indicator of a sum of |defect|^2 and the mean of |y|^2 (truncation.py)."""
-    if square == 0:
-        return math.inf if lost else 0.0
-    return math.sqrt(lost / square)
 
 
 def total_defect(trajectory: Trajectory) -> float:

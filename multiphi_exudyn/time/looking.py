@@ -8,7 +8,6 @@ passed before, sampling.py looks at them all, if somebody asks.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from multiphi_exudyn.events.arrays import (
     AFTER,
@@ -35,7 +34,7 @@ from multiphi_exudyn.events.energies import energy
 from multiphi_exudyn.events.flow import state_at
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
-__all__ = ["INDICATOR", "SAMPLES", "begin_look", "is_small", "keep_look", "look", "looked", "see"]
+__all__ = ["INDICATOR", "SAMPLES", "begin_look", "is_small", "keep_look", "look", "see"]
 
 SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
 HALVES = math.sqrt(2 * SAMPLES)
@@ -49,13 +48,6 @@ def is_small(lost: float, limit: float, square: float) -> int:
     A defect has changed |y| there by no more than its size; it is the first of the samples, which count by half.
     """
     return 1 if lost * (1.0 + HALVES / limit) ** 2 < square else 0
-
-
-def looked(numbers: Sequence[float], end: float) -> tuple[float, float] | None:
-    """Mean of |y|^2 and largest energy of a run to ``end`` [s], from its numbers; None where the loop did not look."""
-    if numbers[LOOKED] != SAMPLES or numbers[LOOK_END] != end:
-        return None
-    return numbers[LOOKED + 1], numbers[LOOKED + 2]
 
 
 @compiled

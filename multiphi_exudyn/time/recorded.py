@@ -59,10 +59,17 @@ class Recorded(Made[Segment], Segments):
     summed: works [J] of all that the record does not list as left out.
     """
 
-    def __init__(self, record: Record, defects: float, truncated: float, summed: tuple[float, float, float]) -> None:
+    def __init__(
+        self,
+        record: Record,
+        defects: float,
+        truncated: float,
+        summed: tuple[float, float, float],
+        verdict: tuple[float, float] = Segments.verdict,
+    ) -> None:
         self._make, self._count, self._known = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
-        self.defects, self.truncated = defects, truncated
+        self.defects, self.truncated, self.verdict = defects, truncated, verdict
         self._summed, self._left_out = summed, record.left_out_count
 
     @functools.cached_property

@@ -31,26 +31,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation import Excitation
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import total_defect
 from multiphi_exudyn.time.known_warnings import (
     cluster_warnings,
     damping_warnings,
     missing_modes,
     static_warnings,
 )
-from multiphi_exudyn.time.left_out import LeftOut, energy_warning, left_out_warnings
-from multiphi_exudyn.time.looking import looked
+from multiphi_exudyn.time.left_out import energy_warning, left_out_warnings, verdict_of
 from multiphi_exudyn.time.rough_impacts import impact_warnings
 from multiphi_exudyn.time.rubbing import rubbing_warnings
 from multiphi_exudyn.time.segment import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.verdict import share_lost
 
 __all__ = ["Known", "RunSummary", "warnings_of", "warnings_of_body"]
 
@@ -63,27 +61,44 @@ PIECE_BYTES = 500  # that it takes there, its segment included
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
-    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
+    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by.
+
+    Runs of one length in the same levels with one verdict are told alike, and what was told is kept for the next one,
+    but where somebody looks into every run.
+    """
     segments = trajectory.segments
     if not segments:
         return ()
-    known = Known.of(trajectory.model, segments)
+    if tolerance is not None:
+        return _told(trajectory, Known.of(trajectory.model, segments), verdict_of(trajectory, tolerance), tolerance)
+    record, verdict = trajectory.ending.record, segments.verdict
+    key = record.visited, verdict, trajectory.t_end, trajectory.start.time
+    kept = record.arrays.levels.told
+    if (found := kept.find(key)) is not None:
+        return found
+    known, judged = Known.of(trajectory.model, segments), verdict_of(trajectory)
+    told = _told(trajectory, known, judged)
+    return kept.keep(key, told) if known.alike and judged == verdict else told
+
+
+def _told(
+    trajectory: Trajectory, known: Known, verdict: tuple[float, float], tolerance: Tolerance | None = None
+) -> tuple[str, ...]:
+    """The sentences on a run with a verdict on what truncation took of it."""
     before, after = known.around(trajectory)
-    if known.whole:
-        return (*before, *after)
-    return (*before, *_left_out(trajectory, known, tolerance), *after)
+    struck = known.rigid and verdict[1] > 0 and _struck(trajectory)
+    return (*before, *left_out_warnings(trajectory.model, verdict, tolerance, struck), *after)
 
 
 @dataclass(frozen=True)
 class Known:
     """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    whole: no level leaves out a mode. rigid: there is a rigid contact. asked: whether friction, or the model's own
+    rigid: there is a rigid contact. asked: whether friction, or the model's own
     check, looks into every run. before, clusters: warnings. fastest: the highest frequency of the open level [Hz].
     slowest: the lowest of the levels that is not zero [rad/s]. ample: a time [s] in which all modes move.
     """
 
-    whole: bool
     rigid: bool
     asked: bool
     before: tuple[str, ...]
@@ -91,6 +106,11 @@ class Known:
     fastest: float
     slowest: float
     ample: float
+
+    @property
+    def alike(self) -> bool:
+        """Whether runs of one length in the same levels, with one verdict, are told the same."""
+        return not (self.asked or self.rigid)
 
     @classmethod
     def of(cls, model: MultiPhiModel, segments: Segments) -> Known:
@@ -107,7 +127,6 @@ class Known:
         fastest = model.level_at(()).highest_frequency
         slowest = float(np.min(omega[omega > 0], initial=math.inf))
         return cls(
-            model.whole,
             any(contact.rigid for contact in model.contacts),
             model.general or model.validity is not None,
             (*damping_warnings(model), *missing_modes(model), *static),
@@ -161,7 +180,7 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     found = [*damping_warnings(model), *missing_modes(model)]
     if not model.whole:
         found.extend(static_warnings(run.levels))
-        found.extend(energy_warning(abs(run.truncated), run.energy))
+        found.extend(energy_warning(share_lost(abs(run.truncated), run.energy)))
     return tuple(found)
 
 
@@ -187,22 +206,6 @@ def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
             f"{per_cent(share)} of what loads move it by is round-off; hold it, or make its stiffness exactly zero"
         )
-
-
-def _left_out(trajectory: Trajectory, known: Known, tolerance: Tolerance | None) -> tuple[str, ...]:
-    """Of what truncation took of a run, whatever its sign at an instant."""
-    numbers, y, segments = trajectory.ending.numbers.tolist(), trajectory.start.displacement, trajectory.segments
-    excitation = segments.levels[0].excitation
-    lost = numbers[a.TRUNCATED] + abs(numbers[a.LOST_AT_START + a.KINETIC] + numbers[a.LOST_AT_START + a.STRAIN])
-    given = numbers[a.GIVEN_ENERGY] + (float(trajectory.load.dot(y)) if excitation.pushes else 0.0)
-    square = numbers[a.GIVEN_SQUARE] or float(y.dot(y))
-    taken = LeftOut(lost, total_defect(trajectory), abs(given), square)
-    much, far = taken.looked_into(tolerance)
-    if not (much or far):
-        return ()
-    sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
-    struck = known.rigid and _struck(trajectory)
-    return left_out_warnings(trajectory.model, excitation, taken, (much, far), tolerance, sizes, struck)
 
 
 def _struck(trajectory: Trajectory) -> bool:

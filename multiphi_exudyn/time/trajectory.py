@@ -165,17 +165,22 @@ class Trajectory(ModelHistories):
         """
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
-        return Ledger.of(self.ending.sums, self.segments.works, self._static_potentials)
+        ending = self.ending
+        return Ledger.of(ending.sums, self.segments.works, self._static_work, self.initial_energy, ending.energy)
 
     @property
-    def _static_potentials(self) -> tuple[float, float]:
-        """f.y [J] of the static load at the start and at the end."""
+    def _static_work(self) -> float:
+        """Work [J] of the static load."""
         level = self.ending.level
-        assert level is not None, "a run with segments has a final state"
-        if not level.excitation.pushes:
-            return 0.0, 0.0
-        last = level.configuration(self.ending.displacement)
-        return float(self.load.dot(self.start.displacement)), float(self.load.dot(last))
+        if level is None or not level.excitation.pushes:
+            return 0.0
+        return float(self.load @ (level.configuration(self.ending.displacement) - self.start.displacement))
+
+    @property
+    def initial_energy(self) -> float:
+        """Kinetic and strain energy [J] at the start, which of a run that sets out the loop has."""
+        state = self.start.state
+        return self.ending.given_energy if state is None else state.level.energy(state.displacement, state.velocity)
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
