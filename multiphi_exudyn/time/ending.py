@@ -67,7 +67,7 @@ class Ending(NamedTuple):
 
     @property
     def sums(self) -> list[float]:
-        """What a ledger is made of, see ``Ledger.of``."""
+        """What a ledger is made of, see ``ledger_of``."""
         sums: list[float] = self.numbers[a.LOST_AT_START : a.WORK + 1].tolist()
         return sums
 

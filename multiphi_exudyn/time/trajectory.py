@@ -24,7 +24,7 @@ from multiphi_exudyn.events.exits import exits_of
 from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.time.balance import Ledger, Statistics
+from multiphi_exudyn.time.balance import Ledger, Statistics, ledger_of
 from multiphi_exudyn.time.ending import Ending
 from multiphi_exudyn.time.histories import INSTANTS
 from multiphi_exudyn.time.model_histories import ModelHistories
@@ -166,7 +166,7 @@ class Trajectory(ModelHistories):
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         ending = self.ending
-        return Ledger.of(ending.sums, self.segments.works, self._static_work, self.initial_energy, ending.energy)
+        return ledger_of(ending.sums, self.segments.works, self._static_work, self.initial_energy, ending.energy)
 
     @property
     def _static_work(self) -> float:
