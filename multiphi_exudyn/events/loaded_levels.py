@@ -49,8 +49,8 @@ class LoadedLevels:
     places for channels, which outlast a run; these where nothing varies.
     lasting: the longest time [s] that a motion takes.
     arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
-    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py). told: the
-    warnings of runs that are told alike (reliability.py).
+    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py). told:
+    what is told alike of runs in the same levels (reliability.py).
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class LoadedLevels:
         self.arrays: Any = None
         self.held: Any = None
         self.starts = BoundedCache[float, Any](STARTS)
-        self.told = BoundedCache[Hashable, tuple[str, ...]](TOLD)
+        self.told = BoundedCache[Hashable, Any](TOLD)
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
@@ -16,6 +18,7 @@ from multiphi_exudyn.time.verdict import judge
 
 __all__ = ["energy_warning", "least_indicator", "left_out_warnings", "verdict_of"]
 
+TEXTS = 64  # sentences of each kind that are kept, by their number
 RIGID_INDICATOR = 0.05  # where a rigid contact is struck: its impacts raise the indicator more than the error
 
 
@@ -25,13 +28,13 @@ def least_indicator(tolerance: Tolerance | None) -> float:
 
 
 def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
-    """The verdict on a run; where the loop did not know enough for it, or of a smaller limit, that is looked for.
+    """The verdict on a run of which the loop did not know enough, or not the limit.
 
     tolerance: the one that the modes were decided by.
     """
-    (share, error), limit = trajectory.segments.verdict, least_indicator(tolerance)
-    if trajectory.model.whole or (limit == INDICATOR and share >= 0 and error >= 0):
-        return share, error
+    if trajectory.model.whole:
+        return 0.0, 0.0
+    limit = least_indicator(tolerance)
     numbers, isolated = trajectory.ending.numbers.copy(), int(trajectory.ending.record.arrays.levels.isolated)
     numbers[a.DEFECTS] = total_defect(trajectory)
     numbers[a.GIVEN_SQUARE] = numbers[a.GIVEN_SQUARE] or np.sum(trajectory.start.displacement**2)
@@ -49,10 +52,21 @@ def left_out_warnings(
 ) -> tuple[str, ...]:
     """Of the energy that truncation took, and of the motion that it did; struck: whether a rigid contact was."""
     share, error = verdict
-    found = energy_warning(share)
-    return (*found, *_motion_warning(model, error, tolerance, struck)) if error > 0 else found
+    if tolerance is not None and error > tolerance.error:
+        return energy_warning(share) + _tolerance_warning(model, error, tolerance)
+    return energy_warning(share) + _motion_warning(error, struck)
 
 
+def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance) -> tuple[str, ...]:
+    """Of an indicator above the tolerance that the modes were decided by."""
+    kept = model.level_at(()).modes
+    return (
+        f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
+        "give Tolerance a larger most=, or a new model, so that it decides by this run",
+    )
+
+
+@functools.lru_cache(TEXTS)
 def energy_warning(share: float) -> tuple[str, ...]:
     """Of the energy lost, of the largest of the run; nothing where that is too small to be told."""
     if not share > 0:
@@ -60,14 +74,9 @@ def energy_warning(share: float) -> tuple[str, ...]:
     return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
 
 
-def _motion_warning(model: MultiPhiModel, error: float, tolerance: Tolerance | None, struck: bool) -> tuple[str, ...]:
-    """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
-    if tolerance is not None and error > tolerance.error:
-        kept = model.level_at(()).modes
-        return (
-            f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
-            "give Tolerance a larger most=, or a new model, so that it decides by this run",
-        )
+@functools.lru_cache(TEXTS)
+def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
+    """Of the estimated error, which is four times the true one in the mean where a rigid contact was struck."""
     if not error > (RIGID_INDICATOR if struck else INDICATOR):
         return ()
     typical = ", with rigid contacts a quarter of that is typical" if struck else ""

@@ -63,40 +63,37 @@ PIECE_BYTES = 500  # that it takes there, its segment included
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
     """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by.
 
-    Runs of one length in the same levels with one verdict are told alike, and what was told is kept for the next one,
-    but where somebody looks into every run.
+    What is told beside the verdict on truncation is the same for runs of one length in the same levels, and kept for
+    them, but where somebody looks into every run.
     """
     segments = trajectory.segments
     if not segments:
         return ()
-    if tolerance is not None:
-        return _told(trajectory, Known.of(trajectory.model, segments), verdict_of(trajectory, tolerance), tolerance)
-    record, verdict = trajectory.ending.record, segments.verdict
-    key = record.visited, verdict, trajectory.t_end, trajectory.start.time
-    kept = record.arrays.levels.told
-    if (found := kept.find(key)) is not None:
-        return found
-    known, judged = Known.of(trajectory.model, segments), verdict_of(trajectory)
-    told = _told(trajectory, known, judged)
-    return kept.keep(key, told) if known.alike and judged == verdict else told
-
-
-def _told(
-    trajectory: Trajectory, known: Known, verdict: tuple[float, float], tolerance: Tolerance | None = None
-) -> tuple[str, ...]:
-    """The sentences on a run with a verdict on what truncation took of it."""
-    before, after = known.around(trajectory)
-    struck = known.rigid and verdict[1] > 0 and _struck(trajectory)
-    return (*before, *left_out_warnings(trajectory.model, verdict, tolerance, struck), *after)
+    record, model = trajectory.ending.record, trajectory.model
+    key, kept = (record.visited, trajectory.t_end, trajectory.start.time), record.arrays.levels.told
+    found = kept.find(key)
+    if found is None:
+        known = Known.of(model, segments)
+        found = known, *known.around(trajectory)
+        if not known.asked:
+            kept.keep(key, found)
+    known, before, after = found
+    share, error = segments.verdict
+    if tolerance is not None or not (share >= 0 and error >= 0):
+        share, error = verdict_of(trajectory, tolerance)
+    if not (share > 0 or error > 0):
+        return before + after
+    struck = known.rigid and error > 0 and _struck(trajectory)
+    return before + left_out_warnings(model, (share, error), tolerance, struck) + after
 
 
 @dataclass(frozen=True)
 class Known:
     """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    rigid: there is a rigid contact. asked: whether friction, or the model's own
-    check, looks into every run. before, clusters: warnings. fastest: the highest frequency of the open level [Hz].
-    slowest: the lowest of the levels that is not zero [rad/s]. ample: a time [s] in which all modes move.
+    rigid: there is a rigid contact. asked: whether friction, or the model's own check, looks into every run. before,
+    clusters: warnings. fastest: the highest frequency of the open level [Hz]. slowest: the lowest of the levels that is
+    not zero [rad/s]. ample: a time [s] in which all modes move.
     """
 
     rigid: bool
@@ -106,11 +103,6 @@ class Known:
     fastest: float
     slowest: float
     ample: float
-
-    @property
-    def alike(self) -> bool:
-        """Whether runs of one length in the same levels, with one verdict, are told the same."""
-        return not (self.asked or self.rigid)
 
     @classmethod
     def of(cls, model: MultiPhiModel, segments: Segments) -> Known:
@@ -194,6 +186,11 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
         )
 
 
+def _struck(trajectory: Trajectory) -> bool:
+    """Whether a rigid contact was struck."""
+    return bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
+
+
 def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
     """Of a mode of which a run sees so little that where loads move it is a difference of far places.
 
@@ -206,11 +203,6 @@ def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
             f"{per_cent(share)} of what loads move it by is round-off; hold it, or make its stiffness exactly zero"
         )
-
-
-def _struck(trajectory: Trajectory) -> bool:
-    """Whether a rigid contact was struck."""
-    return bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
 
 
 def _load_pieces(excitation: Excitation, end: float) -> str:
