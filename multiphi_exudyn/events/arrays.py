@@ -119,27 +119,32 @@ UNMOVED = 224  # flags of elements that nothing lets move: nobody looks at their
 WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the segment under way are
 STARTS, START_STATES, START = 228, 229, 230  # where starts stand, their states in the ints; which of them a run has
 MAPPED_AGAIN, SPEEDS_CHANGED = 231, 232  # whether the decision under way took more than one map; impacts beside it
-RUN_INTS = 233
+ISOLATED = 233  # whether nothing works on the structure from outside
+RUN_INTS = 234
 
 # ---------------------------------------------------------------------- run record, numbers
 
-TIME, HORIZON, LAST_DECISION, ALLOWED, WORK, INSTANT_TIME, AGE = 0, 1, 2, 3, 4, 5, 6
+TIME, HORIZON, LAST_DECISION, ALLOWED, INSTANT_TIME, AGE = 0, 1, 2, 3, 5, 6
+SWUNG = 4  # twice the largest energy so far, as far as it was looked for
 GIVEN_SPRINGS = 7  # strain energy [J] of the links that hold at the start, all in one
 TOLD = 8  # three numbers of a failure
 LOST, LOST_NOW, LOST_IN_IMPACT, LOST_STILLED = 12, 18, 24, 30  # energies of a decision, of an answer, of impacts
-LOST_AT_START = 36
-DEFECTS, TRUNCATED = 42, 43  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
-WORKS = 44  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
-SWUNG = 47  # twice the largest energy so far, as far as it was looked for
-GIVEN_ENERGY = 48  # kinetic and strain energy [J] that the run was given, less the potential of static loads
-LOST_SO_FAR = 49  # energies lost at events
-LOOKED = 55  # instants of the motion looked at; of these the mean of |y|^2, and the largest energy (time/looking.py)
-LOOK_FIRST, LOOK_END = 58, 59  # the first and the last such instant, one and the same where nobody looks on
-GIVEN_SQUARE = 60  # |y|^2 at the start, zero where a run goes on from another
-INDEPENDENCE = 61  # of directions of length one: what is left beside others, below which one follows from them
-WORKS_NOW = 62  # of the segment under way
-SEEN = 65  # like LOOKED, with the segment under way; of samples of a run that is over (time/sampling.py)
-RUN_NUMBERS = 68
+LOST_AT_START = 36  # from here to WORK: what a ledger is made of (time/balance.py)
+LOST_SO_FAR = 42  # energies lost at events
+WORK = 48  # [J] of varying loads and stops on the present state
+GIVEN_ENERGY = 49  # kinetic and strain energy [J] that the run was given, less the potential of static loads
+GIVEN_POTENTIAL = 50  # f.y [J] of static loads at the start
+LEFT_ENERGY = 51  # kinetic and strain energy [J] of the state in which the loop was left, nan where that is not known
+WORKS = 52  # [J] of damping, of what varies and of friction so far, in the segments that are not listed as left out
+DEFECTS, TRUNCATED = 55, 56  # of the run: |defect|^2, nan where one is not known; energy truncated, without its sign
+VERDICT = 57  # what truncation took, of the largest energy, and its indicator of the motion (time/verdict.py)
+GIVEN_SQUARE = 59  # |y|^2 at the start, zero where a run goes on from another
+LOOKED = 60  # instants of the motion looked at; of these the mean of |y|^2, and the largest energy (time/looking.py)
+LOOK_FIRST, LOOK_END = 63, 64  # the first and the last such instant, one and the same where nobody looks on
+INDEPENDENCE = 65  # of directions of length one: what is left beside others, below which one follows from them
+WORKS_NOW = 66  # of the segment under way
+SEEN = 69  # like LOOKED, with the segment under way; of samples of a run that is over (time/sampling.py)
+RUN_NUMBERS = 72
 OF_A_RUN = INDEPENDENCE  # so many, the first ones, are a run's own: it takes them along when another has the arrays
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
@@ -164,7 +169,9 @@ SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor
 #             which static loads work on y; zero while nobody asked
 DISSIPATED_MODES = 30  # (r, 2) of each mode in that form, first and one past the last that it goes with
 DRIVEN = 29  # forms of the works of what channels force, -1 where there are none (work_forms.py)
-LEVEL_INTS = 31
+STRAIN_FORM, STRAIN_ROWS = 31, 32  # strain energy: constant, row (n,), then rows (weight, n, offset), and how many of
+#             these; zero while nobody asked
+LEVEL_INTS = 33
 
 ELEMENT, ASKED, FIRMNESS, SIGNAL, ENTERED = 0, 1, 2, 3, 6
 TURN, FORWARD, BACKWARD = 7, 10, 11  # the speed that may turn it: a signal, -1 for none; the states asked for then

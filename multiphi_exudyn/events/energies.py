@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from multiphi_exudyn.events.arrays import (
     CARRIED,
     CHANNELS,
@@ -26,12 +28,14 @@ from multiphi_exudyn.events.arrays import (
     STICKS,
     STIFFNESSES,
     STRAIN,
+    STRAIN_FORM,
+    STRAIN_ROWS,
     VISCOUS,
 )
 from multiphi_exudyn.events.signals import gap
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
-__all__ = ["energy", "kinetic", "lose", "pattern_work", "potential"]
+__all__ = ["energy", "kinetic", "lose", "pattern_work", "potential", "strain"]
 
 
 @compiled
@@ -99,6 +103,25 @@ def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
 def energy(ints: Ints, numbers: Numbers, state: int) -> float:
     """Kinetic and strain energy less the potential of static loads [J]."""
     return kinetic(ints, numbers, state) + potential(ints, numbers, state) + pattern_work(ints, numbers, state)
+
+
+@compiled
+def strain(ints: Ints, numbers: Numbers, state: int) -> float:
+    """Strain energy [J], which is no difference of large energies (StrainForm); nan where nobody has asked for it."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    form, n, total = ints[level + STRAIN_FORM], ints[level + MODES] + ints[CHANNELS], 0.0
+    if form == 0:
+        return math.nan
+    row = form + 1 + n
+    for _ in range(ints[level + STRAIN_ROWS]):
+        stretch = numbers[row + 1 + n]
+        for i in range(n):
+            stretch += numbers[row + 1 + i] * numbers[x + i]
+        total += 0.5 * numbers[row] * stretch * stretch
+        row += n + 2
+    for i in range(n):
+        total += numbers[form + 1 + i] * numbers[x + i]
+    return total + numbers[form]
 
 
 @compiled

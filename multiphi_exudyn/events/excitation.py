@@ -153,7 +153,12 @@ class Excitation:
     @functools.cached_property
     def nothing(self) -> bool:
         """Whether there is no load, and nothing varies."""
-        return not (self.histories or np.any(self.static))
+        return not (self.histories or self.pushes)
+
+    @functools.cached_property
+    def pushes(self) -> bool:
+        """Whether there is a static load."""
+        return bool(np.any(self.static))
 
     @functools.cached_property
     def most_effort(self) -> int:

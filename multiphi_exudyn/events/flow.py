@@ -66,7 +66,7 @@ from multiphi_exudyn.mathematics.response_arrays import (
     forced_response,
 )
 
-__all__ = ["expand", "signal_sizes", "signal_waves", "state_at"]
+__all__ = ["expand", "signal_sizes", "signal_waves", "state_at", "step_on"]
 
 
 @compiled
@@ -284,11 +284,32 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
 @compiled
 def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x: int, v: int) -> None:
     """xi, xi' of the flow a time t after its state; held channels stay what they are."""
+    basis, phi = ints[FLOW_BASIS], ints[WORK_WAVES]
+    exponentials(ints, numbers, waves, basis, t, t, phi)
+    differentiate(ints, numbers, waves, basis, ints[FLOW_WAVES], phi + ints[FLOW_COUNT])
+    sum_flow(ints, numbers, waves, level, x, v)
+
+
+@compiled
+def step_on(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float, again: int, x: int, v: int) -> None:
+    """``state_at`` a step [s] after the time that was asked about last, ``again`` 1 where that was one step on too.
+
+    Of a flow without powers of time the exponentials are multiplied by those of the step.
+    """
+    basis, phi, p = ints[FLOW_BASIS], ints[WORK_WAVES], ints[FLOW_COUNT]
+    if again == 0:
+        exponentials(ints, numbers, waves, basis, step, step, phi + 2 * p)
+    for j in range(p):
+        waves[phi + j] *= waves[phi + 2 * p + j]
+    sum_flow(ints, numbers, waves, level, x, v)
+
+
+@compiled
+def sum_flow(ints: Ints, numbers: Numbers, waves: Waves, level: int, x: int, v: int) -> None:
+    """xi, xi' from the exponentials at a time, and the coefficients of their derivatives."""
     r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
     n, free, count, c = r + ints[PRESCRIBED], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
     phi, rate = ints[WORK_WAVES], ints[WORK_WAVES] + ints[FLOW_COUNT]
-    exponentials(ints, numbers, waves, basis, t, t, phi)
-    differentiate(ints, numbers, waves, basis, c, rate)
     for i in range(r + ints[CHANNELS]):
         numbers[x + i] = 0.0 if i < n else numbers[ints[ints[FLOW_FROM] + PLACE] + i]
         numbers[v + i] = 0.0

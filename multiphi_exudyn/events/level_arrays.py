@@ -15,7 +15,7 @@ from multiphi_exudyn.events.element_arrays import describe_elements
 from multiphi_exudyn.events.exit_table import ExitTable
 from multiphi_exudyn.events.exits import after, asked_alone, entered_row, exits_of
 from multiphi_exudyn.events.level_parts import from_base
-from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal, put_sizes
+from multiphi_exudyn.events.level_records import put_base, put_level, put_powers, put_signal, put_sizes, put_strain
 from multiphi_exudyn.events.level_tables import LevelTables
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.loaded_levels import LoadedLevels
@@ -117,6 +117,7 @@ class LevelArrays:
         self.base = 0  # where it stands as a level in the ints, once there are starts
         self._starts = 0  # for how many there is room
         describe_elements(self.buffers, self.levels.model)
+        self.ints[a.ISOLATED] = self.levels.isolated
         self._tables = LevelTables(self.buffers)  # what the loop finds, and does not ask for
         self.channels.describe(self.buffers)
         self.scratch = ScratchArrays(self.buffers, self.channels.terms)
@@ -255,6 +256,12 @@ class LevelArrays:
         """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
+
+    def add_strain(self, states: tuple[int, ...]) -> None:
+        """Pack the strain energy of a level, if it stands in the ints, for runs that end in it."""
+        record = self._offsets[self._levels[states]] if states in self._levels else 0
+        if record and not self.ints[record + a.STRAIN_FORM]:
+            put_strain(self.buffers, record, self.loaded[self._levels[states]])
 
     def _add_sizes(self, level: int) -> None:
         """Pack what |y| and the work of static loads are read from in a level that stands in the ints."""

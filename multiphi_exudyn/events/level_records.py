@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.element import Exit, Share
 
-__all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes"]
+__all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes", "put_strain"]
 
 Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
 
@@ -122,6 +122,15 @@ def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     rows = factor(motion)
     given[: len(rows)] = rows
     buffers.ints[record + a.SIZES] = buffers.put("numbers", given)
+
+
+def put_strain(buffers: Buffers, record: int, level: LoadedLevel) -> None:
+    """Give the record of a level its strain energy."""
+    form = level.strain_form
+    rows = np.column_stack([form.weights, form.rows, form.offsets])
+    buffers.ints[record + a.STRAIN_ROWS] = len(rows)
+    values = np.concatenate([[form.constant], form.linear, rows], axis=None)
+    buffers.ints[record + a.STRAIN_FORM] = buffers.put("numbers", values)
 
 
 def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:

@@ -205,6 +205,10 @@ class LoadedLevel(Shown):
         """Whether channels move rigid stops, and the structure with them."""
         return bool(np.any(self.channels.carried))
 
+    def energy(self, displacement: np.ndarray, velocity: np.ndarray) -> float:
+        """Kinetic and strain energy [J] of xi, xi' (r + q,)."""
+        return float(self.kinetic(velocity) + self.strain(displacement))
+
     def strain(self, displacement: np.ndarray) -> np.ndarray:
         """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column; given frequencies count."""
         return self.strain_form(displacement)

@@ -23,6 +23,7 @@ from multiphi_exudyn.mathematics.signal_bounds import power_of_two_above
 __all__ = ["LoadedLevels"]
 
 STARTS = 4  # ends of runs for which it is kept what starts are judged by
+TOLD = 16  # of what was told of runs
 FURTHER = 8  # of a level: of two steps of a solver, with what is attached at two places
 
 T = TypeVar("T")
@@ -48,7 +49,8 @@ class LoadedLevels:
     places for channels, which outlast a run; these where nothing varies.
     lasting: the longest time [s] that a motion takes.
     arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
-    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py).
+    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py). told:
+    what is told alike of runs in the same levels (reliability.py).
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class LoadedLevels:
         self.arrays: Any = None
         self.held: Any = None
         self.starts = BoundedCache[float, Any](STARTS)
+        self.told = BoundedCache[Hashable, Any](TOLD)
         self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
@@ -107,6 +110,11 @@ class LoadedLevels:
             self.arrays = None
         else:
             self.held = None
+
+    @property
+    def isolated(self) -> bool:
+        """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
+        return self.excitation.nothing and not (self.model.general or self.model.overrides)
 
     @property
     def load(self) -> np.ndarray:

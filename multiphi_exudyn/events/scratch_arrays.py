@@ -110,7 +110,7 @@ class ScratchArrays:
             | {a.CONSTANTS: signals, a.NOISES: signals}
             | {a.SEARCH_NUMBERS: max(zero_crossing.scratch_numbers(p, signals), 2 * p)},
             "ints": {a.WAITING: 2 * signals, a.FALLEN: signals},
-            "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 2 * p}
+            "waves": {a.FLOW_WAVES: p, a.SIGNALS: signals * p, a.WORK_WAVES: 3 * p}
             | {a.SEARCH_WAVES: zero_crossing.scratch_waves(p, signals)}
             | {a.FORCES: terms * n, a.FORCED: room * n, a.FORCED_WORK: (2 + p) * room, a.FLOW_FORCED: q * room * n},
         }

@@ -31,7 +31,6 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.time.going_on import stops_moved
-from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.trajectory import Trajectory
 
@@ -144,7 +143,7 @@ class Shooting:
     def _free(self, trajectory: Trajectory) -> np.ndarray:
         """Which coordinates are unknowns: all but places that links have held all the time, or never."""
         model = self.map.model
-        levels = [self._state.level, *listed(trajectory.segments).levels]
+        levels = [self._state.level, *trajectory.segments.levels]
         holding = [model.links_held(level.states) for level in levels]
         kept = [len({i in held for held in holding}) == 1 for i in model.held]
         return np.flatnonzero(np.append(np.ones(len(self._scales) - len(kept), bool), ~np.array(kept, bool)))

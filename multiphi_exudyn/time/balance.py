@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 from multiphi_exudyn.display import Shown
+from multiphi_exudyn.events.arrays import BY_IMPACT, DAMPING, FRICTION, KINETIC, STOP_WORK, STRAIN
 
-__all__ = ["Ledger", "Statistics"]
+__all__ = ["Ledger", "Statistics", "ledger_of"]
 
 
 class Statistics(NamedTuple):
@@ -86,3 +87,24 @@ class Ledger(Shown):
     def _facts(self) -> Iterator[tuple[str, str]]:
         for name in (*(entry.name for entry in fields(self)), "residual"):
             yield name.replace("_", " "), f"{getattr(self, name):.4g} J"
+
+
+def ledger_of(
+    sums: Sequence[float], works: tuple[float, float, float], static: float, initial: float, final: float
+) -> Ledger:
+    """The ledger of the numbers (13,) of a run from LOST_AT_START to WORK (events/arrays.py).
+
+    works [J]: of damping, of what varies and of friction, of all segments. static: work [J] of constant loads.
+    """
+    impact, kinetic, strain, stopped, damping, friction, *lost, work = sums
+    damped, varying, rubbed = works
+    return Ledger(
+        initial=initial,
+        work_of_loads=static + (stopped + lost[STOP_WORK]) + varying + work,
+        impact=impact + lost[BY_IMPACT],
+        truncation_kinetic=kinetic + lost[KINETIC],
+        truncation_strain=strain + lost[STRAIN],
+        damping=damping + lost[DAMPING] + damped,
+        friction=friction + lost[FRICTION] + rubbed,
+        final=final,
+    )

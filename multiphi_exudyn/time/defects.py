@@ -25,10 +25,11 @@ from multiphi_exudyn.events.defect_forms import allowed, defect_form, held_rigid
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.events.transition import Transition
-from multiphi_exudyn.time.segment import Segments, listed
+from multiphi_exudyn.time.segment import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.verdict import indicator
 
-__all__ = ["Defect", "DefectHistory", "defects", "indicator", "total_defect"]
+__all__ = ["Defect", "DefectHistory", "defects", "total_defect"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class DefectHistory:
     @classmethod
     def of(cls, trajectory: Trajectory) -> DefectHistory:
         """Of a run with segments."""
-        segments = listed(trajectory.segments)
+        segments = trajectory.segments
         table = event_table(trajectory.events, trajectory.model.index)
         stopped = _stopped(table, segments.starts)
         ways = _ways(segments.numbers, stopped)
@@ -86,16 +87,9 @@ class DefectHistory:
         return indicator(lost, self.segments.sizes(end)[0])
 
 
-def indicator(lost: float, square: float) -> float:
-    """The truncation indicator of a sum of |defect|^2 and the mean of |y|^2 (truncation.py)."""
-    if square == 0:
-        return math.inf if lost else 0.0
-    return math.sqrt(lost / square)
-
-
-def total_defect(trajectory: Trajectory, segments: Segments) -> float:
+def total_defect(trajectory: Trajectory) -> float:
     """Sum of |defect|^2 [m2 kg] over the segments of a run, which the loop has added up where it could."""
-    known = segments.defects
+    known = trajectory.segments.defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(known) else known
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -65,9 +66,26 @@ class Ending(NamedTuple):
         return Loss(*self.numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
 
     @property
-    def work(self) -> float:
-        """Work [J] that varying loads and stops have done on the last state."""
-        return float(self.numbers[a.WORK])
+    def sums(self) -> list[float]:
+        """What a ledger is made of, see ``ledger_of``."""
+        sums: list[float] = self.numbers[a.LOST_AT_START : a.WORK + 1].tolist()
+        return sums
+
+    @property
+    def given_energy(self) -> float:
+        """Kinetic and strain energy [J] that a run was given that sets out."""
+        energy, potential = self.numbers[a.GIVEN_ENERGY : a.GIVEN_POTENTIAL + 1].tolist()
+        return float(energy + potential)
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and strain energy [J] of the last state; the loop has that of runs which end like this one."""
+        assert self.level is not None, "a run with segments has a final state"
+        left = float(self.numbers[a.LEFT_ENERGY])
+        if not math.isnan(left):
+            return left
+        self.record.arrays.add_strain(self.level.states)
+        return self.level.energy(self.displacement, self.velocity)
 
     def statistics(self, segments: int, events: int, possible: int) -> Statistics:
         """What the run has taken; possible: levels."""

@@ -1,90 +1,82 @@
-"""Left out: what truncation took of a run, and how large it has to be for a warning.
-
-The energy is told from a share of the largest of the run on, whatever its sign at an instant; the motion from an
-indicator on (truncation.py). The thresholds are calibrated on random truncated models judged by the same with all
-modes: tests/campaign/truncation_study.py.
-"""
+"""Left out: sentences on what truncation took of a run, from its verdict (verdict.py)."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import functools
+
+import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import indicator
+from multiphi_exudyn.time.defects import total_defect
 from multiphi_exudyn.time.known_warnings import REMEDY
-from multiphi_exudyn.time.looking import INDICATOR, is_small
+from multiphi_exudyn.time.looking import INDICATOR, SAMPLES
+from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.verdict import judge
 
-__all__ = ["LeftOut", "energy_warning", "left_alone", "left_out_warnings"]
+__all__ = ["energy_warning", "least_indicator", "left_out_warnings", "verdict_of"]
 
-ENERGY_SHARE = 0.01  # of the largest energy of a run
+TEXTS = 64  # sentences of each kind that are kept, by their number
 RIGID_INDICATOR = 0.05  # where a rigid contact is struck: its impacts raise the indicator more than the error
 
 
-class LeftOut(NamedTuple):
-    """What truncation took of a run: energy [J], its sum of |defect|^2; of its start: the energy [J] given, |y|^2."""
+def least_indicator(tolerance: Tolerance | None) -> float:
+    """From which on it is told; tolerance: the one that the modes were decided by."""
+    return INDICATOR if tolerance is None else min(INDICATOR, tolerance.error)
 
-    energy: float
-    defects: float
-    given: float
-    square: float
 
-    def looked_into(self, tolerance: Tolerance | None) -> tuple[bool, bool]:
-        """Whether its energy, and what it did to the motion, may be told; what is not a number may.
+def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
+    """The verdict on a run of which the loop did not know enough, or not the limit.
 
-        tolerance: the one that the modes were decided by.
-        """
-        least = min(INDICATOR, tolerance.error) if tolerance else INDICATOR
-        much = not self.energy <= ENERGY_SHARE * self.given
-        return much, not (self.defects <= 0 or is_small(self.defects, least, self.square))
+    tolerance: the one that the modes were decided by.
+    """
+    if trajectory.model.whole:
+        return 0.0, 0.0
+    limit = least_indicator(tolerance)
+    numbers, isolated = trajectory.ending.numbers.copy(), int(trajectory.ending.record.arrays.levels.isolated)
+    numbers[a.DEFECTS] = total_defect(trajectory)
+    numbers[a.GIVEN_SQUARE] = numbers[a.GIVEN_SQUARE] or np.sum(trajectory.start.displacement**2)
+    judge(numbers, isolated, limit, trajectory.t_end)
+    if np.isnan(numbers[a.VERDICT : a.VERDICT + 2]).any():
+        numbers[a.LOOKED : a.LOOKED + a.LOOK_WIDTH] = SAMPLES, *trajectory.segments.sizes(trajectory.t_end)
+        numbers[a.LOOK_END] = trajectory.t_end
+        judge(numbers, isolated, limit, trajectory.t_end)
+    share, error = numbers[a.VERDICT : a.VERDICT + 2].tolist()
+    return share, error
 
 
 def left_out_warnings(
-    model: MultiPhiModel,
-    excitation: Excitation,
-    taken: LeftOut,
-    looked: tuple[bool, bool],
-    tolerance: Tolerance | None,
-    sizes: tuple[float, float],
-    struck: bool,
+    model: MultiPhiModel, verdict: tuple[float, float], tolerance: Tolerance | None, struck: bool
 ) -> tuple[str, ...]:
-    """Of the energy that truncation took, and of the motion that it did, where these are ``looked_into``.
-
-    sizes: mean of |y|^2 and largest energy of the run. struck: whether a rigid contact was.
-    """
-    (much, far), (square, largest) = looked, sizes
-    found: tuple[str, ...] = ()
-    if much:
-        alone = left_alone(model, excitation)
-        found = energy_warning(taken.energy, taken.given if alone else max(largest, taken.given))
-    if far:
-        found += _motion_warning(model, indicator(taken.defects, square), tolerance, struck)
-    return found
-
-
-def left_alone(model: MultiPhiModel, excitation: Excitation) -> bool:
-    """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
-    return excitation.nothing and not (model.general or model.overrides)
-
-
-def energy_warning(lost: float, largest: float) -> tuple[str, ...]:
-    """largest: zero where truncation has taken all energy at the start."""
-    if not lost > ENERGY_SHARE * largest:
-        return ()
-    share = per_cent(lost / (largest or lost))
-    return (f"lost energy: truncation took {share} of the largest energy of the run; {REMEDY}",)
-
-
-def _motion_warning(model: MultiPhiModel, error: float, tolerance: Tolerance | None, struck: bool) -> tuple[str, ...]:
-    """Of the estimated error, which with rigid contacts is four times the true one in the mean."""
+    """Of the energy that truncation took, and of the motion that it did; struck: whether a rigid contact was."""
+    share, error = verdict
     if tolerance is not None and error > tolerance.error:
-        kept = model.level_at(()).modes
-        return (
-            f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
-            "give Tolerance a larger most=, or a new model, so that it decides by this run",
-        )
+        return energy_warning(share) + _tolerance_warning(model, error, tolerance)
+    return energy_warning(share) + _motion_warning(error, struck)
+
+
+def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance) -> tuple[str, ...]:
+    """Of an indicator above the tolerance that the modes were decided by."""
+    kept = model.level_at(()).modes
+    return (
+        f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
+        "give Tolerance a larger most=, or a new model, so that it decides by this run",
+    )
+
+
+@functools.lru_cache(TEXTS)
+def energy_warning(share: float) -> tuple[str, ...]:
+    """Of the energy lost, of the largest of the run; nothing where that is too small to be told."""
+    if not share > 0:
+        return ()
+    return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
+
+
+@functools.lru_cache(TEXTS)
+def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
+    """Of the estimated error, which is four times the true one in the mean where a rigid contact was struck."""
     if not error > (RIGID_INDICATOR if struck else INDICATOR):
         return ()
     typical = ", with rigid contacts a quarter of that is typical" if struck else ""

@@ -8,7 +8,6 @@ passed before, sampling.py looks at them all, if somebody asks.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from multiphi_exudyn.events.arrays import (
     AFTER,
@@ -16,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     COORDINATES,
     CURRENT,
     DEFECTS,
+    FLOW_BASIS,
     GIVEN_SQUARE,
     INSTANT_TIME,
     LAST_DECISION,
@@ -32,10 +32,11 @@ from multiphi_exudyn.events.arrays import (
     TIME,
 )
 from multiphi_exudyn.events.energies import energy
-from multiphi_exudyn.events.flow import state_at
+from multiphi_exudyn.events.flow import state_at, step_on
+from multiphi_exudyn.mathematics.basis_arrays import PURE
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 
-__all__ = ["INDICATOR", "SAMPLES", "begin_look", "is_small", "keep_look", "look", "looked", "see"]
+__all__ = ["INDICATOR", "SAMPLES", "begin_look", "is_small", "keep_look", "look", "see"]
 
 SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
 HALVES = math.sqrt(2 * SAMPLES)
@@ -49,13 +50,6 @@ def is_small(lost: float, limit: float, square: float) -> int:
     A defect has changed |y| there by no more than its size; it is the first of the samples, which count by half.
     """
     return 1 if lost * (1.0 + HALVES / limit) ** 2 < square else 0
-
-
-def looked(numbers: Sequence[float], end: float) -> tuple[float, float] | None:
-    """Mean of |y|^2 and largest energy of a run to ``end`` [s], from its numbers; None where the loop did not look."""
-    if numbers[LOOKED] != SAMPLES or numbers[LOOK_END] != end:
-        return None
-    return numbers[LOOKED + 1], numbers[LOOKED + 2]
 
 
 @compiled
@@ -76,7 +70,7 @@ def look(ints: Ints, numbers: Numbers, waves: Waves) -> None:
     Until the first decision nobody knows what truncation will take, so all is looked at but a segment that ends the
     run. What a size is read from is packed when somebody has asked for it in a level (sampling.py), not before.
     """
-    first, end, level = numbers[LOOK_FIRST], numbers[LOOK_END], ints[CURRENT + LEVEL]
+    first, end, level, passed = numbers[LOOK_FIRST], numbers[LOOK_END], ints[CURRENT + LEVEL], 0
     for part in range(LOOK_WIDTH):
         numbers[SEEN + part] = numbers[LOOKED + part]
     while end > first and numbers[SEEN] < SAMPLES:
@@ -88,15 +82,28 @@ def look(ints: Ints, numbers: Numbers, waves: Waves) -> None:
         if ints[level + SIZES] == 0 or (small and (numbers[LAST_DECISION] > first or numbers[INSTANT_TIME] >= end)):
             numbers[LOOK_END] = first
             return
-        see(ints, numbers, waves, level, t - numbers[TIME], 1.0 if numbers[SEEN] > 0 and not last else 0.5)
+        weight = 1.0 if numbers[SEEN] > 0 and not last else 0.5
+        if passed > 0 and ints[ints[FLOW_BASIS] + PURE] == 1:
+            step, again = (end - first) / (SAMPLES - 1), 1 if passed > 1 else 0
+            step_on(ints, numbers, waves, level, step, again, ints[AFTER + PLACE], ints[AFTER + SPEED])
+            weigh(ints, numbers, level, weight)
+        else:
+            see(ints, numbers, waves, level, t - numbers[TIME], weight)
+        passed += 1
 
 
 @compiled
 def see(ints: Ints, numbers: Numbers, waves: Waves, level: int, delay: float, weight: float) -> None:
     """Count the flow a ``delay`` [s] after its state: how many were SEEN, their weighted mean |y|^2, largest energy."""
-    x, n, row = ints[AFTER + PLACE], ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
     ints[AFTER + LEVEL] = level
-    state_at(ints, numbers, waves, level, delay, x, ints[AFTER + SPEED])
+    state_at(ints, numbers, waves, level, delay, ints[AFTER + PLACE], ints[AFTER + SPEED])
+    weigh(ints, numbers, level, weight)
+
+
+@compiled
+def weigh(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
+    """Count the state AFTER, of a level."""
+    x, n, row = ints[AFTER + PLACE], ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
     square = 0.0
     for line in range(n + 1):
         size = numbers[row + n]

@@ -43,8 +43,10 @@ from multiphi_exudyn.events.arrays import (
     HIGHEST_FREQUENCY,
     HORIZON,
     INSTANT_TIME,
+    ISOLATED,
     JUDGED,
     LAST_DECISION,
+    LEFT_ENERGY,
     LEVEL,
     LOSSES,
     LOST,
@@ -92,7 +94,7 @@ from multiphi_exudyn.events.changes import clear
 from multiphi_exudyn.events.decision import decide, decide_jump
 from multiphi_exudyn.events.defect_sums import add_defect, add_start_defect
 from multiphi_exudyn.events.drive import keep_drive, load_piece, piece_end, set_drive
-from multiphi_exudyn.events.energies import energy, kinetic, pattern_work, potential
+from multiphi_exudyn.events.energies import energy, kinetic, pattern_work, potential, strain
 from multiphi_exudyn.events.flow import expand, state_at
 from multiphi_exudyn.events.maps import find_map
 from multiphi_exudyn.events.start import begin
@@ -101,8 +103,9 @@ from multiphi_exudyn.events.waiting import arm, flag_again, watch, who_asks
 from multiphi_exudyn.mathematics.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.zero_crossing import INSTANT, NONE, first_descent
-from multiphi_exudyn.time.looking import begin_look, keep_look, look
+from multiphi_exudyn.time.looking import INDICATOR, begin_look, keep_look, look
 from multiphi_exudyn.time.loop_record import is_chatter, keep_events, keep_segment
+from multiphi_exudyn.time.verdict import judge
 from multiphi_exudyn.time.work_sums import work_of_segment
 
 __all__ = ["advance"]
@@ -116,6 +119,17 @@ def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
 
     END_REACHED, EVENT, NEED, FULL or FAILED.
     """
+    status = travel(ints, numbers, waves, end)
+    left = kinetic(ints, numbers, CURRENT) + strain(ints, numbers, CURRENT) if ints[STARTING] == 0 else math.nan
+    numbers[LEFT_ENERGY] = left
+    if ints[JUDGED] == 1:
+        judge(numbers, ints[ISOLATED], INDICATOR, numbers[TIME])
+    return status
+
+
+@compiled
+def travel(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """The same, without what is told of the state that it comes to, and of what truncation has taken so far."""
     if ints[STARTING] > 0:
         fresh = ints[STARTING] == FRESH
         status = set_out(ints, numbers, waves) if fresh else go_on(ints, numbers, waves)

@@ -70,6 +70,8 @@ class Motion:
         numbers = np.zeros(a.OF_A_RUN)
         numbers[a.TIME] = numbers[a.LAST_DECISION] = time
         numbers[a.ALLOWED] = self._allowed
+        if self.levels.excitation.pushes:
+            numbers[a.GIVEN_POTENTIAL] = self.levels.excitation.static.dot(self.start.displacement)
         return numbers
 
     def begin(self) -> Motion:
@@ -119,11 +121,11 @@ class Motion:
 
     def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
         """What has been collected; again: see Trajectory."""
-        numbers = self._ending.numbers
-        defects, truncated, *works = numbers[a.DEFECTS : a.WORKS + 3].tolist()
+        sums = self._ending.numbers[a.WORKS : a.VERDICT + 2].tolist()
+        damped, varying, rubbed, defects, truncated, share, error = sums
         return Trajectory(
             model=self.model,
-            segments=Recorded(self.record, defects, truncated, tuple(works)),
+            segments=Recorded(self.record, defects, truncated, (damped, varying, rubbed), (share, error)),
             events=self.events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",

@@ -106,6 +106,11 @@ class Record:
         return self._parts[name].whole
 
     @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """The levels by the states of their elements."""
+        return tuple(self._numbers)
+
+    @property
     def eventless(self) -> bool:
         """Whether nothing has happened, as far as one sees without looking into it."""
         return not self._parts and "kinds" not in self._last

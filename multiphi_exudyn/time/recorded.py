@@ -59,10 +59,17 @@ class Recorded(Made[Segment], Segments):
     summed: works [J] of all that the record does not list as left out.
     """
 
-    def __init__(self, record: Record, defects: float, truncated: float, summed: tuple[float, ...]) -> None:
+    def __init__(
+        self,
+        record: Record,
+        defects: float,
+        truncated: float,
+        summed: tuple[float, float, float],
+        verdict: tuple[float, float] = Segments.verdict,
+    ) -> None:
         self._make, self._count, self._known = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
-        self.defects, self.truncated = defects, truncated
+        self.defects, self.truncated, self.verdict = defects, truncated, verdict
         self._summed, self._left_out = summed, record.left_out_count
 
     @functools.cached_property
@@ -84,6 +91,11 @@ class Recorded(Made[Segment], Segments):
     def levels(self) -> Sequence[LoadedLevel]:
         """See ``Segments``."""
         return self._record.levels
+
+    @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """See ``Segments``."""
+        return self._record.visited
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
@@ -112,14 +124,17 @@ class Recorded(Made[Segment], Segments):
         moved = (c * terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
         return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
 
-    @functools.cached_property
+    @property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
+        return self._completed if self._left_out else self._summed
+
+    @functools.cached_property
+    def _completed(self) -> tuple[float, float, float]:
+        """The works with those of the segments that were left out."""
         damping, varying, friction = self._summed
-        if self._left_out:
-            further = self._record.works(self._record.left_out[: self._left_out])
-            damping, varying, friction = damping + further[0], varying + further[1], friction + further[2]
-        return damping, varying, friction
+        further = self._record.works(self._record.left_out[: self._left_out])
+        return damping + further[0], varying + further[1], friction + further[2]
 
 
 class Events(Made[Event]):

@@ -31,25 +31,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation import Excitation
+from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.time.defects import total_defect
 from multiphi_exudyn.time.known_warnings import (
     cluster_warnings,
     damping_warnings,
     missing_modes,
     static_warnings,
 )
-from multiphi_exudyn.time.left_out import LeftOut, energy_warning, left_out_warnings
-from multiphi_exudyn.time.looking import looked
+from multiphi_exudyn.time.left_out import energy_warning, left_out_warnings, verdict_of
 from multiphi_exudyn.time.rough_impacts import impact_warnings
 from multiphi_exudyn.time.rubbing import rubbing_warnings
-from multiphi_exudyn.time.segment import Segments, listed
+from multiphi_exudyn.time.segment import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.verdict import share_lost
 
 __all__ = ["Known", "RunSummary", "warnings_of", "warnings_of_body"]
 
@@ -62,69 +61,97 @@ PIECE_BYTES = 500  # that it takes there, its segment included
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
-    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by."""
-    if not trajectory.segments:
+    """What a user must not miss of a run, one sentence each; tolerance: the one that its modes were decided by.
+
+    What is told beside the verdict on truncation is the same for runs of one length in the same levels, and kept for
+    them, but where somebody looks into every run.
+    """
+    segments = trajectory.segments
+    if not segments:
         return ()
-    segments = listed(trajectory.segments)
-    known = Known.of(trajectory.model, segments)
-    before, after = known.around(trajectory, segments)
-    return (*before, *_left_out(trajectory, known, segments, tolerance), *after)
+    record, model = trajectory.ending.record, trajectory.model
+    key, kept = (record.visited, trajectory.t_end, trajectory.start.time), record.arrays.levels.told
+    found = kept.find(key)
+    if found is None:
+        known = Known.of(model, segments)
+        found = known, *known.around(trajectory)
+        if not known.asked:
+            kept.keep(key, found)
+    known, before, after = found
+    share, error = segments.verdict
+    if tolerance is not None or not (share >= 0 and error >= 0):
+        share, error = verdict_of(trajectory, tolerance)
+    if not (share > 0 or error > 0):
+        return before + after
+    struck = known.rigid and error > 0 and _struck(trajectory)
+    return before + left_out_warnings(model, (share, error), tolerance, struck) + after
 
 
 @dataclass(frozen=True)
 class Known:
     """What is known of a model before any run, and of the levels of a run before it comes there.
 
-    whole: no level leaves out a mode. rigid: there is a rigid contact. before, clusters: warnings. fastest: the highest
-    frequency of the open level [Hz]. slowest: the lowest of the levels that is not zero [rad/s].
+    rigid: there is a rigid contact. asked: whether friction, or the model's own check, looks into every run. before,
+    clusters: warnings. fastest: the highest frequency of the open level [Hz]. slowest: the lowest of the levels that is
+    not zero [rad/s]. ample: a time [s] in which all modes move.
     """
 
-    whole: bool
     rigid: bool
+    asked: bool
     before: tuple[str, ...]
     clusters: tuple[str, ...]
     fastest: float
     slowest: float
+    ample: float
 
     @classmethod
     def of(cls, model: MultiPhiModel, segments: Segments) -> Known:
         """Kept by the model."""
-        key = ("warnings", *[level.level.indices for level in segments.levels])
+        key = ("warnings", segments.visited)
         found: Known | None = model.entries.find(key)
-        return found or model.entries.keep(key, cls._of(model, segments))
+        return found or model.entries.keep(key, cls._of(model, segments.levels))
 
     @classmethod
-    def _of(cls, model: MultiPhiModel, segments: Segments) -> Known:
-        levels = [level.modal for level in segments.levels]
-        static = () if model.whole else static_warnings([level.level for level in segments.levels])
+    def _of(cls, model: MultiPhiModel, loaded: Sequence[LoadedLevel]) -> Known:
+        levels = [level.modal for level in loaded]
+        static = () if model.whole else static_warnings([level.level for level in loaded])
         omega = np.concatenate([level.omega for level in levels])
+        fastest = model.level_at(()).highest_frequency
+        slowest = float(np.min(omega[omega > 0], initial=math.inf))
         return cls(
-            model.whole,
             any(contact.rigid for contact in model.contacts),
+            model.general or model.validity is not None,
             (*damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
-            model.level_at(()).highest_frequency,
-            float(np.min(omega[omega > 0], initial=math.inf)),
+            fastest,
+            slowest,
+            max(HARDLY / fastest if fastest > 0 else 0.0, SLOW / slowest),
         )
 
-    def around(self, trajectory: Trajectory, segments: Segments) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def around(self, trajectory: Trajectory) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """What is told of a run before and after what truncation took of it.
 
         The same for all runs in the same levels, but where friction, or a model's own check, looks into the run.
         """
-        model, span = trajectory.model, trajectory.t_end - trajectory.start.time
-        before, after, excitation = self.before, self.clusters, segments.levels[0].excitation
-        if 0 < self.fastest * trajectory.t_end < HARDLY:
+        before, after, excitation = self.before, self.clusters, trajectory.segments.levels[0].excitation
+        brief = trajectory.t_end - trajectory.start.time < self.ample
+        if brief:
             before = (*_slow(trajectory, self.fastest), *before)
-        if model.validity is not None:
-            after += tuple(model.validity(trajectory))
-        if 0 < self.slowest * span < SLOW:
-            after += tuple(_slow_mode(segments, self.slowest, span))
-        if model.general:
-            after += (*rubbing_warnings(segments, model), *impact_warnings(trajectory))
+        if brief or self.asked:
+            after = (*after, *self._asked(trajectory))
         if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
-            after += (_load_pieces(excitation, trajectory.t_end),)
+            after = (*after, _load_pieces(excitation, trajectory.t_end))
         return before, after
+
+    def _asked(self, trajectory: Trajectory) -> Iterator[str]:
+        """What the model's own check, and friction, see in a run, and of a mode that has hardly begun."""
+        model = trajectory.model
+        if model.validity is not None:
+            yield from model.validity(trajectory)
+        yield from _slow_mode(trajectory, self.slowest)
+        if model.general:
+            yield from rubbing_warnings(trajectory.segments, model)
+            yield from impact_warnings(trajectory)
 
 
 @dataclass(frozen=True)
@@ -145,37 +172,18 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     found = [*damping_warnings(model), *missing_modes(model)]
     if not model.whole:
         found.extend(static_warnings(run.levels))
-        found.extend(energy_warning(abs(run.truncated), run.energy))
+        found.extend(energy_warning(share_lost(abs(run.truncated), run.energy)))
     return tuple(found)
 
 
 def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
     """Not of runs that go on with one another, and not of a system that was reduced."""
-    if not (trajectory.t_start > 0 or trajectory.model.validity is not None):
+    hardly = 0 < fastest * trajectory.t_end < HARDLY
+    if hardly and not (trajectory.t_start > 0 or trajectory.model.validity is not None):
         yield (
             f"slow model: its fastest mode takes {1 / fastest:.3g} s for an oscillation, and the run lasts "
             f"{trajectory.t_end:.3g} s; are mass and stiffness swapped, or in different units?"
         )
-
-
-def _left_out(trajectory: Trajectory, known: Known, segments: Segments, tolerance: Tolerance | None) -> tuple[str, ...]:
-    """Of what truncation took of a run, whatever its sign at an instant."""
-    if known.whole:
-        return ()
-    numbers, excitation = trajectory.ending.numbers.tolist(), segments.levels[0].excitation
-    lost, y = segments.truncated, trajectory.start.displacement
-    if math.isnan(lost):
-        lost = float(np.sum(np.abs(event_table(trajectory.events, trajectory.model.index)[:, 3])))
-    lost += abs(numbers[a.LOST_AT_START + a.KINETIC] + numbers[a.LOST_AT_START + a.STRAIN])
-    given = numbers[a.GIVEN_ENERGY] + (0.0 if excitation.nothing else float(trajectory.load.dot(y)))
-    square = numbers[a.GIVEN_SQUARE] or float(y.dot(y))
-    taken = LeftOut(lost, total_defect(trajectory, segments), abs(given), square)
-    told = taken.looked_into(tolerance)
-    if told == (False, False):
-        return ()
-    sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
-    struck = known.rigid and _struck(trajectory)
-    return left_out_warnings(trajectory.model, excitation, taken, told, tolerance, sizes, struck)
 
 
 def _struck(trajectory: Trajectory) -> bool:
@@ -183,12 +191,13 @@ def _struck(trajectory: Trajectory) -> bool:
     return bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
 
 
-def _slow_mode(segments: Segments, slowest: float, span: float) -> Iterator[str]:
-    """Of a mode of which a run of ``span`` [s] sees so little that where loads move it is a difference of far places.
+def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
+    """Of a mode of which a run sees so little that where loads move it is a difference of far places.
 
     p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    if not all(level.excitation.nothing for level in segments.levels):
+    span, levels = trajectory.t_end - trajectory.start.time, trajectory.segments.levels
+    if 0 < slowest * span < SLOW and not all(level.excitation.nothing for level in levels):
         share = min(1.0, LEFT / (slowest * span)) ** 2
         yield (
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "

@@ -17,7 +17,6 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.coulomb_impacts import CoulombImpact
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["impact_warnings"]
@@ -63,7 +62,7 @@ class _Impact(NamedTuple):
 
 def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
     """All instants at which rigid contacts are struck."""
-    model, segments = trajectory.model, listed(trajectory.segments)
+    model, segments = trajectory.model, trajectory.segments
     table = event_table(trajectory.events, model.index)
     rigid = np.array([contact.rigid and not contact.held for contact in model.contacts])
     table = table[rigid[table[:, 1].astype(int)] & (table[:, 2] > 0)]

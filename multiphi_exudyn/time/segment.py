@@ -114,11 +114,13 @@ class Segments(Sequence[Segment], ABC):
     """The segments of a run, in order, and in arrays what many of them are asked for together.
 
     defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their
-    signs [J]; nan where the loop has not summed them.
+    signs [J]; nan where the loop has not summed them. verdict: what these are of the run (verdict.py), nan where that
+    is not known.
     """
 
     defects = math.nan
     truncated = math.nan
+    verdict = math.nan, math.nan
 
     @property
     @abstractmethod
@@ -139,6 +141,11 @@ class Segments(Sequence[Segment], ABC):
     @abstractmethod
     def levels(self) -> Sequence[LoadedLevel]:
         """The levels that were visited, each once."""
+
+    @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """The same by the states of their elements."""
+        return tuple([level.states for level in self.levels])
 
     @abstractmethod
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ the call: whoever has asked carries that one by itself. So a run is what it is a
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,14 +22,15 @@ from multiphi_exudyn.events.level_arrays import LevelArrays
 from multiphi_exudyn.events.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.compiled import entry
 from multiphi_exudyn.time.carrying import ENDS, TOLD_WIDTH, carry_starts, measure_starts, sample_starts
-from multiphi_exudyn.time.left_out import LeftOut
-from multiphi_exudyn.time.looking import looked
+from multiphi_exudyn.time.looking import INDICATOR, SAMPLES
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.taken import EMPTY, PARTS, taken
+from multiphi_exudyn.time.verdict import judge
 
 __all__ = ["Several"]
 
 carry_several, sampled_several, measured_several = entry(carry_starts), entry(sample_starts), entry(measure_starts)
+judged = entry(judge)
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,9 @@ class Several:
         given = end, arrays.channels.first_end, fresh, count, ends.ravel(), told.ravel()
         done = int(call(carry_several, *arrays.buffers.all, *given))
         arrays.owner = None
+        if (excitation := arrays.levels.excitation).pushes:  # each start has its own potential
+            told[:done, a.GIVEN_POTENTIAL] = [excitation.static.dot(start.displacement) for start in starts[:done]]
+            told[:done, a.VERDICT] = math.nan
         return cls(arrays, starts, end, call, done, EMPTY | taken(arrays, PARTS), ends, told)
 
     @property
@@ -117,24 +122,35 @@ class Several:
             self._asked(sampled_several, self.count, *asked, found.ravel())
         return found
 
-    def sizes(self, asked: Sequence[int]) -> dict[int, tuple[float, float]]:
-        """Mean of |y|^2 [m2 kg] and largest energy [J] of some runs, see ``Segments``."""
-        known = {k: looked(self.told[k].tolist(), self.end) for k in asked}
-        found = {k: sizes for k, sizes in known.items() if sizes is not None}
-        if further := [k for k in asked if k not in found]:
+    def verdicts(self, runs: Sequence[int], limit: float) -> dict[int, tuple[float, float]]:
+        """What truncation took of some runs (verdict.py); limit: of the indicator, from which it is told."""
+        if not self.arrays.ints[a.JUDGED]:
+            return dict.fromkeys(runs, (0.0, 0.0))
+        asked = self._unjudged(runs) if limit == INDICATOR else runs
+        self._judge(asked, limit)
+        if further := self._unjudged(asked):
             sizes = np.empty((len(further), 2))
             self._asked(measured_several, np.array(further, np.int64), len(further), self.end, sizes.ravel())
-            found |= {k: (square, energy) for k, (square, energy) in zip(further, sizes.tolist(), strict=True)}
-        return found
+            self.told[further, a.LOOKED], self.told[further, a.LOOK_END] = SAMPLES, self.end
+            self.told[further, a.LOOKED + 1 : a.LOOKED + a.LOOK_WIDTH] = sizes
+            self._judge(further, limit)
+        found = self.told[:, a.VERDICT : a.VERDICT + 2].tolist()
+        return {k: (found[k][0], found[k][1]) for k in runs}
 
-    def left_out(self) -> list[LeftOut]:
-        """What truncation took of each run."""
-        told, load = self.told[: self.count], self.arrays.levels.excitation.static
-        at_start = told[:, a.LOST_AT_START + a.KINETIC] + told[:, a.LOST_AT_START + a.STRAIN]
-        potentials = np.array([load.dot(start.displacement) for start in self.starts[: self.count]])
-        given = np.abs(told[:, a.GIVEN_ENERGY] + potentials)
-        numbers = np.abs(at_start) + told[:, a.TRUNCATED], told[:, a.DEFECTS], given, told[:, a.GIVEN_SQUARE]
-        return [LeftOut(*own) for own in zip(*(column.tolist() for column in numbers), strict=True)]
+    def _unjudged(self, runs: Sequence[int]) -> list[int]:
+        """Those of some runs whose verdict is not known."""
+        unknown = np.isnan(self.told[list(runs), a.VERDICT : a.VERDICT + 2]).any(axis=1).tolist()
+        return [k for k, still in zip(runs, unknown, strict=True) if still]
+
+    def _judge(self, runs: Sequence[int], limit: float) -> None:
+        """The verdict on some runs."""
+        isolated = int(self.arrays.ints[a.ISOLATED])
+        for k in runs:
+            judged(self.told[k], isolated, limit, self.end)
+
+    def has_defects(self, k: int) -> bool:
+        """Whether all defects of a run are known."""
+        return not math.isnan(self.told[k, a.DEFECTS])
 
     def struck(self, k: int) -> bool:
         """Whether a rigid contact was struck in a run."""

@@ -21,16 +21,15 @@ from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.entering import Start
 from multiphi_exudyn.events.exits import exits_of
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table, total_loss
+from multiphi_exudyn.events.state import Event, Loss, Phase, State, event_table
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.time.balance import Ledger, Statistics
+from multiphi_exudyn.time.balance import Ledger, Statistics, ledger_of
 from multiphi_exudyn.time.ending import Ending
 from multiphi_exudyn.time.histories import INSTANTS
 from multiphi_exudyn.time.model_histories import ModelHistories
 from multiphi_exudyn.time.saved import save
-from multiphi_exudyn.time.segment import Segment
+from multiphi_exudyn.time.segment import Segments
 
 __all__ = ["Again", "Trajectory"]
 
@@ -95,7 +94,7 @@ class Trajectory(ModelHistories):
     """
 
     model: MultiPhiModel
-    segments: Sequence[Segment]
+    segments: Segments
     events: Sequence[Event]
     t_end: float
     status: str
@@ -136,11 +135,6 @@ class Trajectory(ModelHistories):
         return dataclasses.replace(self, ending=self.ending.at(state))
 
     @property
-    def final_work(self) -> float:
-        """Work [J] that varying loads and stops have done on the final state."""
-        return self.ending.work
-
-    @property
     def stats(self) -> Statistics:
         """Levels built, transitions, events, segments, function evaluations, bytes."""
         return self.ending.statistics(len(self.segments), len(self.events), self.model.levels_possible)
@@ -160,7 +154,7 @@ class Trajectory(ModelHistories):
         ledger = dataclasses.asdict(self.ledger) if self.segments else None
         save(self, Path(path), **told, ledger=ledger, stats=self.stats._asdict())
 
-    @functools.cached_property
+    @property
     def ledger(self) -> Ledger:
         """Where the energy went [J]; computed when it is asked for.
 
@@ -171,38 +165,22 @@ class Trajectory(ModelHistories):
         """
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
-        losses = self.start_loss + total_loss(self.events)
-        damped, varying, rubbed = self._segments.works
-        level, displacement = self.ending.level, self.ending.displacement
-        assert level is not None, "a run with segments has a final state"
-        return Ledger(
-            initial=self.initial_energy,
-            work_of_loads=self._static_work(level, displacement) + losses.stop_work + varying + self.final_work,
-            impact=losses.impact,
-            truncation_kinetic=losses.truncation_kinetic,
-            truncation_strain=losses.truncation_strain,
-            damping=losses.damping + damped,
-            friction=losses.friction + rubbed,
-            final=float(level.kinetic(self.ending.velocity) + level.strain(displacement)),
-        )
+        ending = self.ending
+        return ledger_of(ending.sums, self.segments.works, self._static_work, self.initial_energy, ending.energy)
 
-    def _static_work(self, level: LoadedLevel, last: np.ndarray) -> float:
-        """Work [J] of the static load up to the last displacement xi (n,)."""
-        if not self.load.any():
+    @property
+    def _static_work(self) -> float:
+        """Work [J] of the static load."""
+        level = self.ending.level
+        if level is None or not level.excitation.pushes:
             return 0.0
-        return float(self.load @ (level.configuration(last) - self.start.displacement))
+        return float(self.load @ (level.configuration(self.ending.displacement) - self.start.displacement))
 
     @property
     def initial_energy(self) -> float:
-        """Kinetic and strain energy [J] at the start."""
-        start = self.start
-        if start.state is not None:
-            return start.state.kinetic + float(start.state.level.strain(start.state.displacement))
-        base, gaps = self.model.base, start.gaps
-        if start.penetrating:
-            gaps = base.gaps_at(start.displacement, gaps)
-        strain = base.strain(start.displacement, start.penetrating, gaps)
-        return 0.5 * float(start.velocity.dot(start.velocity)) + strain
+        """Kinetic and strain energy [J] at the start, which of a run that sets out the loop has."""
+        state = self.start.state
+        return self.ending.given_energy if state is None else state.level.energy(state.displacement, state.velocity)
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
         """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.

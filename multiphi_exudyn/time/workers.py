@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,12 +19,11 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.time.left_out import LeftOut, left_out_warnings
+from multiphi_exudyn.time.left_out import least_indicator, left_out_warnings
 from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
 from multiphi_exudyn.time.refinement import refined
 from multiphi_exudyn.time.reliability import Known
-from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.several import Several
 from multiphi_exudyn.time.simulate import Run, warned
 from multiphi_exudyn.time.start import first_start
@@ -127,37 +125,30 @@ class Task:
 
     def _warnings(self, worker: _Worker, several: Several, numbers: list[int]) -> dict[int, tuple[str, ...]]:
         """Of runs carried together; one that its numbers alone do not tell of is looked into as a whole."""
-        model, left_out = several.arrays.levels.model, several.left_out()
+        model, runs = several.arrays.levels.model, range(several.count)
         hidden = model.general or model.validity is not None or not model.base.complete
-        apart = [k for k, taken in enumerate(left_out) if hidden or math.isnan(taken.defects)]
+        apart = [k for k in runs if hidden or not several.has_defects(k)]
         landed = [(k, several.land(k)) for k in apart]  # at once: who looks into one may begin the arrays anew
-        found = self._from_numbers(several, {k: taken for k, taken in enumerate(left_out) if k not in apart})
+        found = self._from_numbers(several, [k for k in runs if k not in apart])
         for k, motion in landed:
             run = self._run(numbers[k], worker)
             run.ahead = motion
             found[k] = warned(run).warnings
         return found
 
-    def _from_numbers(self, several: Several, left_out: dict[int, LeftOut]) -> dict[int, tuple[str, ...]]:
-        """Warnings of runs by what truncation took of each; all others are those of the levels that it was in."""
-        levels, modes, found = several.arrays.levels, self._given.model.modes, dict[int, tuple[str, ...]]()
-        model, tolerance = levels.model, modes if isinstance(modes, Tolerance) else None
-        looked = {} if model.whole else {k: taken.looked_into(tolerance) for k, taken in left_out.items()}
-        asked = [k for k, which in looked.items() if any(which)]
-        sizes, rigid = several.sizes(asked), any(contact.rigid for contact in model.contacts)
-        for k, taken in left_out.items():
+    def _from_numbers(self, several: Several, runs: Sequence[int]) -> dict[int, tuple[str, ...]]:
+        """Warnings of some runs by what truncation took of each; all others are those of the levels that it was in."""
+        model, modes, found = several.arrays.levels.model, self._given.model.modes, dict[int, tuple[str, ...]]()
+        tolerance = modes if isinstance(modes, Tolerance) else None
+        rigid = any(contact.rigid for contact in model.contacts)
+        for k, verdict in several.verdicts(runs, least_indicator(tolerance)).items():
             visited = several.visited(k)
             if visited not in self._around:
                 trajectory = several.land(k).trajectory(several.end)
-                segments = listed(trajectory.segments)
-                self._around[visited] = Known.of(model, segments).around(trajectory, segments)
+                self._around[visited] = Known.of(model, trajectory.segments).around(trajectory)
             before, after = self._around[visited]
-            if k in sizes:
-                struck = rigid and several.struck(k)
-                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, sizes[k], struck)
-                found[k] = (*before, *told, *after)
-            else:
-                found[k] = (*before, *after)
+            struck = verdict[1] > 0 and rigid and several.struck(k)
+            found[k] = (*before, *left_out_warnings(model, verdict, tolerance, struck), *after)
         return found
 
     def _finish(self, number: int, run: Run) -> None:
@@ -176,7 +167,7 @@ class Task:
         known = self.times <= trajectory.t_end
         if not (trajectory.segments and known.any()):
             return
-        segments, times = listed(trajectory.segments), self.times[known]
+        segments, times = trajectory.segments, self.times[known]
         for place, row in enumerate(self._rows_of(trajectory.model)):
             self.samples[number, place, known] = segments.values(times, "right", partial(point_row, row))
 

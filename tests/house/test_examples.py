@@ -274,12 +274,13 @@ def test_body_speed(capsys):
 def test_run_cost(capsys):
     """Times are not asserted: a record takes what its numbers take."""
     costs = load("run_cost").main(rounds=1)
-    assert costs["6 modes, free"].event_bytes == pytest.approx(161, rel=0.02)
-    assert costs["12 modes, free"].event_bytes == pytest.approx(259, rel=0.02)
-    assert costs["12 modes, harmonic"].event_bytes <= 300
-    assert all(
-        0 < time < math.inf for cost in costs.values() for time in (cost.short, cost.run, cost.bare, cost.ledger)
-    )
+    memory = {name: found[-1] for name, found in costs.items()}
+    assert memory["6 modes, free"] == pytest.approx(161, rel=0.02)
+    assert memory["12 modes, free"] == pytest.approx(259, rel=0.02)
+    assert memory["12 modes, harmonic"] <= 300
+    for *measured, _ in costs.values():
+        for cost in measured:
+            assert all(0 < time < math.inf for time in (cost.short, cost.run, cost.bare, cost.ledger))
     assert capsys.readouterr().out.count("of which warnings") == 6
 
 

@@ -143,4 +143,4 @@ def test_a_start_that_sticks_is_left_to_those_who_look_at_all_modes(seed):
     run = simulated(model, 1.0, velocity=np.random.default_rng(seed).normal(size=7))
     assert (run.events[0].kind, run.events[0].time) == ("stick", 0.0)
     exact = sum(defect.size**2 for defect in defects(run))
-    assert_allclose(total_defect(run, listed(run.segments)), exact, rtol=1e-12)
+    assert_allclose(total_defect(run), exact, rtol=1e-12)

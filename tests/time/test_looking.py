@@ -7,8 +7,8 @@ import pytest
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.arrays import LOOKED
-from multiphi_exudyn.time.looking import INDICATOR, SAMPLES, is_small, looked
+from multiphi_exudyn.events.arrays import LOOK_END, LOOKED
+from multiphi_exudyn.time.looking import INDICATOR, SAMPLES, is_small
 from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.segment import listed
 from multiphi_exudyn.time.simulate import Run
@@ -39,8 +39,10 @@ def runs(given, count=2, **options):
 
 
 def sizes(run):
-    """What the loop has seen of a run."""
-    return looked(run.ending.numbers, run.t_end)
+    """What the loop has seen of a run; None where it has not seen all."""
+    numbers = run.ending.numbers.tolist()
+    whole = numbers[LOOKED] == SAMPLES and numbers[LOOK_END] == run.t_end
+    return (numbers[LOOKED + 1], numbers[LOOKED + 2]) if whole else None
 
 
 @pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])

@@ -184,6 +184,27 @@ class TestTruncation:
         assert first.warnings == second.warnings != ()
         assert mp.truncation_indicator(first) == pytest.approx(mp.truncation_indicator(second), rel=1e-6)
 
+    @pytest.mark.parametrize("loads", [(), (mp.ConstantLoad("node3", 0.2),)], ids=["free", "static"])
+    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
+    def test_a_run_is_told_the_same_whatever_has_run_before(self, stiffness, loads):
+        """Of its own model the first one is sampled; others are looked at on their way, and told what was kept."""
+        model, start = rig(stiffness)
+        shared, starts = dataclasses.replace(model, modes=6), [f * start for f in (1.0, 0.8, 1.3, 1.0, 1.3, 0.02)]
+        found = [mp.simulate(shared, END, displacement=x, loads=loads).warnings for x in starts]
+        own = [dataclasses.replace(model, modes=6) for _ in starts]
+        runs = zip(own, starts, strict=True)
+        assert found == [mp.simulate(one, END, displacement=x, loads=loads).warnings for one, x in runs]
+        assert len(set(found)) > 2
+
+    def test_a_tolerance_has_its_own_limit_whatever_was_told_before(self):
+        model, start = rig(1e6)
+        run = mp.simulate(dataclasses.replace(model, modes=12), END, displacement=start)
+        for _ in range(2):
+            assert warnings_of(run) == ()
+            (told,) = warnings_of(run, mp.Tolerance(1e-6))
+            assert told.startswith("truncation: the indicator is ")
+            assert warnings_of(run, mp.Tolerance(0.5)) == ()
+
     def test_loads_that_vary_in_time_are_judged_too(self):
         model = mp.MultiPhiModel(chain(40), [stop("m39", 0.1, 1e3)], modes=3)
         run = mp.simulate(model, 60.0, loads=[mp.HarmonicLoad("m39", 0.5, 0.01)])

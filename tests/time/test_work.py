@@ -33,6 +33,13 @@ LOADS = {
     "moving base": [mp.BaseMotion({"m0": 1.0, "m1": 1.0, "m2": 1.0}, mp.Harmonic(0.05, 0.7))],
 }
 
+KEPT = (
+    "no load",
+    "constant",
+    "harmonic",
+    "samples",
+)  # by the model, with the levels under them: nobody can change them
+
 
 def run_of(damping, contacts, loads, t_end=5.0, start=(0.03, 0.06, -0.09)):
     model = mp.MultiPhiModel(chain(3, damping=damping, stiffness=10.0), contacts, modes="all")
@@ -184,3 +191,26 @@ def test_works_of_short_segments_are_no_differences_of_large_energies():
     run = mp.simulate(model, 4.002, loads=[pulse], start=ridden)
     assert len(run.segments) > 1000
     assert abs(run.ledger.residual) < 2e-12 * run.ledger.initial
+
+
+@pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
+@pytest.mark.parametrize("loads", [LOADS[name] for name in KEPT], ids=KEPT)
+def test_the_loop_tells_the_final_energy_once_somebody_has_asked_for_it(loads, elements):
+    """That of runs which end in the same level, as the level itself tells it."""
+    model = mp.MultiPhiModel(chain(3, damping=DAMPINGS["coupled"], stiffness=10.0), elements, modes="all")
+    first = mp.simulate(model, 5.0, displacement=(0.03, 0.06, -0.09), loads=loads)
+    assert math.isnan(first.ending.numbers[arrays.LEFT_ENERGY])
+    asked = first.ledger.final
+    again = mp.simulate(model, 5.0, displacement=(0.03, 0.06, -0.09), loads=loads)
+    assert again.ending.numbers[arrays.LEFT_ENERGY] == again.ledger.final == pytest.approx(asked, rel=1e-13)
+
+
+def test_the_final_energy_of_the_loop_is_no_difference_of_large_energies():
+    """20 m from the belt's first place its spring alone holds 4e5 J at the level's rest, and hardly any in motion."""
+    belt = mp.Friction("belt", "m0", 0.24, stiffness=2e3, velocity=5.0)
+    model = mp.MultiPhiModel(chain(2, damping=np.diag([0.02, 0.05]), stiffness=1e-3), [belt], modes="all")
+    asked = mp.simulate(model, 4.0, velocity=[5.0, 5.0]).ledger.final
+    told = mp.simulate(model, 4.0, velocity=[5.0, 5.0])
+    assert told.ledger.final == pytest.approx(asked, rel=2e-15)
+    left = told.ending.numbers[arrays.LEFT_ENERGY]
+    assert left == pytest.approx(told.ending.level.energy(told.ending.displacement, told.ending.velocity), rel=2e-15)

@@ -119,7 +119,9 @@ class KnownMotion:
         motion.advance(until)
         self._reached = motion.state, motion.time
         times, _, _, truncated = motion.events.table().T
-        segments = Recorded(motion.record, math.nan, math.nan, ())  # nobody asks a body for defects and works
+        segments = Recorded(
+            motion.record, math.nan, math.nan, (0.0, 0.0, 0.0)
+        )  # nobody asks a body for defects and works
         given = motion.state, motion.message, segments, motion.record.standings()
         return Stretch(motion.time, motion.events, times, truncated, *given, motion.levels.alone)
 

@@ -26,7 +26,6 @@ from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.time.left_out import left_alone
 
 __all__ = ["RunAhead"]
 
@@ -71,7 +70,7 @@ class RunAhead:
         """Bring the record up to date; energy [J] that truncation took so far."""
         for level in self._stretch.levels(self.time):
             self._record.include(level)
-        if not left_alone(self._body.model, self._body.own.excitation):
+        if not self._body.own.loaded.isolated:
             self._record.reach(self._stretch.largest_energy(self.time))
         return self._truncated + float(np.sum(self._stretch.truncated[: self._told]))
 
