@@ -7,6 +7,7 @@ modes: tests/campaign/truncation_study.py.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from multiphi_exudyn.display import per_cent
@@ -17,10 +18,11 @@ from multiphi_exudyn.time.defects import indicator
 from multiphi_exudyn.time.known_warnings import REMEDY
 from multiphi_exudyn.time.looking import INDICATOR, is_small
 
-__all__ = ["LeftOut", "energy_warning", "left_alone", "left_out_warnings"]
+__all__ = ["LeftOut", "energy_warning", "hangs_on_size", "left_alone", "left_out_warnings"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 RIGID_INDICATOR = 0.05  # where a rigid contact is struck: its impacts raise the indicator more than the error
+NOT_ASKED = math.nan, math.nan  # in place of sizes
 
 
 class LeftOut(NamedTuple):
@@ -41,20 +43,27 @@ class LeftOut(NamedTuple):
         return much, not (self.defects <= 0 or is_small(self.defects, least, self.square))
 
 
+def hangs_on_size(model: MultiPhiModel, excitation: Excitation, looked: tuple[bool, bool]) -> bool:
+    """Whether what is told, of what is ``looked_into``, hangs on how the run went on, not on its start alone."""
+    much, far = looked
+    return far or (much and not left_alone(model, excitation))
+
+
 def left_out_warnings(
     model: MultiPhiModel,
     excitation: Excitation,
     taken: LeftOut,
     looked: tuple[bool, bool],
     tolerance: Tolerance | None,
-    sizes: tuple[float, float],
+    sizes: tuple[float, float] | None,
     struck: bool,
 ) -> tuple[str, ...]:
     """Of the energy that truncation took, and of the motion that it did, where these are ``looked_into``.
 
-    sizes: mean of |y|^2 and largest energy of the run. struck: whether a rigid contact was.
+    sizes: mean of |y|^2 and largest energy of the run, None where nothing ``hangs_on_size``. struck: whether a rigid
+    contact was.
     """
-    (much, far), (square, largest) = looked, sizes
+    (much, far), (square, largest) = looked, sizes or NOT_ASKED
     found: tuple[str, ...] = ()
     if much:
         alone = left_alone(model, excitation)

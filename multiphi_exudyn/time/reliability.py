@@ -44,7 +44,7 @@ from multiphi_exudyn.time.known_warnings import (
     missing_modes,
     static_warnings,
 )
-from multiphi_exudyn.time.left_out import LeftOut, energy_warning, left_out_warnings
+from multiphi_exudyn.time.left_out import LeftOut, energy_warning, hangs_on_size, left_out_warnings
 from multiphi_exudyn.time.looking import looked
 from multiphi_exudyn.time.rough_impacts import impact_warnings
 from multiphi_exudyn.time.rubbing import rubbing_warnings
@@ -173,7 +173,9 @@ def _left_out(trajectory: Trajectory, known: Known, segments: Segments, toleranc
     told = taken.looked_into(tolerance)
     if told == (False, False):
         return ()
-    sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
+    sizes = None
+    if hangs_on_size(trajectory.model, excitation, told):
+        sizes = looked(numbers, trajectory.t_end) or segments.sizes(trajectory.t_end)
     struck = known.rigid and _struck(trajectory)
     return left_out_warnings(trajectory.model, excitation, taken, told, tolerance, sizes, struck)
 

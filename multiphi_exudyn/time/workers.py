@@ -20,7 +20,7 @@ from multiphi_exudyn.events.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.time.left_out import LeftOut, left_out_warnings
+from multiphi_exudyn.time.left_out import LeftOut, hangs_on_size, left_out_warnings
 from multiphi_exudyn.time.level_rows import point_row
 from multiphi_exudyn.time.motion import Motion, carry
 from multiphi_exudyn.time.refinement import refined
@@ -143,7 +143,7 @@ class Task:
         levels, modes, found = several.arrays.levels, self._given.model.modes, dict[int, tuple[str, ...]]()
         model, tolerance = levels.model, modes if isinstance(modes, Tolerance) else None
         looked = {} if model.whole else {k: taken.looked_into(tolerance) for k, taken in left_out.items()}
-        asked = [k for k, which in looked.items() if any(which)]
+        asked = [k for k, which in looked.items() if hangs_on_size(model, levels.excitation, which)]
         sizes, rigid = several.sizes(asked), any(contact.rigid for contact in model.contacts)
         for k, taken in left_out.items():
             visited = several.visited(k)
@@ -152,9 +152,9 @@ class Task:
                 segments = listed(trajectory.segments)
                 self._around[visited] = Known.of(model, segments).around(trajectory, segments)
             before, after = self._around[visited]
-            if k in sizes:
+            if any(looked.get(k, ())):
                 struck = rigid and several.struck(k)
-                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, sizes[k], struck)
+                told = left_out_warnings(model, levels.excitation, taken, looked[k], tolerance, sizes.get(k), struck)
                 found[k] = (*before, *told, *after)
             else:
                 found[k] = (*before, *after)
