@@ -111,9 +111,10 @@ def map_state(
     speed: int,
     sizes: int,
 ) -> None:
-    """xi (rows,) of x (n,) by one map, xi' of v (m,) by that or another one, and the sizes of their terms (2, rows).
+    """xi (rows,) of x (n,) by one map, xi' of v (m,) by that or another one, and the sizes of the terms of xi (rows,).
 
-    Both at once: they are sums that do not wait for each other.
+    Both at once: they are sums that do not wait for each other. Behind the sizes those of xi', of a map that sets
+    places: it knows the terms of which its own numbers are sums.
     """
     matrix, offset, moving = ints[way + MATRIX], ints[way + OFFSET], n
     rates, rate_offset, sliding = ints[other + RATE_MATRIX], ints[other + RATE_OFFSET], m
@@ -125,21 +126,18 @@ def map_state(
     for i in range(rows):
         total = numbers[offset + i] if offset >= 0 else 0.0
         slope = numbers[rate_offset + i] if rate_offset >= 0 else 0.0
-        size, steepness = abs(total), abs(slope)
+        size = abs(total)
         for j in range(both):
-            moved, slid = numbers[matrix + j] * numbers[x + j], numbers[rates + j] * numbers[v + j]
+            moved = numbers[matrix + j] * numbers[x + j]
             total += moved
-            slope += slid
+            slope += numbers[rates + j] * numbers[v + j]
             size += abs(moved)
-            steepness += abs(slid)
         for j in range(both, moving):
             total += numbers[matrix + j] * numbers[x + j]
             size += abs(numbers[matrix + j] * numbers[x + j])
         for j in range(both, sliding):
             slope += numbers[rates + j] * numbers[v + j]
-            steepness += abs(numbers[rates + j] * numbers[v + j])
-        numbers[place + i], numbers[speed + i] = total, slope
-        numbers[sizes + i], numbers[sizes + rows + i] = size, steepness
+        numbers[place + i], numbers[speed + i], numbers[sizes + i] = total, slope, size
         matrix += n
         rates += m
     if ints[way + MAP_TERMS] >= 0:
