@@ -118,11 +118,13 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
 
 
 def factor(rows: np.ndarray) -> np.ndarray:
-    """R with |R z| = |rows z|, upper triangular; the rows are lost."""
-    if not rows.size:
-        return np.zeros((0, rows.shape[1]))
-    found = dgeqrf(rows, overwrite_a=True)[0][: rows.shape[1]]
-    return np.asarray(found * _upper(*found.shape))
+    """R (n, n), upper triangular, with |R z| = |rows z|; the rows (m, n) are lost."""
+    n = rows.shape[1]
+    square = np.zeros((n, n))
+    if rows.size:
+        found = dgeqrf(rows, overwrite_a=True)[0][:n]
+        np.multiply(found, _upper(*found.shape), out=square[: len(found)])
+    return square
 
 
 @functools.lru_cache(maxsize=64)

@@ -32,14 +32,14 @@ from multiphi_exudyn.events.arrays import (
     OPEN,
     PERIODS,
     PLACE,
-    SET_SIZES,
     SHARED,
     SPEED,
     SPEEDS_CHANGED,
     STATES,
     STRUCK_DEFECTS,
+    WORK_NUMBERS,
 )
-from multiphi_exudyn.events.maps import find_map, move_part
+from multiphi_exudyn.events.maps import find_map, map_state
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
 __all__ = ["add_defect", "add_start_defect"]
@@ -61,38 +61,45 @@ def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
     if way < 0 or ints[way + MAP_DEFECT] < 0:
         numbers[DEFECTS] = math.nan
         return
-    n, n_after = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
-    row, changes = ints[way + MAP_DEFECT], ints[SET_SIZES]
-    for part in range(2):
-        x, constants, further = ints[before + PLACE + part], 1 - part, 0
-        if ints[MAPPED_AGAIN] == 1 or (part == 1 and ints[SPEEDS_CHANGED] == 1):
-            move_part(ints, numbers, way, part, x, ints[after + LEVEL], n, changes, changes + n_after)
-            further = n_after
-        for i in range(further):
-            numbers[changes + i] -= numbers[ints[after + PLACE + part] + i]
-        width = constants + n + n_after
-        rows = min(ints[COORDINATES], constants + n + further)
-        numbers[DEFECTS] += square(numbers, row, width, rows, constants, x, n, changes, further)
-        row += min(ints[COORDINATES], width) * width
+    n, further = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
+    x, v, count, width = ints[before + PLACE], ints[before + SPEED], n, 1 + n + further
+    if ints[MAPPED_AGAIN] == 1 or ints[SPEEDS_CHANGED] == 1:
+        list_changed(ints, numbers, way, before, after)
+        x, v, count = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + n + further, n + further
+    numbers[DEFECTS] += squares(numbers, ints[way + MAP_DEFECT], width, x, v, count)
 
 
 @compiled
-def square(
-    numbers: Numbers, factor: int, width: int, rows: int, constants: int, x: int, n: int, changes: int, further: int
-) -> float:
-    """|R z|^2 of the first rows of a triangular factor R (.., width), z = (1, x, changes, 0) or without the 1.
+def list_changed(ints: Ints, numbers: Numbers, way: int, before: int, after: int) -> None:
+    """(xi, s) and (xi', s') (2, n + n_after) into WORK_NUMBERS; s is zero where one map has made the places."""
+    n, further = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
+    x, v, changed = ints[before + PLACE], ints[before + SPEED], ints[MAPPED_AGAIN] == 1
+    places, speeds = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + n + further
+    for i in range(n):
+        numbers[places + i] = numbers[x + i]
+        numbers[speeds + i] = numbers[v + i]
+    s, slowed, sizes = places + n, speeds + n, speeds + n + further
+    map_state(ints, numbers, way, way, x, v, n, n, further, s, slowed, sizes)
+    for i in range(further):
+        numbers[s + i] = numbers[s + i] - numbers[ints[after + PLACE] + i] if changed else 0.0
+        numbers[slowed + i] -= numbers[ints[after + SPEED] + i]
 
-    constants: 1 or 0. x: (n,). changes: (further,).
-    """
-    result = 0.0
-    for i in range(rows):
-        row = factor + i * width
-        total = numbers[row] if i < constants else 0.0
-        for j in range(max(i - constants, 0), n):
-            total += numbers[row + constants + j] * numbers[x + j]
-        for j in range(max(i - constants - n, 0), further):
-            total += numbers[row + constants + n + j] * numbers[changes + j]
-        result += total * total
+
+@compiled
+def squares(numbers: Numbers, factors: int, width: int, x: int, v: int, count: int) -> float:
+    """|R (1, x, 0)|^2 + |R' (v, 0)|^2 of triangular factors R (width, width) and R', one narrower; x, v: (count,)."""
+    displaced, moving, constant = factors + 1, factors + width * width, numbers[factors]
+    for j in range(count):
+        constant += numbers[displaced + j] * numbers[x + j]
+    result = constant * constant
+    for i in range(count):
+        displaced += width
+        d, w = 0.0, 0.0
+        for j in range(i, count):
+            d += numbers[displaced + j] * numbers[x + j]
+            w += numbers[moving + j] * numbers[v + j]
+        result += d * d + w * w
+        moving += width - 1
     return result
 
 

@@ -119,8 +119,7 @@ def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     n = motion.shape[1]
     given = np.zeros((n + 1, n))
     given[-1] = level.excitation.static @ motion
-    rows = factor(motion)
-    given[: len(rows)] = rows
+    given[:-1] = factor(motion)
     buffers.ints[record + a.SIZES] = buffers.put("numbers", given)
 
 

@@ -37,7 +37,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.state_arrays import measure
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled
 
-__all__ = ["find_level", "find_map", "level_hash", "map_hash", "move", "move_part"]
+__all__ = ["find_level", "find_map", "level_hash", "map_hash", "map_state", "move"]
 
 HASH_MODULUS = 1_000_003  # of keys: products of it with small numbers stay far below 2^63
 
@@ -97,29 +97,67 @@ def find_map(ints: Ints, source: int, target: int) -> int:
 
 
 @compiled
-def move_part(
-    ints: Ints, numbers: Numbers, way: int, rates: int, given: int, target: int, n: int, result: int, sizes: int
+def map_state(
+    ints: Ints,
+    numbers: Numbers,
+    way: int,
+    other: int,
+    x: int,
+    v: int,
+    n: int,
+    m: int,
+    rows: int,
+    place: int,
+    speed: int,
+    sizes: int,
 ) -> None:
-    """xi (rates 0) or xi' (rates 1) of a level with n coordinates in level ``target``, and the sizes of its terms.
+    """xi (rows,) of x (n,) by one map, xi' of v (m,) by that or another one, and the sizes of the terms of xi (rows,).
 
-    A map that sets places knows the terms of which its own numbers are sums.
+    Both at once: they are sums that do not wait for each other. Behind the sizes those of xi', of a map that sets
+    places: it knows the terms of which its own numbers are sums.
     """
     matrix, offset, moving = ints[way + MATRIX], ints[way + OFFSET], n
-    if rates == 1:
-        matrix, offset = ints[way + RATE_MATRIX], ints[way + RATE_OFFSET]
-    while moving > 0 and numbers[given + moving - 1] == 0.0:  # a start at rest has no speed at all
+    rates, rate_offset, sliding = ints[other + RATE_MATRIX], ints[other + RATE_OFFSET], m
+    while moving > 0 and numbers[x + moving - 1] == 0.0:
         moving -= 1
-    for i in range(ints[target + MODES] + ints[CHANNELS]):
-        total, row = numbers[offset + i] if offset >= 0 else 0.0, matrix + i * n
-        size, terms = abs(total), row
-        if ints[way + MAP_TERMS] >= 0:
-            terms = ints[way + MAP_TERMS] + i * (n + 1)
-            size = size if rates == 1 else numbers[terms + n]  # that one is of places
-        for j in range(moving):
-            total += numbers[row + j] * numbers[given + j]
+    while sliding > 0 and numbers[v + sliding - 1] == 0.0:  # a start at rest has no speed at all
+        sliding -= 1
+    both = min(moving, sliding)
+    for i in range(rows):
+        total = numbers[offset + i] if offset >= 0 else 0.0
+        slope = numbers[rate_offset + i] if rate_offset >= 0 else 0.0
+        size = abs(total)
+        for j in range(both):
+            moved = numbers[matrix + j] * numbers[x + j]
+            total += moved
+            slope += numbers[rates + j] * numbers[v + j]
+            size += abs(moved)
+        for j in range(both, moving):
+            total += numbers[matrix + j] * numbers[x + j]
+            size += abs(numbers[matrix + j] * numbers[x + j])
+        for j in range(both, sliding):
+            slope += numbers[rates + j] * numbers[v + j]
+        numbers[place + i], numbers[speed + i], numbers[sizes + i] = total, slope, size
+        matrix += n
+        rates += m
+    if ints[way + MAP_TERMS] >= 0:
+        size_by_terms(ints, numbers, way, 0, x, n, rows, sizes)
+    if ints[other + MAP_TERMS] >= 0:
+        size_by_terms(ints, numbers, other, 1, v, m, rows, sizes + rows)
+
+
+@compiled
+def size_by_terms(ints: Ints, numbers: Numbers, way: int, part: int, given: int, n: int, rows: int, sizes: int) -> None:
+    """Sizes (rows,) of the terms of xi (part 0) or xi' (part 1) by those of which a map's own numbers are sums."""
+    terms, offset = ints[way + MAP_TERMS], ints[way + RATE_OFFSET]
+    for i in range(rows):
+        size = numbers[terms + n]  # that one is of places
+        if part == 1:
+            size = abs(numbers[offset + i]) if offset >= 0 else 0.0
+        for j in range(n):
             size += abs(numbers[terms + j] * numbers[given + j])
-        numbers[result + i] = total
         numbers[sizes + i] = size
+        terms += n + 1
 
 
 @compiled
@@ -133,20 +171,20 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
     way = find_map(ints, here, level)
     if way < 0:
         return way
-    channels, x, v = ints[CHANNELS], ints[result + PLACE], ints[result + SPEED]
-    sizes, slopes = ints[SET_SIZES], ints[SET_SIZES] + ints[level + MODES] + channels
-    move_part(ints, numbers, way, 0, ints[places + PLACE], level, ints[here + MODES] + channels, x, sizes)
-    if there != here:
-        way = find_map(ints, there, level)
-        if way < 0:
-            return way
-    move_part(ints, numbers, way, 1, ints[speeds + SPEED], level, ints[there + MODES] + channels, v, slopes)
+    other = way if there == here else find_map(ints, there, level)
+    if other < 0:
+        return other
+    channels, rows, sizes = ints[CHANNELS], ints[level + MODES] + ints[CHANNELS], ints[SET_SIZES]
+    map_state(
+        ints, numbers, way, other, ints[places + PLACE], ints[speeds + SPEED], ints[here + MODES] + channels,
+        ints[there + MODES] + channels, rows, ints[result + PLACE], ints[result + SPEED], sizes,
+    )  # fmt: skip
     ints[result + LEVEL] = level
     measure(ints, numbers, result)
-    sets_places = ints[way + MAP_TERMS] >= 0
+    sets_places = ints[other + MAP_TERMS] >= 0
     for i in range(ints[level + MODES]):
         numbers[ints[result + MAPPED] + i] = numbers[sizes + i]
         if sets_places:
             numbers[ints[result + REACH] + i] += numbers[sizes + i]
-            numbers[ints[result + SWING] + i] += numbers[slopes + i]
+            numbers[ints[result + SWING] + i] += numbers[sizes + rows + i]
     return 0

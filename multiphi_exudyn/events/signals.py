@@ -48,12 +48,16 @@ def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
-    value = numbers[row + 2 * n]
+    rated, value = ints[signal + RATED] == 1, numbers[row + 2 * n]
     size = abs(value) + terms
     for i in range(n):
-        term = numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i]
+        term = numbers[row + i] * numbers[x + i]
+        size += abs(numbers[row + i]) * numbers[reach + i]
+        if rated:
+            term += numbers[row + n + i] * numbers[v + i]
+            size += abs(numbers[row + n + i]) * numbers[swing + i]
         value += term
-        size += abs(term) + abs(numbers[row + i]) * numbers[reach + i] + abs(numbers[row + n + i]) * numbers[swing + i]
+        size += abs(term)
     return sign_of(value, size)
 
 

@@ -38,11 +38,15 @@ def copy_state(ints: Ints, numbers: Numbers, given: int, result: int) -> None:
     """A copy of a state, phases included."""
     ints[result + LEVEL] = ints[given + LEVEL]
     ints[result + SETTLED] = ints[given + SETTLED]
-    n = ints[ints[given + LEVEL] + MODES] + ints[CHANNELS]
-    for part in range(PLACE, SWING + 1):
-        start, end = ints[given + part], ints[result + part]
-        for i in range(n):
-            numbers[end + i] = numbers[start + i]
+    x, v, x_copy, v_copy = ints[given + PLACE], ints[given + SPEED], ints[result + PLACE], ints[result + SPEED]
+    reach, mapped, swing = ints[given + REACH], ints[given + MAPPED], ints[given + SWING]
+    reach_copy, mapped_copy, swing_copy = ints[result + REACH], ints[result + MAPPED], ints[result + SWING]
+    for i in range(ints[ints[given + LEVEL] + MODES] + ints[CHANNELS]):
+        numbers[x_copy + i] = numbers[x + i]
+        numbers[v_copy + i] = numbers[v + i]
+        numbers[reach_copy + i] = numbers[reach + i]
+        numbers[mapped_copy + i] = numbers[mapped + i]
+        numbers[swing_copy + i] = numbers[swing + i]
     for i in range(ints[ints[given + LEVEL] + EXIT_COUNT]):
         ints[ints[result + PHASES] + i] = ints[ints[given + PHASES] + i]
 

@@ -29,6 +29,7 @@ from multiphi_exudyn.events.arrays import (
     NOISES,
     PHASES,
     PLACE,
+    RATED,
     REACH,
     REACHED,
     RECOVERING,
@@ -100,21 +101,24 @@ def wait_for(
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
     n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
-    x, v, scale = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH]
-    first, swing = ints[SIGNALS] + count * p, ints[CURRENT + SWING]
+    x, v, scale, first = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH], ints[SIGNALS] + count * p
     signal_waves(ints, numbers, waves, CURRENT, signal, first)
     constant, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
     constant = sign * (constant + held_part(ints, numbers, CURRENT, signal))
     if rate == 1:
         differentiate(ints, numbers, waves, ints[FLOW_BASIS], first, first)
-        accelerate(ints, numbers, CURRENT, ints[ACCELERATION])
-        x, v, scale = ints[CURRENT + SPEED], ints[ACCELERATION], ints[CURRENT + SWING]
-        constant, size = 0.0, 0.0
+        x, v, scale, constant, size = v, ints[ACCELERATION], ints[CURRENT + SWING], 0.0, 0.0
     begins = sign * numbers[row + 2 * n]
     for i in range(n):
         size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
-        size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
-        begins += sign * (numbers[row + i] * numbers[x + i] + numbers[row + n + i] * numbers[v + i])
+        begins += sign * (numbers[row + i] * numbers[x + i])
+    if ints[signal + RATED] == 1:
+        swing = ints[CURRENT + SWING]
+        if rate == 1:
+            accelerate(ints, numbers, CURRENT, v)
+        for i in range(n):
+            size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
+            begins += sign * (numbers[row + n + i] * numbers[v + i])
     if rate == 0 and entered == 0 and begins < 0.0:
         terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
         constant -= begins if abs(begins) <= ZERO * (size + terms) else 0.0

@@ -51,10 +51,15 @@ def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers,
         largest = max(largest, abs(numbers[given + j]))
     for i in range(count if largest > 0.0 else 0):
         if abs(numbers[products + i]) <= CLEAR * (numbers[row_sums + i] * largest):
-            size = 0.0
-            for j in range(count):
-                size += matrix[i * count + j] * abs(numbers[given + j])
-            if abs(numbers[products + i]) <= ZERO * size:
+            row, first, second, third, fourth = i * count, 0.0, 0.0, 0.0, 0.0
+            for j in range(0, count - 3, 4):  # four sums that do not wait for each other
+                first += matrix[row + j] * abs(numbers[given + j])
+                second += matrix[row + j + 1] * abs(numbers[given + j + 1])
+                third += matrix[row + j + 2] * abs(numbers[given + j + 2])
+                fourth += matrix[row + j + 3] * abs(numbers[given + j + 3])
+            for j in range(count - count % 4, count):
+                first += matrix[row + j] * abs(numbers[given + j])
+            if abs(numbers[products + i]) <= ZERO * (first + second + third + fourth):
                 numbers[products + i] = 0.0
 
 

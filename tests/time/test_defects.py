@@ -86,6 +86,8 @@ CASES = {
     "stops and pads": (padded([3, 6], ["m1", "m5"], 2, 0.05), WEIGHT + PULL),
     "pads": (padded([], ["m1", "m4", {"m1": 1.0, "m4": -1.0}], 2, 0.1), PULL),
     "rough, loads": (rough_chain(3), WEIGHT + PULL),
+    "most modes": (beside_each_other(20.0, 5), ()),  # two levels have more coordinates together than there are modes
+    "most modes, rigid": (beside_each_other(math.inf, 5), WEIGHT + PULL),
 }
 
 
@@ -124,10 +126,10 @@ def test_where_one_map_made_the_state_after_only_the_state_before_is_looked_at()
     numbers, ints = runs[0].arrays.numbers, runs[0].arrays.ints
     expected = numbers[a.DEFECTS]
     for record, n, n_after in entered(runs[0]):
-        place, rows = int(ints[record + a.MAP_DEFECT]), 7
+        place = int(ints[record + a.MAP_DEFECT])
         for constants in (1, 0):
             width = constants + n + n_after
-            factor = numbers[place : place + min(rows, width) * width].reshape(-1, width)
+            factor = numbers[place : place + width * width].reshape(width, width)
             factor[constants + n :] = math.nan
             factor[:, constants + n :] = math.nan
             place += factor.size

@@ -64,6 +64,22 @@ def test_a_run_that_tells_of_its_truncation_is_not_sampled_again(monkeypatch):
     assert len(set(told)) == 1
 
 
+def test_a_run_that_tells_of_its_energy_alone_is_not_sampled_where_it_begins_with_the_most(monkeypatch):
+    """Nothing works on it, so its largest energy is that of its start; under a load that has to be looked for."""
+    structure = chain(40, mass=0.5, stiffness=2e4, damping=mp.ModalDamping(0.02))
+    given = mp.MultiPhiModel(structure, [stop("m39", 5e-3, 2e4)], modes=37)
+    x, v = 1e-3 * np.arange(40.0), 0.03 * (-1.0) ** np.arange(40)  # that shape is in no mode of the 37
+    calls, asked = [], Record.sizes
+    monkeypatch.setattr(Record, "sizes", lambda *given: calls.append(1) or asked(*given))
+    alone = mp.simulate(given, END, displacement=x, velocity=v)
+    many = mp.simulate_many(given, END, [x, x], [v, v])
+    assert calls == []
+    loaded = mp.simulate(given, END, displacement=x, velocity=v, loads=LOADS["static"])
+    assert calls == [1]
+    for told in (alone.warnings, *many.warnings, loaded.warnings):
+        assert [sentence.partition(":")[0] for sentence in told] == ["lost energy"]
+
+
 def test_a_run_that_loses_little_is_not_looked_at_beyond_its_first_decision():
     given = model(17, stiffness=2e4)
     listed(runs(given, count=1)[0].segments).sizes(END)  # packed
