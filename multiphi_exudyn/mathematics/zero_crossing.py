@@ -42,6 +42,7 @@ from multiphi_exudyn.mathematics.signal_bounds import (
     all_above,
     all_finite,
     bound,
+    round_off,
     sample_distance,
 )
 from multiphi_exudyn.mathematics.suspect import (
@@ -121,6 +122,10 @@ def first_descent(
             break
         if all_finite(numbers, constants, bounds, count) == 0:
             return NOT_FINITE
+        if begin == 0.0:
+            sample_start(ints, numbers, waves, basis, signals, constants, bounds, count)
+            if until == horizon and stay_above(numbers, constants, noise, bounds, count, horizon) == 1:
+                break
         if begin == 0.0 and count > 1 and ints[basis + PURE] == 1:
             found = near_descent(
                 ints, numbers, waves, basis, signals, constants, noise, bounds, count, latest, suspect, scratch_wave
@@ -146,6 +151,42 @@ def first_descent(
 
 
 @compiled
+def sample_start(
+    ints: Ints, numbers: Numbers, waves: Waves, basis: int, signals: int, constants: int, bounds: int, count: int
+) -> None:
+    """g and g' of every signal at t = 0, (count, 2), behind the bounds."""
+    p, powers, rates, unit = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES]
+    for s in range(count):
+        value, slope = numbers[constants + s], 0.0
+        for j in range(p):
+            a = waves[signals + s * p + j]
+            if ints[powers + j] == 0:
+                value += a.real
+                slope += (a * waves[rates + j]).real
+            elif ints[powers + j] == 1:
+                slope += a.real / numbers[unit]
+        numbers[bounds + DERIVATIVES * count + 2 * s] = value
+        numbers[bounds + DERIVATIVES * count + 2 * s + 1] = slope
+
+
+@compiled
+def stay_above(numbers: Numbers, constants: int, noise: int, bounds: int, count: int, horizon: float) -> int:
+    """1 where by values and slopes at t = 0 no signal falls in [0, horizon].
+
+    One that starts at zero or above rises all the time where g' > max|g''| t; one that starts above zero is above
+    g + g' t - max|g''| t^2 / 2, which is lowest at one of its ends.
+    """
+    for s in range(count):
+        first, start = bounds + DERIVATIVES * s, bounds + DERIVATIVES * count + 2 * s
+        value, slope, bent = numbers[start], numbers[start + 1], numbers[first + 2] * horizon
+        lowest = min(value, value + (slope - bent / 2) * horizon)
+        touches = value >= -round_off(numbers[first], numbers[constants + s], numbers[noise + s])
+        if not lowest > 0.0 and not (touches and slope > bent):
+            return 0
+    return 1
+
+
+@compiled
 def near_descent(
     ints: Ints,
     numbers: Numbers,
@@ -163,17 +204,9 @@ def near_descent(
     """A first descent near t = 0 that Taylor's theorem certifies at once, NONE if it is not that plain.
 
     2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
-    valid: how long the bounds hold, for ever where nothing grows. Every power is zero.
+    valid: how long the bounds hold, for ever where nothing grows. Every power is zero. g and g' at t = 0 are known.
     """
-    p, rates, starts = ints[basis + SIZE], ints[basis + RATES], bounds + DERIVATIVES * count
-    for s in range(count):
-        value, slope = numbers[constants + s], 0.0
-        for j in range(p):
-            a = waves[signals + s * p + j]
-            value += a.real
-            slope += (a * waves[rates + j]).real
-        numbers[starts + 2 * s] = value
-        numbers[starts + 2 * s + 1] = slope
+    p, starts = ints[basis + SIZE], bounds + DERIVATIVES * count
     for s in range(count):
         value, slope = numbers[starts + 2 * s], numbers[starts + 2 * s + 1]
         if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + DERIVATIVES * s + 2] < slope * slope:
