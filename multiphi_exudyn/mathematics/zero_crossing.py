@@ -39,6 +39,7 @@ from multiphi_exudyn.mathematics.signal_bounds import (
     BOUNDING,
     DERIVATIVES,
     INTERVALS,
+    OF_A_SIGNAL,
     all_above,
     all_finite,
     bound,
@@ -81,7 +82,7 @@ INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes l
 
 def scratch_numbers(p: int, count: int) -> int:
     """Numbers that a search among so many signals on p exponentials works in."""
-    return SUSPECT + BOUNDING * p + (DERIVATIVES + 4) * count
+    return SUSPECT + BOUNDING * p + (OF_A_SIGNAL + 4) * count
 
 
 def scratch_waves(p: int, count: int) -> int:
@@ -165,8 +166,8 @@ def sample_start(
                 slope += (a * waves[rates + j]).real
             elif ints[powers + j] == 1:
                 slope += a.real / numbers[unit]
-        numbers[bounds + DERIVATIVES * count + 2 * s] = value
-        numbers[bounds + DERIVATIVES * count + 2 * s + 1] = slope
+        numbers[bounds + OF_A_SIGNAL * count + 2 * s] = value
+        numbers[bounds + OF_A_SIGNAL * count + 2 * s + 1] = slope
 
 
 @compiled
@@ -177,7 +178,7 @@ def stay_above(numbers: Numbers, constants: int, noise: int, bounds: int, count:
     g + g' t - max|g''| t^2 / 2, which is lowest at one of its ends.
     """
     for s in range(count):
-        first, start = bounds + DERIVATIVES * s, bounds + DERIVATIVES * count + 2 * s
+        first, start = bounds + OF_A_SIGNAL * s, bounds + OF_A_SIGNAL * count + 2 * s
         value, slope, bent = numbers[start], numbers[start + 1], numbers[first + 2] * horizon
         lowest = min(value, value + (slope - bent / 2) * horizon)
         touches = value >= -round_off(numbers[first], numbers[constants + s], numbers[noise + s])
@@ -206,17 +207,17 @@ def near_descent(
     2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
     valid: how long the bounds hold, for ever where nothing grows. Every power is zero. g and g' at t = 0 are known.
     """
-    p, starts = ints[basis + SIZE], bounds + DERIVATIVES * count
+    p, starts = ints[basis + SIZE], bounds + OF_A_SIGNAL * count
     for s in range(count):
         value, slope = numbers[starts + 2 * s], numbers[starts + 2 * s + 1]
-        if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + DERIVATIVES * s + 2] < slope * slope:
+        if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + OF_A_SIGNAL * s + 2] < slope * slope:
             latest = -2 * value / slope
             if (latest <= valid or ints[basis + ETERNAL] == 1) and others_stay_above(
                 numbers, starts, bounds, count, s, latest
             ) == 1:
                 take_up(
                     ints, numbers, waves, basis, signals + s * p, numbers[constants + s], numbers[noise + s],
-                    bounds + DERIVATIVES * s, 0.0, suspect, scratch_wave,
+                    bounds + OF_A_SIGNAL * s, 0.0, suspect, scratch_wave,
                 )  # fmt: skip
                 sample_at(ints, numbers, waves, basis, 0.0, suspect, suspect + LEFT, scratch_wave)
                 sample_at(ints, numbers, waves, basis, latest, suspect, suspect + RIGHT, scratch_wave)
@@ -229,7 +230,7 @@ def near_descent(
 def others_stay_above(numbers: Numbers, starts: int, bounds: int, count: int, falling: int, latest: float) -> int:
     """1 where by their values and slopes at t = 0 no other signal falls before ``latest``."""
     for s in range(count):
-        first = bounds + DERIVATIVES * s
+        first = bounds + OF_A_SIGNAL * s
         high = numbers[starts + 2 * s] > numbers[first + 1] * latest
         if s != falling and not high and not numbers[starts + 2 * s + 1] > numbers[first + 2] * latest:
             return 0
