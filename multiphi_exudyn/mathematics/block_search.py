@@ -6,7 +6,7 @@ in doubt is divided signal by signal (suspect.py).
 
 from __future__ import annotations
 
-from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.basis_arrays import POWERS, PURE, SCALES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.signal_bounds import HERMITE, INTERVALS, LIFTED, OF_A_SIGNAL, OPPOSITE, round_off
 from multiphi_exudyn.mathematics.suspect import (
@@ -48,20 +48,23 @@ def descent_in_block(
     start: float,
     step: float,
     horizon: float,
+    known: int,
     suspect: int,
     scratch_wave: int,
 ) -> int:
-    """The signal that falls first in a block of intervals, NONE if none does."""
+    """The signal that falls first in a block of intervals, NONE if none does.
+
+    known: 1 where the block before had the same sample distance: its factors are used again.
+    """
     p, values = ints[basis + SIZE], bounds + OF_A_SIGNAL * count
     here, there, factors = scratch_wave + HERE * p, scratch_wave + THERE * p, scratch_wave + FACTORS * p
-    local = begin_block(ints, numbers, waves, basis, signals, constants, bounds, count, start, step, scratch_wave)
-    known, wide, place, end, found = 0, 0, 0, horizon - start, NONE
+    local = begin_block(ints, numbers, waves, basis, signals, constants, bounds, count, start, scratch_wave)
+    if known == 0:
+        begin_factors(ints, numbers, waves, basis, step, factors)
+    wide, place, end, found = 0, 0, horizon - start, NONE
     while found == NONE and place < INTERVALS and place * step < end:
         while place + (1 << wide) > INTERVALS:
             wide -= 1
-        while known < wide:
-            multiply(waves, factors + known * p, factors + known * p, p, factors + (known + 1) * p)
-            known += 1
         left, width = place * step, step * (1 << wide)
         advance_exponentials(ints, numbers, waves, basis, here, factors + wide * p, start + left + width, there)
         sample(numbers, waves, local, constants, bounds, count, p, there, values + 2 * count)
@@ -94,12 +97,11 @@ def begin_block(
     bounds: int,
     count: int,
     start: float,
-    step: float,
     scratch_wave: int,
 ) -> int:
     """Where the coefficients of the signals (count, p) from a block's start on begin, those of g' (count, p) behind.
 
-    The first of its values, and the exponentials there and their factors from one sample to the next, as well.
+    The first of its values, and the exponentials there, as well.
     """
     p, unit, values = ints[basis + SIZE], numbers[ints[basis + SCALES]], bounds + OF_A_SIGNAL * count
     here, local = scratch_wave + HERE * p, scratch_wave + LOCAL * p
@@ -109,9 +111,17 @@ def begin_block(
         if numbers[bounds + OF_A_SIGNAL * s + OPPOSITE] == 0.0:
             differentiate(ints, numbers, waves, basis, local + s * p, local + (count + s) * p)
     exponentials(ints, numbers, waves, basis, 0.0, start, here)
-    exponentials(ints, numbers, waves, basis, step, unit, scratch_wave + FACTORS * p)
     sample(numbers, waves, local, constants, bounds, count, p, here, values)
     return local
+
+
+@compiled
+def begin_factors(ints: Ints, numbers: Numbers, waves: Waves, basis: int, step: float, factors: int) -> None:
+    """Factors (1 + WIDEST, p) of the exponentials over 1, 2, 4, ... sample distances."""
+    p = ints[basis + SIZE]
+    exponentials(ints, numbers, waves, basis, step, numbers[ints[basis + SCALES]], factors)
+    for k in range(WIDEST):
+        multiply(waves, factors + k * p, factors + k * p, p, factors + (k + 1) * p)
 
 
 @compiled
@@ -127,7 +137,9 @@ def advance_exponentials(
 ) -> None:
     """phi (p,) at a next sample: those of power zero times their factors, the others times t / T."""
     powers, ratio, phi = ints[basis + POWERS], t / numbers[ints[basis + SCALES]], 0j
-    for j in range(ints[basis + SIZE]):
+    if ints[basis + PURE] == 1:
+        multiply(waves, here, factors, ints[basis + SIZE], there)
+    for j in range(ints[basis + SIZE] if ints[basis + PURE] == 0 else 0):
         phi = phi * ratio if ints[powers + j] > 0 else waves[here + j] * waves[factors + j]
         waves[there + j] = phi
 

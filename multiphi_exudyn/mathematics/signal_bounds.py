@@ -28,6 +28,7 @@ __all__ = [
     "LIFTED",
     "OF_A_SIGNAL",
     "OPPOSITE",
+    "QUINTIC",
     "all_above",
     "all_finite",
     "bound",
@@ -43,6 +44,7 @@ BOUNDING = 4  # in p: numbers that are worked in behind the bounds
 INTERVALS = 64  # in a block
 RESOLUTION = 0.004  # wanted remainder of a block's intervals, of the signal's typical size
 HERMITE = 1 / 384
+QUINTIC = 1 / 46080  # max of u^3 (1 - u)^3 / 720 on [0, 1]
 LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
 
 
@@ -74,7 +76,8 @@ def bound(
             height *= ratio
             numbers[sizes + link + j - 1] = ints[powers + j] / latest
         else:
-            height = exponential_size(decay * (start if decay < 0.0 else latest)) if decay != 0.0 else 1.0
+            exponent = decay * (start if decay < 0.0 else latest)
+            height = exponential_size(exponent) if exponent != 0.0 else 1.0
         numbers[sizes + envelope + j] = height
         numbers[sizes + fast + j] = magnitude(waves, rates + j)
     for s in range(count):

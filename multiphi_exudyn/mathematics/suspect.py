@@ -16,7 +16,7 @@ from __future__ import annotations
 from multiphi_exudyn.mathematics.basis_arrays import SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, LIFTED, round_off
+from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, LIFTED, QUINTIC, round_off
 
 __all__ = [
     "DESCENT",
@@ -152,7 +152,7 @@ def decide(
     """
     width, noise = right - left, numbers[suspect + NOISE]
     at_left, at_right = numbers[suspect + LEFT], numbers[suspect + RIGHT]
-    low, minus_high = lowest(numbers, suspect, 0, 1.0, width), lowest(numbers, suspect, 0, -1.0, width)
+    low, minus_high = lowest_value(numbers, suspect, 1.0, width), lowest_value(numbers, suspect, -1.0, width)
     if low > 0.0 or min(low, minus_high) >= -noise or rises(numbers, suspect, width) == 1:
         return NO_DESCENT
     if at_left < -noise:
@@ -180,6 +180,18 @@ def lowest(numbers: Numbers, suspect: int, order: int, sign: float, width: float
     inner_right = right - sign * width * numbers[suspect + RIGHT + order + 1] / 3
     remainder = HERMITE * width * width * width * width * numbers[suspect + BOUNDS + order + 4]
     return min(left, right, inner_left, inner_right) - remainder
+
+
+@compiled
+def lowest_value(numbers: Numbers, suspect: int, sign: float, width: float) -> float:
+    """The same of the suspect itself, whose second derivative is known too, by the quintic."""
+    left, right, first, second = suspect + LEFT, suspect + RIGHT, sign * width / 5, sign * width * width / 20
+    at_left, at_right = sign * numbers[left], sign * numbers[right]
+    inner = min(at_left + first * numbers[left + 1], at_right - first * numbers[right + 1])
+    middle_left = at_left + 2 * first * numbers[left + 1] + second * numbers[left + 2]
+    middle_right = at_right - 2 * first * numbers[right + 1] + second * numbers[right + 2]
+    remainder = QUINTIC * width * width * width * width * width * width * numbers[suspect + BOUNDS + 6]
+    return min(at_left, at_right, inner, middle_left, middle_right) - remainder
 
 
 @compiled

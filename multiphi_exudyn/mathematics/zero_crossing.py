@@ -114,7 +114,7 @@ def first_descent(
     growth = numbers[scales + 2]
     window = WINDOW / growth if growth > 0.0 else math.inf
     numbers[suspect + SAMPLES] = 0.0
-    found, searched, begin = NONE, 0, start
+    found, searched, before, begin = NONE, 0, 0.0, start
     while found == NONE and begin < horizon and count > 0:
         until = min(horizon, begin + window)
         latest = 2 * until - begin  # a block may end behind
@@ -135,14 +135,15 @@ def first_descent(
                 found = found if numbers[suspect + ROOT] <= horizon else NONE
                 break
         step = sample_distance(numbers, constants, bounds, count, until - begin)
+        known, before = 1 if step == before else 0, step
         searched += 1
         if searched > PATIENCE and horizon - begin > MOST_BLOCKS * INTERVALS * step:
             numbers[result + 2] = step
             numbers[result + 3] = horizon - begin
             return TOO_LONG
         found = descent_in_block(
-            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, suspect,
-            scratch_wave,
+            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, known,
+            suspect, scratch_wave,
         )  # fmt: skip
         begin += INTERVALS * step
     numbers[result + 1] += numbers[suspect + SAMPLES]
