@@ -37,6 +37,7 @@ SAMPLED = 5  # g and its derivatives up to the fourth are known at every point o
 NARROWEST = 1e-13  # of an interval's end in its block: an interval in doubt is not divided below this
 TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
 MOST_STEPS = 100  # towards a root; a dozen is many
+NEWTON_STEPS = 3  # towards that of a polynomial: a guess of two digits becomes one of all
 LEFT, RIGHT, POINT, MINIMUM = 0, 5, 10, 15
 CONSTANT, ORIGIN, BOUNDS, NOISE, ROOT, SAMPLES, STACK = 20, 21, 22, 29, 32, 33, 34
 DEEPEST = 64  # divisions: 1e-13 is reached after 44
@@ -229,8 +230,7 @@ def decide_convex(
 ) -> int:
     """DESCENT or NO_DESCENT of a convex piece: it lies before the minimum, if the minimum lies below zero.
 
-    A piece that lies above its tangents at some point and at its ends needs no minimum, nor does one that falls below
-    zero there.
+    A guess of the minimum is enough where g is below zero there, or its tangent above zero in all of the interval.
     """
     noise, lower = numbers[suspect + NOISE], suspect + RIGHT
     if numbers[suspect + LEFT + 1] >= -numbers[suspect + NOISE + 1]:
@@ -311,7 +311,8 @@ def guess(numbers: Numbers, at_left: int, at_right: int, width: float) -> float:
 
 @compiled
 def septic_root(numbers: Numbers, at_left: int, at_right: int, width: float, u: float) -> float:
-    """The zero near ``u`` of the septic with the value and three derivatives of both ends, or ``u``.
+    """The zero near ``u`` of the septic with the value and three derivatives of both ends, where it has the sense of
+    the interval, or ``u``: what begins at zero by round-off has another zero there.
 
     a_0 + a_1 u + a_2 u^2 + a_3 u^3 + u^4 (b_0 + b_1 v + b_2 v^2 + b_3 v^3),   v = u - 1
     """
@@ -322,11 +323,12 @@ def septic_root(numbers: Numbers, at_left: int, at_right: int, width: float, u: 
     b1 = width * numbers[at_right + 1] - a1 - 2 * a2 - 3 * a3 - 4 * b0
     b2 = second * numbers[at_right + 2] - a2 - 3 * a3 - 4 * b1 - 6 * b0
     b3 = third * numbers[at_right + 3] - a3 - 4 * b2 - 6 * b1 - 4 * b0
-    better = u
-    for _ in range(3):
+    better, slope = u, 0.0
+    for _ in range(NEWTON_STEPS):
         v, square = better - 1.0, better * better
         rest, bent = b0 + v * (b1 + v * (b2 + v * b3)), b1 + v * (2 * b2 + 3 * v * b3)
         value = a0 + better * (a1 + better * (a2 + better * a3)) + square * square * rest
         slope = a1 + better * (2 * a2 + 3 * better * a3) + square * better * (4 * rest + better * bent)
         better -= value / slope if slope != 0.0 else 0.0
-    return better if 0.0 < better < 1.0 else u
+    turns = slope * (numbers[at_right] - numbers[at_left]) <= 0.0
+    return u if turns or not 0.0 < better < 1.0 else better
