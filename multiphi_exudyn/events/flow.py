@@ -143,15 +143,17 @@ def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier:
             waves[scaled + d * q + k] = waves[moved + d * q + k] * scale
         scale *= horizon
     for d in range(degree + 1):
+        forces = ints[FORCES] + d * r
         for i in range(r):
-            row, total = ints[level + MOTION] + i * (2 * n + 1), 0j
-            for k in range(q):
-                value = waves[scaled + d * q + k]
-                slope = rate * value
-                if d < degree:
-                    slope += (d + 1) / horizon * waves[scaled + (d + 1) * q + k]
-                total += numbers[row + r + k] * value + numbers[row + n + r + k] * slope
-            waves[ints[FORCES] + d * r + i] = total
+            waves[forces + i] = 0j
+        for k in range(q):
+            row, value = ints[level + MOTION] + r + k, waves[scaled + d * q + k]
+            slope = rate * value
+            if d < degree:
+                slope += (d + 1) / horizon * waves[scaled + (d + 1) * q + k]
+            for i in range(r):
+                waves[forces + i] += numbers[row] * value + numbers[row + n] * slope
+                row += 2 * n + 1
 
 
 @compiled

@@ -6,9 +6,9 @@ in doubt is divided signal by signal (suspect.py).
 
 from __future__ import annotations
 
-from multiphi_exudyn.mathematics.basis_arrays import POWERS, SCALES, SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.basis_arrays import POWERS, PURE, SCALES, SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, INTERVALS, LIFTED, round_off
+from multiphi_exudyn.mathematics.signal_bounds import HERMITE, INTERVALS, LIFTED, OF_A_SIGNAL, OPPOSITE, round_off
 from multiphi_exudyn.mathematics.suspect import (
     DESCENT,
     LEFT,
@@ -48,23 +48,26 @@ def descent_in_block(
     start: float,
     step: float,
     horizon: float,
+    known: int,
     suspect: int,
     scratch_wave: int,
 ) -> int:
-    """The signal that falls first in a block of intervals, NONE if none does."""
-    p, values = ints[basis + SIZE], bounds + DERIVATIVES * count
+    """The signal that falls first in a block of intervals, NONE if none does.
+
+    known: 1 where the block before had the same sample distance: its factors are used again.
+    """
+    p, values = ints[basis + SIZE], bounds + OF_A_SIGNAL * count
     here, there, factors = scratch_wave + HERE * p, scratch_wave + THERE * p, scratch_wave + FACTORS * p
-    local = begin_block(ints, numbers, waves, basis, signals, constants, count, start, step, values, scratch_wave)
-    known, wide, place, end, found = 0, 0, 0, horizon - start, NONE
+    local = begin_block(ints, numbers, waves, basis, signals, constants, bounds, count, start, scratch_wave)
+    if known == 0:
+        begin_factors(ints, numbers, waves, basis, step, factors)
+    wide, place, end, found = 0, 0, horizon - start, NONE
     while found == NONE and place < INTERVALS and place * step < end:
         while place + (1 << wide) > INTERVALS:
             wide -= 1
-        while known < wide:
-            multiply(waves, factors + known * p, factors + known * p, p, factors + (known + 1) * p)
-            known += 1
         left, width = place * step, step * (1 << wide)
         advance_exponentials(ints, numbers, waves, basis, here, factors + wide * p, start + left + width, there)
-        sample(numbers, waves, local, constants, count, p, there, values + 2 * count)
+        sample(numbers, waves, local, constants, bounds, count, p, there, values + 2 * count)
         numbers[suspect + SAMPLES] += 1.0
         room = least_room(numbers, constants, noise, bounds, count, 0, count, values, width, place)
         if room == DOUBTFUL and wide > 0:
@@ -91,26 +94,34 @@ def begin_block(
     basis: int,
     signals: int,
     constants: int,
+    bounds: int,
     count: int,
     start: float,
-    step: float,
-    values: int,
     scratch_wave: int,
 ) -> int:
     """Where the coefficients of the signals (count, p) from a block's start on begin, those of g' (count, p) behind.
 
-    The first of its values, and the exponentials there and their factors from one sample to the next, as well.
+    The first of its values, and the exponentials there, as well.
     """
-    p, unit = ints[basis + SIZE], numbers[ints[basis + SCALES]]
+    p, unit, values = ints[basis + SIZE], numbers[ints[basis + SCALES]], bounds + OF_A_SIGNAL * count
     here, local = scratch_wave + HERE * p, scratch_wave + LOCAL * p
     exponentials(ints, numbers, waves, basis, start, unit, here)
     for s in range(count):
         multiply(waves, signals + s * p, here, p, local + s * p)
-        differentiate(ints, numbers, waves, basis, local + s * p, local + (count + s) * p)
+        if numbers[bounds + OF_A_SIGNAL * s + OPPOSITE] == 0.0:
+            differentiate(ints, numbers, waves, basis, local + s * p, local + (count + s) * p)
     exponentials(ints, numbers, waves, basis, 0.0, start, here)
-    exponentials(ints, numbers, waves, basis, step, unit, scratch_wave + FACTORS * p)
-    sample(numbers, waves, local, constants, count, p, here, values)
+    sample(numbers, waves, local, constants, bounds, count, p, here, values)
     return local
+
+
+@compiled
+def begin_factors(ints: Ints, numbers: Numbers, waves: Waves, basis: int, step: float, factors: int) -> None:
+    """Factors (1 + WIDEST, p) of the exponentials over 1, 2, 4, ... sample distances."""
+    p = ints[basis + SIZE]
+    exponentials(ints, numbers, waves, basis, step, numbers[ints[basis + SCALES]], factors)
+    for k in range(WIDEST):
+        multiply(waves, factors + k * p, factors + k * p, p, factors + (k + 1) * p)
 
 
 @compiled
@@ -126,22 +137,29 @@ def advance_exponentials(
 ) -> None:
     """phi (p,) at a next sample: those of power zero times their factors, the others times t / T."""
     powers, ratio, phi = ints[basis + POWERS], t / numbers[ints[basis + SCALES]], 0j
-    for j in range(ints[basis + SIZE]):
+    if ints[basis + PURE] == 1:
+        multiply(waves, here, factors, ints[basis + SIZE], there)
+    for j in range(ints[basis + SIZE] if ints[basis + PURE] == 0 else 0):
         phi = phi * ratio if ints[powers + j] > 0 else waves[here + j] * waves[factors + j]
         waves[there + j] = phi
 
 
 @compiled
 def sample(
-    numbers: Numbers, waves: Waves, local: int, constants: int, count: int, p: int, phi: int, result: int
+    numbers: Numbers, waves: Waves, local: int, constants: int, bounds: int, count: int, p: int, phi: int, result: int
 ) -> None:
     """g and g' of every signal, (count, 2), where the exponentials are phi."""
+    moved, slope = 0.0, 0.0
     for s in range(count):
-        value, slope, a = numbers[constants + s], 0.0, local + s * p
-        for j in range(p):
-            value += (waves[a + j] * waves[phi + j]).real
-            slope += (waves[a + count * p + j] * waves[phi + j]).real
-        numbers[result + 2 * s] = value
+        a = local + s * p
+        if numbers[bounds + OF_A_SIGNAL * s + OPPOSITE] == 1.0:
+            moved, slope = -moved, -slope
+        else:
+            moved, slope = 0.0, 0.0
+            for j in range(p):
+                moved += (waves[a + j] * waves[phi + j]).real
+                slope += (waves[a + count * p + j] * waves[phi + j]).real
+        numbers[result + 2 * s] = numbers[constants + s] + moved
         numbers[result + 2 * s + 1] = slope
 
 
@@ -168,9 +186,9 @@ def least_room(
     for s in range(first, last):
         left, right = numbers[values + 2 * s], numbers[values + 2 * (count + s)]
         rise, after = width * numbers[values + 2 * s + 1], width * numbers[values + 2 * (count + s) + 1]
-        spread = width * width * width * width * numbers[bounds + DERIVATIVES * s + 4]
+        spread = width * width * width * width * numbers[bounds + OF_A_SIGNAL * s + 4]
         if not min(left, left + rise / 3, right - after / 3, right) > HERMITE * spread:
-            sunk = left < -round_off(numbers[bounds + DERIVATIVES * s], numbers[constants + s], numbers[noise + s])
+            sunk = left < -round_off(numbers[bounds + OF_A_SIGNAL * s], numbers[constants + s], numbers[noise + s])
             lifted = min(3 * left + rise, 1.5 * right - after / 2, right) > LIFTED * spread
             if place > 0 or sunk or not lifted:
                 return DOUBTFUL
@@ -211,7 +229,7 @@ def descent_in_interval(
         if doubt and left < earliest:
             take_up(
                 ints, numbers, waves, basis, local + s * p, numbers[constants + s], numbers[noise + s],
-                bounds + DERIVATIVES * s, start, suspect, rows,
+                bounds + OF_A_SIGNAL * s, start, suspect, rows,
             )  # fmt: skip
             combine(numbers, waves, p, here, suspect, suspect + LEFT, rows)
             combine(numbers, waves, p, there, suspect, suspect + RIGHT, rows)

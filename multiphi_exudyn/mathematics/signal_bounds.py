@@ -26,6 +26,9 @@ __all__ = [
     "HERMITE",
     "INTERVALS",
     "LIFTED",
+    "OF_A_SIGNAL",
+    "OPPOSITE",
+    "QUINTIC",
     "all_above",
     "all_finite",
     "bound",
@@ -35,10 +38,13 @@ __all__ = [
 ]
 
 DERIVATIVES = 7  # g and its derivatives up to the sixth are bounded
+OPPOSITE = 7  # 1 where a signal moves as the one before it does, in the opposite direction, else 0
+OF_A_SIGNAL = 8  # numbers: its bounds, and whether it is opposite
 BOUNDING = 4  # in p: numbers that are worked in behind the bounds
 INTERVALS = 64  # in a block
 RESOLUTION = 0.004  # wanted remainder of a block's intervals, of the signal's typical size
 HERMITE = 1 / 384
+QUINTIC = 1 / 46080  # max of u^3 (1 - u)^3 / 720 on [0, 1]
 LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
 
 
@@ -54,14 +60,14 @@ def bound(
     latest: float,
     bounds: int,
 ) -> None:
-    """Upper bounds (count, 7) of |g|, |g'|, ..., |g^(6)| on [start, latest], constants left out.
+    """Upper bounds of |g|, |g'|, ..., |g^(6)| on [start, latest], constants left out, and which signals are opposite.
 
     sum_j b_j with b_j = |a_j| (latest / T)^d_j exp(min(Re lambda_j, 0) start + max(Re lambda_j, 0) latest) for g; every
     derivative has |lambda_j| b_j + d_j+1 / latest b_j+1 in place of b_j, where j + 1 is of the next power. BOUNDING p
     numbers behind the bounds are worked in.
     """
     p, powers, rates = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES]
-    sizes, fast, envelope, link = bounds + DERIVATIVES * count, p, 2 * p, 3 * p
+    sizes, fast, envelope, link = bounds + OF_A_SIGNAL * count, p, 2 * p, 3 * p
     ratio, height = latest / numbers[ints[basis + SCALES]], 1.0
     for j in range(p):
         decay = waves[rates + j].real
@@ -70,27 +76,41 @@ def bound(
             height *= ratio
             numbers[sizes + link + j - 1] = ints[powers + j] / latest
         else:
-            height = exponential_size(decay * (start if decay < 0.0 else latest)) if decay != 0.0 else 1.0
+            exponent = decay * (start if decay < 0.0 else latest)
+            height = exponential_size(exponent) if exponent != 0.0 else 1.0
         numbers[sizes + envelope + j] = height
         numbers[sizes + fast + j] = magnitude(waves, rates + j)
     for s in range(count):
-        for j in range(p):
+        own, opposite = bounds + OF_A_SIGNAL * s, is_opposite(waves, signals + s * p, p) if s > 0 else 0
+        numbers[own + OPPOSITE] = opposite
+        for k in range(DERIVATIVES if opposite == 1 else 0):
+            numbers[own + k] = numbers[own - OF_A_SIGNAL + k]
+        for j in range(p if opposite == 0 else 0):
             numbers[sizes + j] = magnitude(waves, signals + s * p + j) * numbers[sizes + envelope + j]
-        for k in range(DERIVATIVES):
+        for k in range(DERIVATIVES if opposite == 0 else 0):
             total = 0.0
             for j in range(p):
                 size = numbers[sizes + j]
                 total += size
                 linked = numbers[sizes + link + j] * numbers[sizes + j + 1]  # the last one to none
                 numbers[sizes + j] = size * numbers[sizes + fast + j] + linked
-            numbers[bounds + DERIVATIVES * s + k] = total
+            numbers[own + k] = total
+
+
+@compiled
+def is_opposite(waves: Waves, signal: int, p: int) -> int:
+    """1 where the coefficients (p,) of a signal are those of the one before it with the other sign."""
+    for j in range(p):
+        if waves[signal + j] != -waves[signal - p + j]:
+            return 0
+    return 1
 
 
 @compiled
 def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
     """1 where every constant outweighs all that moves."""
     for s in range(count):
-        if not numbers[constants + s] > numbers[bounds + DERIVATIVES * s]:
+        if not numbers[constants + s] > numbers[bounds + OF_A_SIGNAL * s]:
             return 0
     return 1
 
@@ -99,7 +119,7 @@ def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
 def all_finite(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
     """1 where the signals and their highest derivatives are bounded by finite numbers."""
     for s in range(count):
-        first = bounds + DERIVATIVES * s
+        first = bounds + OF_A_SIGNAL * s
         if not abs(numbers[constants + s]) + numbers[first] + numbers[first + DERIVATIVES - 1] < math.inf:
             return 0
     return 1
@@ -114,9 +134,9 @@ def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, r
     longest = power_of_two_above(remaining / INTERVALS)
     step = math.inf
     for s in range(count):
-        fourth = numbers[bounds + DERIVATIVES * s + 4]
+        fourth = numbers[bounds + OF_A_SIGNAL * s + 4]
         if fourth > 0.0:
-            wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + DERIVATIVES * s]) / HERMITE
+            wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + OF_A_SIGNAL * s]) / HERMITE
             distance = math.sqrt(math.sqrt(wanted / fourth))
             step = min(step, distance) if distance > 0.0 else step  # what has decayed below all numbers limits nothing
     return min(longest, power_of_two_above(step) / 2) if step < math.inf else longest

@@ -15,8 +15,9 @@ from __future__ import annotations
 
 from multiphi_exudyn.mathematics.basis_arrays import SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.hermite_root import guess
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, LIFTED, round_off
+from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES, HERMITE, LIFTED, QUINTIC, round_off
 
 __all__ = [
     "DESCENT",
@@ -152,7 +153,7 @@ def decide(
     """
     width, noise = right - left, numbers[suspect + NOISE]
     at_left, at_right = numbers[suspect + LEFT], numbers[suspect + RIGHT]
-    low, minus_high = lowest(numbers, suspect, 0, 1.0, width), lowest(numbers, suspect, 0, -1.0, width)
+    low, minus_high = lowest_value(numbers, suspect, 1.0, width), lowest_value(numbers, suspect, -1.0, width)
     if low > 0.0 or min(low, minus_high) >= -noise or rises(numbers, suspect, width) == 1:
         return NO_DESCENT
     if at_left < -noise:
@@ -180,6 +181,18 @@ def lowest(numbers: Numbers, suspect: int, order: int, sign: float, width: float
     inner_right = right - sign * width * numbers[suspect + RIGHT + order + 1] / 3
     remainder = HERMITE * width * width * width * width * numbers[suspect + BOUNDS + order + 4]
     return min(left, right, inner_left, inner_right) - remainder
+
+
+@compiled
+def lowest_value(numbers: Numbers, suspect: int, sign: float, width: float) -> float:
+    """The same of the suspect itself, whose second derivative is known too, by the quintic."""
+    left, right, first, second = suspect + LEFT, suspect + RIGHT, sign * width / 5, sign * width * width / 20
+    at_left, at_right = sign * numbers[left], sign * numbers[right]
+    inner = min(at_left + first * numbers[left + 1], at_right - first * numbers[right + 1])
+    middle_left = at_left + 2 * first * numbers[left + 1] + second * numbers[left + 2]
+    middle_right = at_right - 2 * first * numbers[right + 1] + second * numbers[right + 2]
+    remainder = QUINTIC * width * width * width * width * width * width * numbers[suspect + BOUNDS + 6]
+    return min(at_left, at_right, inner, middle_left, middle_right) - remainder
 
 
 @compiled
@@ -215,15 +228,25 @@ def decide_convex(
     suspect: int,
     rows: int,
 ) -> int:
-    """DESCENT or NO_DESCENT of a convex piece: it lies before the minimum, if the minimum lies below zero."""
+    """DESCENT or NO_DESCENT of a convex piece: it lies before the minimum, if the minimum lies below zero.
+
+    A guess of the minimum is enough where g is below zero there, or its tangent above zero in all of the interval.
+    """
+    noise, lower = numbers[suspect + NOISE], suspect + RIGHT
     if numbers[suspect + LEFT + 1] >= -numbers[suspect + NOISE + 1]:
         return NO_DESCENT
-    lower = suspect + RIGHT
-    if numbers[suspect + RIGHT + 1] > 0.0:
-        find_root(ints, numbers, waves, basis, 1, left, right, suspect, suspect + RIGHT, rows)
-        right, lower = numbers[suspect + ROOT], suspect + MINIMUM
-        sample_at(ints, numbers, waves, basis, right, suspect, lower, rows)
-    if numbers[lower] >= -numbers[suspect + NOISE]:
+    if numbers[suspect + RIGHT + 1] > 0.0 and numbers[lower] >= -noise:
+        t = left + (right - left) * guess(numbers, suspect + LEFT + 1, suspect + RIGHT + 1, right - left)
+        lower = suspect + MINIMUM
+        sample_at(ints, numbers, waves, basis, t, suspect, lower, rows)
+        if numbers[lower] > abs(numbers[lower + 1]) * (right - left):
+            return NO_DESCENT
+        if numbers[lower] >= -noise:
+            find_root(ints, numbers, waves, basis, 1, left, right, suspect, suspect + RIGHT, rows)
+            t = numbers[suspect + ROOT]
+            sample_at(ints, numbers, waves, basis, t, suspect, lower, rows)
+        right = t
+    if numbers[lower] >= -noise:
         return NO_DESCENT
     find_root(ints, numbers, waves, basis, 0, left, right, suspect, lower, rows)
     return DESCENT
@@ -269,15 +292,3 @@ def find_root(
                 following = better
         t = following
     numbers[suspect + ROOT] = t
-
-
-@compiled
-def guess(numbers: Numbers, at_left: int, at_right: int, width: float) -> float:
-    """Where in its interval, as a fraction, a monotone function is zero: inverse cubic Hermite interpolation."""
-    rise = numbers[at_right] - numbers[at_left]
-    slope_left, slope_right = numbers[at_left + 1], numbers[at_right + 1]
-    s = -numbers[at_left] / rise if rise != 0.0 else 0.5
-    if slope_left * rise > 0.0 and slope_right * rise > 0.0:
-        toward_left, toward_right = rise / (slope_left * width), rise / (slope_right * width)
-        s = s * s * (3 - 2 * s) + s * (1 - s) * ((1 - s) * toward_left - s * toward_right)
-    return min(max(s, 0.01), 0.99)

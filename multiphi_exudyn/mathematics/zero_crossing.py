@@ -39,21 +39,14 @@ from multiphi_exudyn.mathematics.signal_bounds import (
     BOUNDING,
     DERIVATIVES,
     INTERVALS,
+    OF_A_SIGNAL,
     all_above,
     all_finite,
     bound,
     sample_distance,
 )
-from multiphi_exudyn.mathematics.suspect import (
-    LEFT,
-    RIGHT,
-    ROOT,
-    SAMPLES,
-    SUSPECT,
-    find_root,
-    sample_at,
-    take_up,
-)
+from multiphi_exudyn.mathematics.signal_starts import near_descent, sample_start, stay_above
+from multiphi_exudyn.mathematics.suspect import ROOT, SAMPLES, SUSPECT
 
 __all__ = [
     "INSTANT",
@@ -80,7 +73,7 @@ INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes l
 
 def scratch_numbers(p: int, count: int) -> int:
     """Numbers that a search among so many signals on p exponentials works in."""
-    return SUSPECT + BOUNDING * p + (DERIVATIVES + 4) * count
+    return SUSPECT + BOUNDING * p + (OF_A_SIGNAL + 4) * count
 
 
 def scratch_waves(p: int, count: int) -> int:
@@ -112,7 +105,7 @@ def first_descent(
     growth = numbers[scales + 2]
     window = WINDOW / growth if growth > 0.0 else math.inf
     numbers[suspect + SAMPLES] = 0.0
-    found, searched, begin = NONE, 0, start
+    found, searched, before, begin = NONE, 0, 0.0, start
     while found == NONE and begin < horizon and count > 0:
         until = min(horizon, begin + window)
         latest = 2 * until - begin  # a block may end behind
@@ -121,6 +114,10 @@ def first_descent(
             break
         if all_finite(numbers, constants, bounds, count) == 0:
             return NOT_FINITE
+        if begin == 0.0:
+            sample_start(ints, numbers, waves, basis, signals, constants, bounds, count)
+            if until == horizon and stay_above(numbers, constants, noise, bounds, count, horizon) == 1:
+                break
         if begin == 0.0 and count > 1 and ints[basis + PURE] == 1:
             found = near_descent(
                 ints, numbers, waves, basis, signals, constants, noise, bounds, count, latest, suspect, scratch_wave
@@ -129,78 +126,21 @@ def first_descent(
                 found = found if numbers[suspect + ROOT] <= horizon else NONE
                 break
         step = sample_distance(numbers, constants, bounds, count, until - begin)
+        known, before = 1 if step == before else 0, step
         searched += 1
         if searched > PATIENCE and horizon - begin > MOST_BLOCKS * INTERVALS * step:
             numbers[result + 2] = step
             numbers[result + 3] = horizon - begin
             return TOO_LONG
         found = descent_in_block(
-            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, suspect,
-            scratch_wave,
+            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, known,
+            suspect, scratch_wave,
         )  # fmt: skip
         begin += INTERVALS * step
     numbers[result + 1] += numbers[suspect + SAMPLES]
     if found != NONE:
         numbers[result] = numbers[suspect + ROOT]
     return found
-
-
-@compiled
-def near_descent(
-    ints: Ints,
-    numbers: Numbers,
-    waves: Waves,
-    basis: int,
-    signals: int,
-    constants: int,
-    noise: int,
-    bounds: int,
-    count: int,
-    valid: float,
-    suspect: int,
-    scratch_wave: int,
-) -> int:
-    """A first descent near t = 0 that Taylor's theorem certifies at once, NONE if it is not that plain.
-
-    2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
-    valid: how long the bounds hold, for ever where nothing grows. Every power is zero.
-    """
-    p, rates, starts = ints[basis + SIZE], ints[basis + RATES], bounds + DERIVATIVES * count
-    for s in range(count):
-        value, slope = numbers[constants + s], 0.0
-        for j in range(p):
-            a = waves[signals + s * p + j]
-            value += a.real
-            slope += (a * waves[rates + j]).real
-        numbers[starts + 2 * s] = value
-        numbers[starts + 2 * s + 1] = slope
-    for s in range(count):
-        value, slope = numbers[starts + 2 * s], numbers[starts + 2 * s + 1]
-        if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + DERIVATIVES * s + 2] < slope * slope:
-            latest = -2 * value / slope
-            if (latest <= valid or ints[basis + ETERNAL] == 1) and others_stay_above(
-                numbers, starts, bounds, count, s, latest
-            ) == 1:
-                take_up(
-                    ints, numbers, waves, basis, signals + s * p, numbers[constants + s], numbers[noise + s],
-                    bounds + DERIVATIVES * s, 0.0, suspect, scratch_wave,
-                )  # fmt: skip
-                sample_at(ints, numbers, waves, basis, 0.0, suspect, suspect + LEFT, scratch_wave)
-                sample_at(ints, numbers, waves, basis, latest, suspect, suspect + RIGHT, scratch_wave)
-                find_root(ints, numbers, waves, basis, 0, 0.0, latest, suspect, suspect + RIGHT, scratch_wave)
-                return s
-    return NONE
-
-
-@compiled
-def others_stay_above(numbers: Numbers, starts: int, bounds: int, count: int, falling: int, latest: float) -> int:
-    """1 where by their values and slopes at t = 0 no other signal falls before ``latest``."""
-    for s in range(count):
-        first = bounds + DERIVATIVES * s
-        high = numbers[starts + 2 * s] > numbers[first + 1] * latest
-        if s != falling and not high and not numbers[starts + 2 * s + 1] > numbers[first + 2] * latest:
-            return 0
-    return 1
 
 
 @compiled

@@ -88,6 +88,11 @@ class Recorded(Made[Segment], Segments):
         return self._record.rows[: self._count, 0]
 
     @property
+    def settled(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.asarray(self._record.rows[: self._count, 3] < 0)
+
+    @property
     def levels(self) -> Sequence[LoadedLevel]:
         """See ``Segments``."""
         return self._record.levels

@@ -139,6 +139,11 @@ class Segments(Sequence[Segment], ABC):
 
     @property
     @abstractmethod
+    def settled(self) -> np.ndarray:
+        """Whether (n,) every exit is armed where they begin: then no signal is below zero in them."""
+
+    @property
+    @abstractmethod
     def levels(self) -> Sequence[LoadedLevel]:
         """The levels that were visited, each once."""
 
@@ -222,6 +227,11 @@ class Listed(Segments):
     def ends(self) -> np.ndarray:
         """See ``Segments``."""
         return np.array([segment.end for segment in self._segments])
+
+    @property
+    def settled(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([all(phase is Phase.ARMED for phase in segment.phases) for segment in self._segments], bool)
 
     def __len__(self) -> int:
         return len(self._segments)

@@ -290,3 +290,12 @@ def test_level_cost(capsys):
     assert len(costs) == 4
     assert all(row[0] > 0 and row == sorted(row) and row[-1] < math.inf for row in costs.values())
     assert capsys.readouterr().out.count("ledger's forms") == 4
+
+
+def test_event_cost(capsys):
+    """Times are not asserted: the events are."""
+    costs = load("event_cost").main(rounds=1)
+    assert [cost.events for (modes, _), cost in costs.items() if modes == 6] == [76, 173, 345, 342]
+    assert costs[6, "belt"].segment == pytest.approx(2.2 * costs[6, "contact"].segment, rel=0.05)
+    assert all(0 < cost.run < math.inf for cost in costs.values())
+    assert capsys.readouterr().out.count("times a contact's") == 6

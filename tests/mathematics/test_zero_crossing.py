@@ -252,6 +252,31 @@ class TestFirst:
         row[order] = -1.0
         assert first(POLYNOMIAL, signals(row), 2.0) <= 1e-3
 
+    @pytest.mark.parametrize("below", [0.0, 1e-16, 1e-15])
+    def test_a_ball_thrown_up_from_a_hair_below_zero_falls_back(self, below):
+        """The curve through zero at its start is no descent, though a search for roots might end there."""
+        thrown = signals([-below, 1, -5.0, 0, 0])._replace(noise=np.array([1e-14]))
+        assert_allclose(first(POLYNOMIAL, thrown, 1.0), 0.2, rtol=1e-13)
+
+    def test_what_its_start_keeps_above_zero_is_not_sampled(self):
+        """cos t + 1 / 2 up to its horizon, by value, slope and curvature; beyond it is sampled."""
+        search = Search(basis([1j]), signals([1.0], constants=[0.5]))
+        assert search.descent(1.2) is None
+        assert search.samples == 0
+        assert_allclose(search.descent(3.0).time, 2 * np.pi / 3, rtol=1e-14)
+        assert search.samples > 0
+
+    @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 4.0])
+    def test_of_two_opposite_signals_each_is_found(self, phase):
+        """-0.97 < cos(t + phase) + 0.3 exp(-t / 2) < 1.28: the limit that is reached first."""
+        row, both = np.array([np.exp(1j * phase), 0.3]), basis([1j, -0.5])
+        t = np.linspace(0.0, 10.0, 1_000_001)
+        moved = np.cos(t + phase) + 0.3 * np.exp(-0.5 * t)
+        outside = np.argmax((moved < -0.97) | (moved > 1.28))
+        found = Search(both, signals(row, -row, constants=[0.97, 1.28])).descent(10.0)
+        assert_allclose(found.time, t[outside], atol=2e-5)
+        assert found.signal == (0 if moved[outside] < 0 else 1)
+
     @pytest.mark.parametrize("horizon", [1.0, 1e3, 1e6])
     def test_a_ball_thrown_up_falls_back(self, horizon):
         """t - t^2/2 * g: the second of its two zeros."""

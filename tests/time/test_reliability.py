@@ -6,6 +6,7 @@ import math
 import pickle
 import warnings
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from multiphi_exudyn.events.state import event_table
 from multiphi_exudyn.time import chatter
 from multiphi_exudyn.time.defects import defects
 from multiphi_exudyn.time.reliability import warnings_of
+from multiphi_exudyn.time.rubbing import rubbing_warnings
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
@@ -433,6 +435,16 @@ class TestFriction:
 
     def test_of_constant_limits_or_on_another_belt_is_determined(self):
         assert self.pads(None).warnings == self.pads(1.5, 2.0).warnings == ()
+
+    def test_that_begins_along_its_slip_is_not_looked_into(self):
+        """Where the speed along a slip is armed it ends the slip before it turns round."""
+        model = mp.MultiPhiModel(
+            chain(12, stiffness=40.0), [mp.Friction("belt", "m9", 1.0, 2.0, velocity=0.1)], modes=7
+        )
+        run = mp.simulate(model, 60.0)
+        assert sum(event.kind == "slip" for event in run.events) > 5
+        with mock.patch.object(type(run.segments), "values", side_effect=AssertionError):
+            assert list(rubbing_warnings(run.segments, model)) == []
 
     @pytest.mark.parametrize(("modes", "told"), [(7, ["backward slip"]), (9, []), ("all", [])])
     def test_that_truncation_turns_round_is_told(self, modes, told):
