@@ -114,7 +114,7 @@ class Known:
     @classmethod
     def _of(cls, model: MultiPhiModel, loaded: Sequence[LoadedLevel]) -> Known:
         levels = [level.modal for level in loaded]
-        static = () if model.whole else static_warnings([level.level for level in loaded])
+        static = () if model.whole else static_warnings(levels)
         omega = np.concatenate([level.omega for level in levels])
         fastest = model.level_at(()).highest_frequency
         slowest = float(np.min(omega[omega > 0], initial=math.inf))

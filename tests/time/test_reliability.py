@@ -100,6 +100,11 @@ class TestTruncatedContact:
         assert "'stop' 17 modes leave out 98 %" in told
         assert "truncated contact" not in kinds(released(long_chain("all")))
 
+    def test_a_load_that_varies_is_no_mode(self):
+        run = released(long_chain(8), loads=(mp.HarmonicLoad("m3", 0.5, 3.0),))
+        (told,) = (sentence for sentence in run.warnings if sentence.startswith("truncated contact: "))
+        assert "at 'stop' 8 modes leave out" in told
+
     def test_a_contact_that_never_closes_is_no_reason_to_warn(self):
         run = mp.simulate(long_chain(17), 0.05, displacement=1e-4 * np.arange(18.0))
         assert not run.events
