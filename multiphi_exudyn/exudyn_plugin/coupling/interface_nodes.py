@@ -70,8 +70,8 @@ class PositionInterface:
 class RigidInterface:
     """A point of a body as a rigid frame of the Exudyn system, to which every joint attaches.
 
-    A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; its node
-    is then ``items["nInterface"]["tip"]``, for MarkerNodeRigid.
+    A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; the
+    node is then ``items["nInterface"]["tip"]``, for MarkerNodeRigid.
 
     A body is linear: a run in which a rigid interface rotates by more than 5 degrees issues a warning.
 
