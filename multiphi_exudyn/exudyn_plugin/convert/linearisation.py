@@ -166,7 +166,7 @@ class Comparison:
         return (stiffness + stiffness.T) / 2
 
     def impact_error(self, z: np.ndarray, scale: float) -> float:
-        """Relative error of impacts of spheres: twice the largest rotation [rad] of a closed contact's normal since q_0.
+        """Relative error of impacts of spheres: twice the largest rotation [rad] of a closed contact's normal.
 
         If a sphere moves sideways by s, at a distance L of the centres, its normal turns by s / L, and so does its
         impulse. With equal speeds along and across the normal, the error of an impact is twice that.
