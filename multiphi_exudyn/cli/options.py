@@ -1,4 +1,4 @@
-"""Options of the commands, with their defaults, and the kinds of values they take."""
+"""Options of the commands, with their defaults and the types of their values."""
 
 from __future__ import annotations
 
