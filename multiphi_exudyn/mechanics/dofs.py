@@ -60,7 +60,7 @@ class DofTable:
             return list(self._node(name, node).values())
         return [self.place(name, node, component)]
 
-    def taken(self, places: np.ndarray) -> DofTable:
+    def restricted_to(self, places: np.ndarray) -> DofTable:
         """Table with these rows alone."""
         return DofTable(tuple(self.rows[place] for place in places.tolist()))
 

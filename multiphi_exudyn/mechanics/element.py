@@ -203,9 +203,9 @@ def is_oblique(link: AnyLink) -> bool:
     return isinstance(link, Link) and bool(link.push)
 
 
-def event_kind(states: Sequence[ElementState], left: int, entered: int) -> str:
+def event_kind(states: Sequence[ElementState], source: int, target: int) -> str:
     """Kind of the event from one state to another; "close" from open to any other state."""
-    return "close" if states[left].name == "open" != states[entered].name else states[entered].event
+    return "close" if states[source].name == "open" != states[target].name else states[target].event
 
 
 def friction_spring(element: Element) -> tuple[int, int, float, float]:

@@ -42,7 +42,7 @@ class PointRows(Mapping[str, np.ndarray]):
     def __repr__(self) -> str:
         return f"<rows of {self.n} degrees of freedom, by point: {names(list(self))}>"
 
-    def taken(self, moving: np.ndarray) -> PointRows:
+    def restricted_to(self, moving: np.ndarray) -> PointRows:
         """Rows of these degrees of freedom alone; raise for a point that moves with the others only."""
         entries = {}
         for name in self:

@@ -107,8 +107,8 @@ class LinearStructure(Shown):
             "mass": mass,
             "stiffness": stiffness,
             "damping": damping,
-            "points": rows.taken(moving) if len(supported) else rows,
-            "dofs": dofs if dofs is None or not len(supported) else dofs.taken(moving),
+            "points": rows.restricted_to(moving) if len(supported) else rows,
+            "dofs": dofs if dofs is None or not len(supported) else dofs.restricted_to(moving),
             "free": self.free[moving] if len(self.free) else moving,
         }
         for name, value in checked.items():

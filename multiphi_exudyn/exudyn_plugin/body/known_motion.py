@@ -67,14 +67,14 @@ class MotionInterval:
 
     def at(self, times: np.ndarray) -> Iterator[LevelStates]:
         """The states at times (k,) [s], level by level; at an event those right after it."""
-        known = np.flatnonzero(times < self.end)
-        owners = self.segments.owners(times[known])
-        states = self.segments.states(owners, times[known] - self.segments.starts[owners])
+        before_end = np.flatnonzero(times < self.end)
+        owners = self.segments.owners(times[before_end])
+        states = self.segments.states(owners, times[before_end] - self.segments.starts[owners])
         numbers = self.segments.numbers[owners]
         for number in np.unique(numbers).tolist():
-            own, level = numbers == number, self.segments.levels[number]
-            eta, eta_t = states[:, own, : level.level.modes]
-            yield self._level_states(known[own], level, eta, eta_t, self.phases[owners[own]])
+            in_level, level = numbers == number, self.segments.levels[number]
+            eta, eta_t = states[:, in_level, : level.level.modes]
+            yield self._level_states(before_end[in_level], level, eta, eta_t, self.phases[owners[in_level]])
         indices = np.flatnonzero(times >= self.end)
         if len(indices):
             eta, eta_t = (

@@ -74,8 +74,8 @@ def check_start(mbs: Any, body: CheckedBody, start: Sequence[np.ndarray], loss: 
     inertia = system.attached_parts(system.copy_state(), coordinates.stepped.mass).inertia
     q_t = coordinates.views[1]
     as_created = np.array_equal(coordinates.views[:2], start)
-    struck = as_created and loss > ROUND_OFF * (loss + 0.5 * float(q_t @ q_t))
-    if struck and np.any(inertia.impedance(np.eye(len(inertia.mass)))):
+    has_impact = as_created and loss > ROUND_OFF * (loss + 0.5 * float(q_t @ q_t))
+    if has_impact and np.any(inertia.impedance(np.eye(len(inertia.mass)))):
         raise MultiPhiValueError(
             f"start of {body.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
             "interface, need a start without an impact"

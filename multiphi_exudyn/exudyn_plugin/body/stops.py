@@ -113,7 +113,7 @@ def plan_event_steps(
     if last > (steps[-1] if len(steps) else 0) and not interval.failure:
         steps, end = np.append(steps, last), start.time + start.step * last
         times, due_times = np.append(times, end), np.append(due_times, end - TIME_ROUNDING * start.step)
-    expected, reached = _undisturbed(start, steps, levels, level_numbers, states, steps_of)
+    expected, largest = _undisturbed(start, steps, levels, level_numbers, states, steps_of)
     return EventSteps(
         times=times.tolist(),
         due_times=due_times.tolist(),
@@ -123,7 +123,7 @@ def plan_event_steps(
         states=states,
         data=data,
         expected=expected,
-        largest=np.maximum.accumulate(reached).tolist(),
+        largest=np.maximum.accumulate(largest).tolist(),
     )
 
 

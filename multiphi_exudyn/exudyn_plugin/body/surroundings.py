@@ -99,11 +99,11 @@ class Surroundings:
             coordinates.write(new, after.held, entered)
             forces_after = coordinates.external_forces(mbs, new)
         else:
-            left = system.copy_state()
+            state_before = system.copy_state()
             forces_before = coordinates.forces_from_accelerations(system.accelerations(instant.step))
             coordinates.set_level_if_changed(mbs, new, after.held, new.drive)
             coordinates.write(new, after.held, entered)
-            system.move_parts(self.parts, left)
+            system.move_parts(self.parts, state_before)
             forces_after = coordinates.forces_from_accelerations(system.accelerations(instant.step))
         remainder = coordinates.transform_force(force - forces_before.forces, old, new)
         return forces_after.forces + remainder, forces_after.system_values - forces_before.system_values
@@ -124,10 +124,10 @@ class Surroundings:
         """
         if self.parts is None or self.inertia is None or not self.body.coordinates.has_friction:
             return self
-        own, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
+        level, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
         x, v = state.displacement, state.velocity
         eta_tt = state.level.alone.asymptotic.drive + force[:r]
-        eta_tt -= own.damping_matrix @ v[:r] + own.squares * x[:r] + own.coupling @ x[:r]
+        eta_tt -= level.damping_matrix @ v[:r] + level.squares * x[:r] + level.coupling @ x[:r]
         reactions = _reactions_of(self.body, self.parts, state.level, (x, v, eta_tt), force[s:])
         return replace(self, reactions=reactions)
 
@@ -189,9 +189,9 @@ def _reactions_of(
 
 def _spring_forces(loaded: LoadedLevel, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Forces -k q - c q' (l,) [N] of all links of finite stiffness, whether they act or not."""
-    base, own = loaded.level.base, loaded.level
+    base, level = loaded.level.base, loaded.level
     springs = np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)
-    return np.asarray(-springs * (own.gap_rows @ x + loaded.gap_constants) - base.dampings * (own.gap_rows @ v))
+    return np.asarray(-springs * (level.gap_rows @ x + loaded.gap_constants) - base.dampings * (level.gap_rows @ v))
 
 
 def _point_inertia(body: CoupledBody, parts: AttachedParts) -> PointInertia | None:

@@ -93,7 +93,7 @@ def linear_structure_from_fem(
     moving = np.ones((mass.shape[0] // COMPONENTS, COMPONENTS), bool)
     moving[fixed_nodes] = False
     free = np.flatnonzero(moving)
-    rows = {name: _row(fem, name, given, moving) for name, given in ({} if points is None else points).items()}
+    rows = {name: _row(fem, name, point, moving) for name, point in ({} if points is None else points).items()}
     dofs = DofTable(tuple((int(dof) // COMPONENTS, NAMES[dof % COMPONENTS]) for dof in free))
     return LinearStructure(mass[free][:, free], stiffness[free][:, free], damping, rows, dofs=dofs)
 

@@ -68,16 +68,16 @@ class AttachedInertia:
         directions: H^T (b, k). in_base: R (m, b).
         """
         lengths = np.linalg.norm(directions, axis=0)
-        moved = directions + in_base.T @ self.reactions(in_base, directions)
-        shares, vectors = np.linalg.eigh(directions.T @ moved / np.outer(lengths, lengths))
+        responses = directions + in_base.T @ self.reactions(in_base, directions)
+        shares, vectors = np.linalg.eigh(directions.T @ responses / np.outer(lengths, lengths))
         return shares, vectors / lengths[:, None]
 
     def immovable(self, base: ModalBase, in_base: np.ndarray) -> set[int]:
         """Indices of rigid contacts that the attached inertia leaves no mobility."""
         rigid = _impact_links(base)
         directions = base.directions[:, rigid]
-        moved = directions + in_base.T @ self.reactions(in_base, directions)
-        immovable = np.sum(directions * moved, axis=0) <= IMMOVABLE * np.sum(directions**2, axis=0)
+        responses = directions + in_base.T @ self.reactions(in_base, directions)
+        immovable = np.sum(directions * responses, axis=0) <= IMMOVABLE * np.sum(directions**2, axis=0)
         return set(rigid[immovable].tolist())
 
 
@@ -165,11 +165,11 @@ class PointInertia:
         """Vectors (c, b) with products u.B u' for directions u (c, b) of contacts; zero for compliant ones."""
         rigid, reduced = _impact_links(self._base), np.zeros_like(units)
         directions = units[rigid].T
-        moved = directions + self._in_base.T @ self._attached.reactions(self._in_base, directions)
-        products = directions.T @ moved
+        responses = directions + self._in_base.T @ self._attached.reactions(self._in_base, directions)
+        products = directions.T @ responses
         shares, vectors = np.linalg.eigh((products + products.T) / 2)
-        left = (vectors * np.sqrt(np.maximum(shares, 0.0)))[:, ::-1][:, : units.shape[1]]
-        reduced[rigid, : left.shape[1]] = left
+        reduced_rows = (vectors * np.sqrt(np.maximum(shares, 0.0)))[:, ::-1][:, : units.shape[1]]
+        reduced[rigid, : reduced_rows.shape[1]] = reduced_rows
         return reduced
 
     def _impedance(self, states: tuple[int, ...]) -> np.ndarray:

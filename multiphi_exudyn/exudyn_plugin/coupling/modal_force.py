@@ -43,9 +43,9 @@ def _compliance(level: Level) -> np.ndarray:
 
 def _free_mode_share(level: Level, inverse: np.ndarray) -> np.ndarray:
     """1 - S S^-1 (r, r), zero for modes of nonzero frequency."""
-    left = np.eye(level.modes) - level.coupling @ inverse
-    left[level.squares != 0] = 0.0
-    return left
+    share = np.eye(level.modes) - level.coupling @ inverse
+    share[level.squares != 0] = 0.0
+    return share
 
 
 @dataclass(frozen=True)
@@ -178,8 +178,8 @@ class ConstantForces:
             self._rate_matrices[record] = plain, self.arrays.buffers.take("numbers", matrix.size)
         plain, start = self._rate_matrices[record]
         rates = self.arrays.numbers[plain : plain + matrix.size].reshape(matrix.shape).copy()
-        ends, left = (self._levels[source].states, self._levels[target].states), len(self._shifts[target])
-        rates[:left, :r] = self._inertia.velocity_map(*ends, rates[:left, :r])
+        states, modes = (self._levels[source].states, self._levels[target].states), len(self._shifts[target])
+        rates[:modes, :r] = self._inertia.velocity_map(*states, rates[:modes, :r])
         self.arrays.ints[record + a.RATE_MATRIX] = start
         self.arrays.numbers[start : start + rates.size] = rates.ravel()
 
@@ -188,11 +188,11 @@ class ConstantForces:
         ints, numbers, n, r = self.arrays.ints, self.arrays.numbers, self._width(level), len(self._shifts[level])
         loaded, row = self.arrays.loaded[int(ints[level + a.NUMBER])], int(ints[ints[exit_ + a.ENTERED] + a.ROW])
         element, exit_taken = exits_of(loaded)[(exit_ - int(ints[level + a.EXITS])) // a.EXIT_INTS]
-        taken = asked_alone(exit_taken)
-        back = way_back(loaded, element, taken)
+        alone = asked_alone(exit_taken)
+        back = way_back(loaded, element, alone)
         plain = self._entered_constants.setdefault(exit_, float(numbers[row + 2 * n]))
         numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
-        entered = self.arrays.levels.level(after(loaded, element, taken))
+        entered = self.arrays.levels.level(after(loaded, element, alone))
         for k, share in force_shares(entered, element, back):
             numbers[row + 2 * n] += share * self._level_forces(entered.states).reactions[k]
 
@@ -209,7 +209,7 @@ class ConstantForces:
     def _read_constants(self, level: int) -> _LevelConstants:
         arrays = self.arrays
         loaded, n, r = arrays.loaded[int(arrays.ints[level + a.NUMBER])], self._width(level), self._modes(level)
-        own, level_exits, inverse = loaded.level, exits_of(loaded), _compliance(loaded.modal)
+        plain, level_exits, inverse = loaded.level, exits_of(loaded), _compliance(loaded.modal)
         free_share = _free_mode_share(loaded.modal, inverse)
         if np.any(free_share) and arrays.ints[level + a.FORCE] < 0:
             place = arrays.buffers.take("numbers", r)
@@ -220,10 +220,10 @@ class ConstantForces:
         rows, energy = ints[exits + a.SIGNAL + a.ROW], int(ints[level + a.POTENTIAL])
         forms = numbers[energy + 1 + n + r :][: (n - r) * n].reshape(n - r, n)
         follow_rows = numbers[ints[level + a.FOLLOWS] :][: ints[level + a.FOLLOW_COUNT] * (n + 1)].reshape(-1, n + 1)
-        gaps, patterns, channels = len(own.gap_rows), self._patterns(level), np.arange(n - r)
+        gaps, patterns, channels = len(plain.gap_rows), self._patterns(level), np.arange(n - r)
         parts = [
             (ints[level + a.MOTION] + 2 * n + (2 * n + 1) * np.arange(r), free_share),
-            (ints[level + a.GAPS] + n + (n + 1) * np.arange(gaps), own.gap_rows[:, :r] @ inverse),
+            (ints[level + a.GAPS] + n + (n + 1) * np.arange(gaps), plain.gap_rows[:, :r] @ inverse),
             (energy + 1 + np.arange(r), numbers[energy + 1 + n :][:r, None] * inverse),
             (energy + 1 + r + channels, forms[:, :r] @ inverse),
             (ints[level + a.PATTERNS] + n + (n + 1) * channels, patterns @ inverse),
@@ -232,7 +232,7 @@ class ConstantForces:
             (rows + 2 * n, numbers[rows[:, None] + np.arange(r)] @ inverse),
         ]
         places = np.concatenate([at for at, _ in parts])
-        gains = np.zeros((len(places), r + len(own.indices)))
+        gains = np.zeros((len(places), r + len(plain.indices)))
         gains[:, :r] = np.vstack([gain[: len(at)] for at, gain in parts])
         for e, (element, exit_) in enumerate(level_exits):
             for k, share in force_shares(loaded, element, exit_):
@@ -271,4 +271,4 @@ class ConstantForces:
 
 
 def _nothing(states: tuple[int, ...]) -> LevelForces:
-    raise AssertionError("no force has been given yet")
+    raise AssertionError("no forces have been set yet")
